@@ -1,10 +1,10 @@
-//! Acceleration structures: time per sample of each structure, and its growth with the number of
-//! objects.
+//! Acceleration structures: time per sample with each structure, and growth of this time with the
+//! number of objects.
 //!
 //! - The structures are compared on three scenes: the reflecting tracks (a mirror ball and rows of
 //!   small balls), 300 objects of several kinds, and a mesh.
 //! - The growth is measured on the tracks with different numbers of balls, and on a cloud of
-//!   objects at random positions.
+//!   spheres at random positions.
 //!
 //! `cargo bench -p zerkalo-benches --bench acceleration`. It runs on one core. The structures take
 //! turns on each scene; the shortest of five times counts.
@@ -24,15 +24,15 @@ use zerkalo::scene::{Acceleration, Document, Object, Scene};
 use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-/// Picture size, in pixels, of the reflecting tracks when the number of balls varies.
+/// Picture size of the scene of the reflecting tracks when its number of balls varies, in pixels.
 const SIZE: [u32; 2] = [640, 480];
-/// Picture size, in pixels, of all other measured scenes.
+/// Picture size of all other measured scenes, in pixels.
 const SMALL: [u32; 2] = [320, 240];
 
 /// Samples per pixel of each measured render.
 const SAMPLES: u32 = 8;
 
-/// A compiled scene and a film for it.
+/// Compiled scene, and a film for its picture.
 struct Bench {
     world: AnyWorld,
     film: Film,
@@ -55,7 +55,7 @@ impl Bench {
         Self { world, film, estimator, pool }
     }
 
-    /// Traces the samples of the picture on this thread, tile by tile.
+    /// Traces [`SAMPLES`] samples of every pixel on this thread, tile by tile.
     fn trace(&mut self) {
         let sampling = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         self.film.restart();
@@ -140,8 +140,8 @@ fn tracks(scene: &Scene, n: usize) -> Scene {
     scene
 }
 
-/// Prints the nanoseconds per sample by number of spheres, for the automatic choice of the
-/// acceleration structure and for a BVH.
+/// Prints the nanoseconds per sample of each of `scenes`, which are given with their numbers of
+/// spheres: for the automatic choice of the acceleration structure, and for a BVH.
 fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
     let times_with = |acceleration| {
         times(scenes.iter().map(|(_, s)| Bench::new(s, acceleration, size)).collect())

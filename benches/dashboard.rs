@@ -20,7 +20,7 @@ const SIZE: [u16; 2] = [160, 45];
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
 
 /// Latency of one key press, read from a line of the file that `--trace` writes. `picture` is
-/// `true` if the response is a new picture.
+/// `true` if the response is a new picture, and `false` if only panels change.
 struct Event {
     picture: bool,
     milliseconds: f64,

@@ -2,7 +2,7 @@
 //!
 //! - intersection, by kind of primitive and SIMD type
 //! - a linear list of primitives against a BVH
-//! - whole paths in the physical mirror room, by SIMD type
+//! - whole paths in the scene mirror-room-physical, by SIMD type
 //! - the sampler
 //! - compilation of a scene
 //! - one wave (set of concurrent jobs) of samples
@@ -55,8 +55,8 @@ impl Random {
         }
     }
 
-    /// Returns a coherent packet of rays from a point of the sphere of radius 4 towards points
-    /// within 1 of the origin.
+    /// Returns a packet of rays from one point, on the sphere of radius 4 around the origin,
+    /// towards points within 0.02 of a random point of the unit ball.
     fn rays<L: SimdFloat>(&mut self) -> Ray<L> {
         let (from, to) = (4.0 * self.direction(), self.direction() * self.next());
         let mut lane = || to + 0.02 * self.direction() - from;
@@ -99,7 +99,8 @@ fn kinds(c: &mut Criterion) {
     }
 }
 
-/// Measures ray queries for spheres that fill a unit ball, with a linear list and with a BVH.
+/// Measures closest hits of rays on spheres at random positions in a unit ball, with a linear list
+/// and with a BVH.
 fn list_or_tree(c: &mut Criterion) {
     for n in [8, 16, 24, 32, 64, 256, 4096] {
         let mut random = Random(n as u64);
@@ -126,9 +127,9 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Measures a render of sixteen samples per pixel of a small physical mirror room on one thread,
-/// with accumulation in the film. The ratio of the results for two SIMD types is the speed-up in a
-/// whole render.
+/// Measures a render of the scene mirror-room-physical on one thread, with accumulation in the
+/// film: 16 samples for each of 160x120 pixels. The ratio of the results for two SIMD types is the
+/// speed-up in a whole render.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];
@@ -178,8 +179,8 @@ fn compile(c: &mut Criterion) {
     c.bench_function("compile the mirror room", |b| b.iter(|| AnyWorld::compile(&scene, &options)));
 }
 
-/// Measures one wave (set of concurrent jobs): 8 samples per pixel of 640x480 pixels, on one
-/// thread.
+/// Measures one wave (set of concurrent jobs) in the scene mirror-room-physical on one thread: 8
+/// samples for each of 640x480 pixels.
 fn wave(c: &mut Criterion) {
     let scene = physical();
     let mut group = c.benchmark_group("wave of 8 samples, 640x480");

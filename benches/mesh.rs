@@ -48,8 +48,9 @@ fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     corners.map(block).collect()
 }
 
-/// Returns `rays` random rays in packets. `spread` is the largest distance between the unit
-/// directions of two rays of a packet. If it is above 1, all rays are independent of each other.
+/// Returns `rays` random rays in packets. The rays of a packet have a common origin, and their unit
+/// directions differ by a vector of at most the length `spread`. If `spread` is above 1, all rays
+/// are independent of each other.
 fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)
@@ -68,8 +69,8 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
 }
 
 /// Returns the number of rays, in millions, that are traced per second. `as_packet` selects packet
-/// traversal (`true`) or single-ray traversal (`false`). If `as_packet` is `None`, the coherence of
-/// each packet decides between the two.
+/// traversal (`true`) or single-ray traversal (`false`). If it is `None`, the program chooses
+/// between them for each packet, by the coherence of its rays.
 fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) -> f64 {
     let limit = L::from_f64(L::MAX);
     let seconds = in_turns(

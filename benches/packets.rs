@@ -1,9 +1,9 @@
 //! Comparison of ray packets with single rays: closest hits per second by kind of primitive, and
 //! samples per second of whole scenes. The same kernels run with packets of several lanes, and with
-//! single rays in packets of one lane.
+//! packets of one lane, which are single rays.
 //!
-//! `cargo bench -p zerkalo-benches --bench packets`. It runs on one core. The two widths take
-//! turns.
+//! `cargo bench -p zerkalo-benches --bench packets`. It runs on one core. Packets and single rays
+//! take turns.
 
 #[path = "common/mod.rs"]
 mod common;

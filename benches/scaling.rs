@@ -118,9 +118,9 @@ impl Times {
 }
 
 impl Setup {
-    /// Returns the size of the file of one of `shards` shards, in megabytes. `blocks` is the mean
-    /// number of blocks of samples in a tile. With fewer shards than blocks, every file holds
-    /// samples of all tiles.
+    /// Returns the size in megabytes of a film file, if the render is divided into `shards` shards
+    /// with one file each. `blocks` is the mean number of blocks of samples in a tile. With fewer
+    /// shards than blocks, every file holds samples of all tiles.
     fn part(&self, shards: usize, blocks: f64) -> f64 {
         self.part_mb * (blocks / shards as f64).min(1.0)
     }

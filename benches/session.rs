@@ -1,7 +1,7 @@
 //! Latency of a session, which renders on a background thread. It is measured for requests of
-//! pictures, for edits of the scene, and for other tasks that run on this thread. The argument is
-//! the size of the film in pixels. Prints median, 99th percentile and maximum in milliseconds. The
-//! default sizes are 640x480 and 3840x2160 pixels.
+//! pictures, for edits of the scene, and for tasks that a client runs on the background thread. The
+//! argument is the size of the film in pixels. Prints median, 99th percentile and maximum in
+//! milliseconds. The default sizes are 640x480 and 3840x2160 pixels.
 //!
 //! cargo bench -p zerkalo-benches --bench session -- 3840x2160
 

@@ -98,11 +98,9 @@ fn random_scenes_are_equal_under_every_acceleration() {
     }
 }
 
-/// Compares the acceleration structures on small and elongated pictures with view angles from
-/// narrow to almost 180 degrees. One tile may span more than a half space around its centre. The
-/// scene has planes and rectangles of every slope, and a pyramid whose coordinates are large
-/// compared to its size. At the pyramid's silhouette, the face that is closest to the rounded hit
-/// point may face away from the ray.
+/// Compares the acceleration structures on a pyramid whose coordinates are large compared to its
+/// size. At the pyramid's silhouette, the face that is closest to the rounded hit point may face
+/// away from the ray.
 #[test]
 fn silhouette_edges_are_equal_under_every_acceleration() {
     let text = "film.size = [10, 30]\n\
@@ -116,6 +114,9 @@ fn silhouette_edges_are_equal_under_every_acceleration() {
     same("pyramid", &parsed(text), Precision::Single, 64);
 }
 
+/// Compares the acceleration structures on small and elongated pictures with view angles from 5 to
+/// 179 degrees. One tile may span more than a half space around the tile's centre. Each scene has
+/// two planes, a rectangle, and random objects.
 #[test]
 fn view_angles_are_equal_under_every_acceleration() {
     let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\

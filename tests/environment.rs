@@ -12,8 +12,8 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Returns the mean of each channel over the picture, and its standard error. The error comes from
-/// the difference of the two replicates (halves of the samples), whose pixels are independent.
+/// Returns the mean of each channel over the picture, and the standard error of the mean. The error
+/// comes from the difference of the two replicates (halves of the samples); pixels are independent.
 fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f64); 3] {
     let rendering = rendered(scene, seed, precision, count);
     assert_eq!(rendering.film.bad_samples().count, 0, "{:?}", rendering.film.bad_samples().first);
@@ -26,8 +26,8 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
     })
 }
 
-/// Returns the scene of a ball of the material `material` in front of `light`. The ball fills most
-/// of the picture.
+/// Returns the scene of a ball that fills most of the picture. The texts `material` and `trace` are
+/// keys of the ball's material and of the trace settings; `light` is a light or a background.
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
         "[film]
@@ -51,7 +51,7 @@ fn ball(material: &str, trace: &str, light: &str) -> Scene {
 
 const WHITE_SKY: &str = "[[light]]\nenvironment = {}";
 
-/// Materials that reflect all light that arrives, as texts of a scene file.
+/// Materials that absorb no light, as texts of a scene file.
 const WHITE: &[&str] = &[
     "diffuse = 1.0",
     "diffuse = 0.0\nreflection = 1.0",
@@ -195,8 +195,8 @@ fn lobes_reflect_a_white_environment_like_a_white_background() {
     assert_eq!(compared, 24.0);
 }
 
-/// Writes a Radiance file without compression. `texel` returns the mantissas and the exponent of a
-/// pixel.
+/// Writes an image file in Radiance format (HDR) without compression. `texel` returns the three
+/// mantissas and the exponent of the pixel in a column and a row.
 fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usize) -> [u8; 4]) {
     let mut bytes =
         format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
@@ -206,8 +206,8 @@ fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usi
     fs::write(path, bytes).unwrap();
 }
 
-/// Returns the scene of a white floor that faces up, fills the picture, and is lit by the image
-/// `sky.hdr` in `folder`.
+/// Returns the scene of a white floor that faces up, fills the picture, and is lit by the
+/// environment image `sky.hdr` in `folder`. `environment` has further keys of this light.
 fn floor(folder: &Path, environment: &str) -> Scene {
     let path = folder.join("scene.toml");
     let text = format!(
@@ -230,9 +230,8 @@ fn floor(folder: &Path, environment: &str) -> Scene {
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Checks an image with a pixel 1e6 times as bright as the others. No sample is invalid. The
-/// radiance of a white floor is the irradiance of the image, integrated over the directions,
-/// divided by pi.
+/// Checks an environment image with a pixel 2^20 times as bright as the others. No sample is
+/// infinite or NaN. The radiance of a white floor is its irradiance by the image, divided by pi.
 #[test]
 fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     let folder = tempfile::tempdir().unwrap();

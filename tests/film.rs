@@ -101,8 +101,8 @@ fn threads_do_not_change_the_bytes() {
     }
 }
 
-/// Adds the first sample of replicate A to each pixel. The pixels are visited by lattices, from
-/// coarse to fine; `steps` are the distances between pixels of each lattice.
+/// Adds the first sample of replicate A (half of the samples) to each pixel. The pixels are visited
+/// in lattices, from coarse to fine; `steps` are the distances between the pixels of each lattice.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;

@@ -34,7 +34,7 @@ fn reported_bias(scene: &Scene, limit: &str) -> Bias {
     }
 }
 
-/// Returns a random scene, and the largest radiance of its surfaces.
+/// Returns a random scene, and an upper bound of the radiance of its surfaces.
 fn random(seed: u64) -> (Scene, f64) {
     let mut numbers = Numbers::new(seed);
     let n = &mut numbers;

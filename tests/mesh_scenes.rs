@@ -226,7 +226,7 @@ fn sphere_mesh_hits_converge_to_sphere() {
 }
 
 /// Checks that the blue background is nowhere visible through a closed red mesh, up to 33 pixels
-/// from the centre of its image.
+/// from the centre of the picture.
 #[test]
 fn closed_mesh_has_no_holes() {
     let desk = Desk::new();

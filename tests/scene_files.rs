@@ -16,7 +16,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Compares `text` with the file at `path`. If `ZERKALO_BLESS` is set, writes it to the file
+/// Compares `text` with the file at `path`. If `ZERKALO_BLESS` is set, writes `text` to the file
 /// instead.
 fn golden(path: &Path, text: &str) {
     if std::env::var_os("ZERKALO_BLESS").is_some() {

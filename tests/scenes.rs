@@ -34,8 +34,8 @@ fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("ZERKALO_ROOT")).join("tests/golden").join(name)
 }
 
-/// Returns the expected text for the scene `name`. If `ZERKALO_BLESS` is set, first writes `actual`
-/// as the expected text.
+/// Returns the expected text from the file `name`. If `ZERKALO_BLESS` is set, first writes `actual`
+/// to this file.
 fn expected(name: &str, actual: impl FnOnce() -> String) -> String {
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         fs::write(golden(name), actual()).unwrap();
@@ -61,8 +61,8 @@ fn every_scene_compiles_to_its_inventory() {
 }
 
 /// Returns two values for each block, row by row: its mean colour, and the squared standard error
-/// of that mean. Half the difference of a pixel's two replicates (halves of the samples) has the
-/// variance of their mean. The squares are added, because pixels are independent.
+/// of that mean. The standard error of a pixel is estimated as half the difference of its two
+/// replicates (halves of the samples). The squares are added, because pixels are independent.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -79,9 +79,9 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     blocks
 }
 
-/// Returns the reference of a scene as text. Each line is for one block of pixels. It contains six
-/// numbers: for the three channels the mean over the renders with all seeds, and for the three
-/// channels the standard error of the block in a single render.
+/// Returns the reference of a scene as text, with one line for each block of pixels. A line
+/// contains six numbers: for the three channels the mean over the renders with all seeds, and for
+/// the three channels the standard error of the block in a single render.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;

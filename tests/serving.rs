@@ -115,8 +115,8 @@ fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
     rendering
 }
 
-/// Returns a changed value for `key` of `scene`. The value may be invalid. Returns `None` if the
-/// scene has no such key.
+/// Returns a changed value for `key` of `scene`. The value may be invalid. Returns `None` if no
+/// value can be derived, such as for a table that the scene does not have.
 fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value> {
     // An earlier edit may have removed the table.
     let materials = scene.get("materials").and_then(Value::as_table).into_iter();
@@ -250,8 +250,8 @@ impl Bench {
         Self { base, film, pool, tried: 0, served: 0, by_key: Default::default() }
     }
 
-    /// Checks the picture if the film is reused for the edited scene. Returns `true` if it is
-    /// reused, and `None` if the edit is invalid.
+    /// Checks the picture if the film is reused for the edited scene `changed`. Returns `true` if
+    /// it is reused, `false` if it is not, and `None` if the edited scene is invalid.
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
         let edited = scene(changed, &self.base.resolver)?;
         self.tried += 1;
@@ -318,8 +318,8 @@ fn relit_film_equals_render_of_the_edited_scene() {
     }
 }
 
-/// Checks that a film does not serve a scene in which a material has changed that only a part of a
-/// compound names.
+/// Checks that a film is not reused for a scene in which a material has changed, even if only a
+/// part of a compound has this material.
 #[test]
 fn material_of_a_compound_part_prevents_relighting() {
     let mut bench = Bench::new();

@@ -44,7 +44,7 @@ fn scene() -> Arc<Scene> {
 }
 
 /// Waits for the end of the render of the scene with the generation (version number) `generation`.
-/// Returns its report.
+/// Returns the final report of the render.
 fn finished(session: &Session, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {

@@ -137,7 +137,9 @@ fn interrupted_shard_equals_uninterrupted() {
 }
 
 /// Results of a render that is planned for eight shards (parts, each for one process). The noise is
-/// divided by the noise target, and the number of rays by that of an adaptive render.
+/// divided by the noise target, and the number of rays by that of an adaptive render with this
+/// target. `pilot` is the fraction of the rays in the pilot (trial render). `imbalance` is the
+/// excess of the largest shard's rays over the mean, as a fraction.
 struct Planned {
     noise: f64,
     rays: f64,

@@ -15,8 +15,8 @@ pub fn seconds(start: Instant) -> f64 {
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-/// Returns the shortest time in seconds of each of `candidates`, over `rounds` rounds in which all
-/// candidates take turns.
+/// Returns the shortest time in seconds that each function of `candidates` takes. There are
+/// `rounds` rounds, in which all functions take turns.
 pub fn in_turns(rounds: usize, candidates: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     let clock = Instant::now();
     let mut best = vec![f64::INFINITY; candidates.len()];

@@ -71,15 +71,16 @@ pub struct BuildQuality {
 }
 
 impl BuildQuality {
-    /// Build settings for a BVH of a million primitives or more. The build is shorter and the ray
-    /// queries are slower than with [`BuildQuality::MEDIUM`].
+    /// Build settings for a BVH of a million primitives or more. The build takes less time and the
+    /// ray queries take more time than with [`BuildQuality::MEDIUM`].
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
         second_reinsertion: 0.0,
         traversal_cost: 3.0,
     };
-    /// Settings of a thorough build, for primitives with expensive intersection tests.
+    /// Build settings for primitives whose intersection tests take much time. The build takes more
+    /// time and the ray queries take less time than with [`BuildQuality::FAST`].
     pub const MEDIUM: Self = Self {
         window: SearchWindow { narrow_passes: 3, distance: 14 },
         reinsertion: 0.05,

@@ -154,7 +154,7 @@ fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
-/// Returns a packet with `x` in all lanes.
+/// Returns a SIMD vector with `x` in all lanes.
 #[inline(always)]
 pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))

@@ -63,7 +63,7 @@ impl<L: SimdFloat> Hit<L> {
     }
 
     /// Accepts a hit on primitive `item` at distance `t` in the lanes of `mask` where `t` is
-    /// positive and smaller than the current distance.
+    /// positive and smaller than the distance of the hit in `self`.
     #[inline(always)]
     pub fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);

@@ -4,7 +4,7 @@
 //! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
 //! this place skips subtrees that cannot improve the sum. If boxes are nested, the search cannot
 //! skip any subtree and would visit all other nodes for each node. In this case the optimisation
-//! ends early, at the bound.
+//! ends when the number of node visits reaches its bound.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode, sibling};
 

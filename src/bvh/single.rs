@@ -1,5 +1,5 @@
-//! Single-ray BVH traversal, interleaved across the lanes of a packet: while one ray waits for a
-//! node or leaf from memory, the others advance.
+//! Single-ray BVH traversal of all rays of a packet, interleaved: while one ray waits for a node or
+//! leaf from memory, the others advance.
 //!
 //! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
 //! The other children wait in a stack frame, unsorted. When the ray returns to the frame, the

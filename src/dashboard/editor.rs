@@ -9,7 +9,8 @@ const MOST: usize = 400;
 /// Editor of a line of text, with a cursor. It also holds the reason why the text was refused.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
-    input: Input,
+    /// Text and cursor.
+    pub input: Input,
     /// Reason why the text was refused, in one or two sentences. It is shown until the text
     /// changes.
     pub problem: Option<String>,
@@ -24,17 +25,6 @@ impl Editor {
     /// Returns the text that is being edited.
     pub fn text(&self) -> &str {
         self.input.value()
-    }
-
-    /// Returns the width in columns of the text before the cursor.
-    pub fn cursor_columns(&self) -> usize {
-        self.input.visual_cursor()
-    }
-
-    /// Returns the number of columns by which the text must be scrolled to the left to keep the
-    /// cursor visible in a field of `width` columns.
-    pub fn scroll_columns(&self, width: usize) -> usize {
-        self.input.visual_scroll(width)
     }
 
     /// Applies a key to the text. Returns `true` if it is an editing key. Returns `false` for other
@@ -98,7 +88,7 @@ mod tests {
         press(&mut editor, "Backspace Left x Home 1 Delete End Ctrl-w");
         assert_eq!(editor.text(), "1.5 ");
         press(&mut editor, "Ctrl-u é 鏡");
-        assert_eq!((editor.text(), editor.cursor_columns()), ("é鏡", 3));
+        assert_eq!((editor.text(), editor.input.visual_cursor()), ("é鏡", 3));
         for key in ["Enter", "Esc", "Tab", "Up", "Down", "F2", "Ctrl-s", "Alt-x"] {
             assert!(!editor.key(key.parse().unwrap()), "{key}");
         }

@@ -1,5 +1,7 @@
 //! Contexts (panels and modes) in which keys are looked up in the command table.
 
+use std::iter::successors;
+
 /// Panel or mode of the dashboard in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum KeyContext {
@@ -44,17 +46,11 @@ impl KeyContext {
 
     /// Returns the contexts in which a key is looked up while this one is active. The first context
     /// with a command for the key determines the command.
-    pub fn chain(self) -> &'static [Self] {
-        match self {
-            Self::Anywhere => &[Self::Anywhere],
-            Self::Picture => &[Self::Picture, Self::Anywhere],
-            Self::Moving => &[Self::Moving, Self::Picture, Self::Anywhere],
-            Self::Turning => &[Self::Turning, Self::Picture, Self::Anywhere],
-            Self::Flying => &[Self::Flying, Self::Picture, Self::Anywhere],
-            Self::Probing => &[Self::Probing, Self::Picture, Self::Anywhere],
-            Self::Outline => &[Self::Outline, Self::Anywhere],
-            Self::Inspector => &[Self::Inspector, Self::Anywhere],
-            Self::Overlay => &[Self::Overlay],
-        }
+    pub fn chain(self) -> impl Iterator<Item = Self> {
+        successors(Some(self), |context| match context {
+            Self::Anywhere | Self::Overlay => None,
+            Self::Picture | Self::Outline | Self::Inspector => Some(Self::Anywhere),
+            Self::Moving | Self::Turning | Self::Flying | Self::Probing => Some(Self::Picture),
+        })
     }
 }

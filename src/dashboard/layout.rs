@@ -89,55 +89,31 @@ pub fn layout(request: &Request) -> Option<Layout> {
     let (image, raster) = fitted(inside, request.film);
     let [outline, inspector, plot] = match side {
         0 => [None; 3],
-        _ => {
-            let column = Rect { x: width - side, y: 0, width: side, height: rows };
-            if request.watching { watch_column(column) } else { edit_column(column, request.focus) }
-        }
+        _ => side_panels(Rect { x: width - side, y: 0, width: side, height: rows }, request),
     };
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
 /// Divides the side column of the screen into three panels, from top to bottom: the outline (the
 /// list of all parts of the scene), the inspector (properties of the selection) and the convergence
-/// plot. Panels without room are `None`.
-fn edit_column(side: Rect, focus: Focus) -> [Option<Rect>; 3] {
+/// plot. Panels without room are `None`. The table of watched files takes the place of the outline
+/// and the inspector.
+fn side_panels(side: Rect, request: &Request) -> [Option<Rect>; 3] {
     let rows = side.height;
-    let part = |y: u16, height: u16| Some(Rect { y: side.y + y, height, ..side });
-    if rows < 16 {
-        // There is room for one panel only.
-        return match focus {
-            Focus::Outline => [part(0, rows), None, None],
-            _ => [None, part(0, rows), None],
-        };
-    }
-    let plot = plot_rows(rows);
+    let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+    // The outline and the inspector share `left` rows. In less than 16 rows, there is room for one
+    // of them only. The outline gets the larger part if it has the focus and the column has fewer
+    // than 40 rows. Otherwise the inspector gets the larger part.
     let left = rows - plot;
-    // The outline and the inspector share `left` rows. The outline gets the larger part if it has
-    // the focus and the column has fewer than 40 rows. Otherwise the inspector gets the larger
-    // part.
-    let outline = match focus {
-        _ if rows >= 40 => left * 2 / 5,
-        Focus::Outline => left * 3 / 5,
+    let outline = match request.focus {
+        _ if request.watching => left,
+        Focus::Outline if rows < 16 => left,
+        _ if rows < 16 => 0,
+        Focus::Outline if rows < 40 => left * 3 / 5,
         _ => left * 2 / 5,
     };
-    let plot = if plot > 0 { part(left, plot) } else { None };
-    [part(0, outline), part(outline, left - outline), plot]
-}
-
-/// Divides the side column of the screen into the table of watched files and the convergence plot.
-/// Returns three areas in the order of [`edit_column`]. The first is the table, which takes the
-/// place of the outline. The second, for the inspector, is `None`. The third is the plot, or `None`
-/// if there is no room for it.
-fn watch_column(side: Rect) -> [Option<Rect>; 3] {
-    let plot = plot_rows(side.height);
-    let table = Rect { height: side.height - plot, ..side };
-    let plot = (plot > 0).then(|| Rect { y: side.y + table.height, height: plot, ..side });
-    [Some(table), None, plot]
-}
-
-/// Returns the height of the convergence plot in a column of `rows` rows, or 0 if there is no room.
-fn plot_rows(rows: u16) -> u16 {
-    if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 }
+    let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
+    [part(0, outline), part(outline, left - outline), part(left, plot)]
 }
 
 /// Returns two values. The first is the largest area with the film's aspect ratio that fits into

@@ -4,7 +4,7 @@ use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
-use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
+use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
 use crate::film::{Display, LinearImage, PixelProbe};
@@ -126,8 +126,6 @@ pub struct WatchTable {
 pub struct RunningExport {
     /// Width and height of the exported image in pixels.
     pub size: [u32; 2],
-    /// File format of the exported image.
-    pub format: Format,
     /// Progress of the export's render, 0..=1.
     pub progress: f64,
 }
@@ -238,6 +236,12 @@ pub struct Model {
 pub fn short_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     sanitized(&name.to_string_lossy())
+}
+
+/// Returns the first of `errors` as one line.
+pub(super) fn first_line(errors: &SceneErrors) -> String {
+    let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
+    first.lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }
 
 impl Model {

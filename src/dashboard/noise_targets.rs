@@ -2,11 +2,10 @@
 //! them.
 
 use crate::dashboard::convergence::Convergence;
-use crate::dashboard::model::Model;
 use crate::render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each of the noise targets [`QUALITIES`].
-const LOOKS: [&str; QUALITIES.len()] = [
+pub const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is visible",
     "grain in dark and even parts",
     "grain is visible by comparison",
@@ -32,35 +31,9 @@ pub enum Cost {
     Unknown,
 }
 
-/// Noise target that the user can select: a noise value at which rendering stops.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoiseTarget {
-    /// Target noise: estimated root mean square error of the picture, in 8-bit levels.
-    pub noise_codes: f64,
-    /// Visual quality at this noise, in a few words.
-    pub looks: &'static str,
-    /// Render time to reach the noise target.
-    pub cost: Cost,
-    /// `true` if this noise target is the current stop criterion.
-    pub is_target: bool,
-}
-
-impl Model {
-    /// Returns the noise targets, the fastest to reach first.
-    pub fn noise_targets(&self) -> [NoiseTarget; QUALITIES.len()] {
-        let report = self.snapshot.as_ref().map(|snapshot| &snapshot.report);
-        std::array::from_fn(|i| NoiseTarget {
-            noise_codes: QUALITIES[i],
-            looks: LOOKS[i],
-            cost: report.map_or(Cost::Unknown, |report| cost(report, &self.convergence, i)),
-            is_target: self.stop.noise_codes == Some(QUALITIES[i]),
-        })
-    }
-}
-
 /// Returns the render time to reach the noise target `QUALITIES[at]`. `report` is the latest report
 /// of the render, and `convergence` the history of the picture's noise.
-fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
+pub fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
     let reached = report.noise.is_some_and(|noise| noise.rmse_codes <= QUALITIES[at]);
     match report.quality_seconds[at] {
         _ if reached => Cost::Reached(convergence.seconds_at(QUALITIES[at])),

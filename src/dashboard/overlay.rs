@@ -3,6 +3,7 @@
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::model::FieldList;
+use crate::dashboard::update::UpdateContext;
 use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
@@ -25,7 +26,7 @@ pub enum Overlay {
         scroll: usize,
     },
     /// List of noise targets (noise values at which rendering can stop) with the time to reach each
-    /// of them: [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
+    /// of them: [`noise_targets`](crate::dashboard::noise_targets).
     NoiseTargets {
         /// Index of the noise target under the cursor.
         cursor: usize,
@@ -91,8 +92,6 @@ pub struct CommandPalette {
 /// List from which the user picks an entry.
 #[derive(Clone, Debug)]
 pub struct Pick {
-    /// Use of the entry that the user picks.
-    pub purpose: PickFor,
     /// Title of the list of entries.
     pub title: String,
     /// Name and description of each entry. The description may be empty.
@@ -101,18 +100,8 @@ pub struct Pick {
     pub cursor: usize,
     /// Index of the first visible entry of the list.
     pub scroll: usize,
-}
-
-/// Use of an entry that the user picks from a list.
-#[derive(Clone, Debug, PartialEq)]
-pub enum PickFor {
-    /// The picked entry is the kind of an object, which is added to the scene.
-    Object,
-    /// The picked entry is the kind of a light, which is added to the scene.
-    Light,
-    /// The picked entry is the new value of a property. The fields are the part of the scene that
-    /// has the property, and the property's key in the scene file.
-    Word(Target, String),
+    /// Function that uses the name of the picked entry.
+    pub(super) take: fn(&mut UpdateContext<'_>, &str),
 }
 
 /// Form for a new object or light. The picture previews the result while the form is open.
@@ -138,29 +127,14 @@ pub struct Form {
 /// Prompt in which the user types a line of text, such as a path.
 #[derive(Clone, Debug)]
 pub struct Prompt {
-    /// Use of the text that the user types.
-    pub purpose: PromptFor,
     /// Title of the prompt, such as `save as`.
     pub title: String,
     /// Description of valid text, for the user.
     pub help: String,
     /// Editor of the text.
     pub editor: Editor,
-}
-
-/// Use of the text that the user types into a prompt.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum PromptFor {
-    /// The typed text is the path of a file, to which the scene is saved.
-    SaveAs,
-    /// The typed text is the new name of this part of the scene.
-    Rename(Target),
-    /// The typed text is the name under which the current camera is stored.
-    StoreView,
-    /// The typed text contains the stop criteria of the render.
-    StopAt,
-    /// The typed text contains the size and the file format of an image to render and export.
-    ExportSized,
+    /// Function that applies the text, or returns the reason why the text is not valid.
+    pub(super) apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
 }
 
 /// Question with a few answers, each with a letter.

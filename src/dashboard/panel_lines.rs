@@ -8,30 +8,41 @@ use crate::scene::Scene;
 use crate::scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use crate::value::truncated;
 
-/// Line of the outline, the list of all parts of the scene.
+/// Line of a list in a panel or form: a heading or an entry.
 #[derive(Clone, Debug, PartialEq)]
-pub enum OutlineLine {
-    /// Heading of a section of the outline, the list of all parts of the scene.
-    Heading(&'static str),
-    /// Part of the scene that can be selected.
-    Entry {
-        /// Part of the scene that the entry selects.
-        subject: Target,
-        /// Name of the part, with control characters escaped.
-        label: String,
-        /// Note after the name: the material of an object, `off` for a light that is off, or the
-        /// key that recalls a stored camera. Empty for other parts.
-        note: String,
-    },
+pub enum ListLine<T> {
+    /// Heading of the entries below.
+    Heading(String),
+    /// Entry, which can be under the cursor.
+    Entry(T),
 }
 
+impl<T> ListLine<T> {
+    /// Returns the entry of the line. Returns `None` for a heading.
+    pub fn entry(&self) -> Option<&T> {
+        match self {
+            Self::Entry(entry) => Some(entry),
+            Self::Heading(_) => None,
+        }
+    }
+}
+
+/// Line of the outline, the list of all parts of the scene.
+pub type OutlineLine = ListLine<OutlineEntry>;
+
 /// Line of the inspector or of a form.
+pub type PanelLine = ListLine<Box<FieldLine>>;
+
+/// Part of the scene that can be selected in the outline.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PanelLine {
-    /// Heading of the fields below.
-    Heading(String),
-    /// Line that shows the value of a property, or one number of it.
-    Field(Box<FieldLine>),
+pub struct OutlineEntry {
+    /// Part of the scene that the entry selects.
+    pub subject: Target,
+    /// Name of the part, with control characters escaped.
+    pub label: String,
+    /// Note after the name: the material of an object, `off` for a light that is off, or the key
+    /// that recalls a stored camera. Empty for other parts.
+    pub note: String,
 }
 
 /// Line of the inspector or of a form that shows the value of a property, or one number of it.
@@ -54,26 +65,6 @@ pub struct FieldLine {
     pub swatch: Option<[f64; 3]>,
 }
 
-impl OutlineLine {
-    /// Returns the part of the scene that the line selects. Returns `None` for a heading.
-    pub fn subject(&self) -> Option<&Target> {
-        match self {
-            Self::Entry { subject, .. } => Some(subject),
-            Self::Heading(_) => None,
-        }
-    }
-}
-
-impl PanelLine {
-    /// Returns the property of the line. Returns `None` for a heading.
-    pub fn field(&self) -> Option<&FieldLine> {
-        match self {
-            Self::Field(field) => Some(field),
-            Self::Heading(_) => None,
-        }
-    }
-}
-
 /// Returns the lines of the outline, the list of all parts of `scene`.
 pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
@@ -81,7 +72,7 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut views = 0;
     for (section, subject) in subjects(scene) {
         if last != Some(section) {
-            lines.push(OutlineLine::Heading(section.title()));
+            lines.push(OutlineLine::Heading(section.title().to_string()));
             last = Some(section);
         }
         let note = match &subject {
@@ -93,7 +84,8 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
             Target::Object(i) => truncated(&scene.objects[*i].material),
             _ => String::new(),
         };
-        lines.push(OutlineLine::Entry { label: subject.label(scene), subject, note });
+        let label = subject.label(scene);
+        lines.push(OutlineLine::Entry(OutlineEntry { subject, label, note }));
     }
     lines
 }
@@ -101,7 +93,8 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
 /// Returns the index of the line that selects `subject` in the outline, the list of all parts of
 /// the scene. Returns `None` if there is none.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
-    lines.iter().position(|line| line.subject() == Some(subject))
+    let selects = |line: &OutlineLine| line.entry().is_some_and(|entry| entry.subject == *subject);
+    lines.iter().position(selects)
 }
 
 /// Returns the lines of the inspector: the properties of `subject`, and those of its material if it
@@ -137,7 +130,7 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let rows = rows(scene, subject).unwrap_or_default();
     rows.into_iter()
         .flat_map(|property| lines_of(subject, property))
-        .map(|f| PanelLine::Field(Box::new(f)))
+        .map(|f| PanelLine::Entry(Box::new(f)))
         .collect()
 }
 
@@ -181,7 +174,7 @@ impl Model {
 /// or after `wanted`. If there is none, it is the last one before `wanted`. Returns 0 if no line
 /// shows a property.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
-    let field = |i: &usize| lines[*i].field().is_some();
+    let field = |i: &usize| lines[*i].entry().is_some();
     (wanted..lines.len())
         .find(field)
         .or_else(|| (0..lines.len().min(wanted)).rev().find(field))
@@ -192,7 +185,7 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
 /// downwards if `steps` is positive. Headings are skipped and not counted. The cursor stops at the
 /// first and at the last line with a property.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
-    let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
+    let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].entry().is_some()).collect();
     let position =
         fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
     let to = position.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
@@ -227,14 +220,12 @@ mod tests {
         }
         let notes: Vec<_> = lines
             .iter()
-            .filter_map(|line| match line {
-                OutlineLine::Entry { label, note, .. } => Some(format!("{label}/{note}")),
-                OutlineLine::Heading(_) => None,
-            })
+            .filter_map(OutlineLine::entry)
+            .map(|entry| format!("{}/{}", entry.label, entry.note))
             .collect();
         assert!(notes.contains(&"lamp/off".to_string()) && notes.contains(&"left/key 1".into()));
         let ball = inspector(&scene, &Target::Object(2));
-        let labels: Vec<_> = ball.iter().filter_map(|l| Some(l.field()?.label.clone())).collect();
+        let labels: Vec<_> = ball.iter().filter_map(|l| Some(l.entry()?.label.clone())).collect();
         for label in ["center x", "center z", "radius", "color green", "roughness"] {
             assert!(labels.contains(&label.to_string()), "{labels:?}");
         }
@@ -245,7 +236,7 @@ mod tests {
     fn cursor_skips_headings() {
         let scene = built_in();
         let lines = inspector(&scene, &Target::Object(2));
-        let heading = lines.iter().position(|l| l.field().is_none()).unwrap();
+        let heading = lines.iter().position(|l| l.entry().is_none()).unwrap();
         assert_eq!(walk_fields(&lines, heading - 1, 1), heading + 1);
         assert_eq!(walk_fields(&lines, heading + 1, -1), heading - 1);
         assert_eq!(walk_fields(&lines, 0, -5), 0);

@@ -6,8 +6,8 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Opens the regular file at `path` for reading. Never blocks; opening a pipe would block until its
-/// other end is open.
+/// Opens the regular file at `path` for reading. Never blocks, whereas a plain open of a pipe
+/// blocks until the other end of the pipe is open.
 ///
 /// # Errors
 /// Fails if the file cannot be opened or is not a regular file.

@@ -212,8 +212,10 @@ fn is_stream(path: &Path) -> bool {
 /// link itself, and there need not be a file at it.
 ///
 /// # Errors
+///
 /// [`ErrorKind::PermissionDenied`] with an explanation if [`may_follow`] does not permit a link;
-/// [`ErrorKind::Unsupported`] for a link to an open file of a process.
+/// [`ErrorKind::Unsupported`] for a link to an open file of a process. Fails also if a link cannot
+/// be read, or after [`MAX_LINKS`] links.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_path_buf();
     for _ in 0..MAX_LINKS {

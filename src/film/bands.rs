@@ -15,10 +15,10 @@ pub trait Bands {
 
     /// Returns the metadata of the picture as pairs of a key and a value.
     ///
-    /// A value that is known only after the last row, such as the noise, may change until then.
-    /// Such a value has at most 128 bytes. A key has 1 to 79 printable ASCII characters, without
-    /// leading, trailing or double spaces. Its first letter is upper-case, because the keys that
-    /// OpenEXR itself defines start with a lower-case letter.
+    /// A value that is known only after the last row, such as the noise, may change until the last
+    /// row has been rendered. Such a value has at most 128 bytes. A key has 1 to 79 printable ASCII
+    /// characters, without leading, trailing or double spaces. Its first letter is upper-case,
+    /// because the keys that OpenEXR itself defines start with a lower-case letter.
     fn metadata(&self) -> Vec<(String, String)>;
 }
 

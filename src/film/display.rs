@@ -12,9 +12,9 @@ pub enum Tone {
     /// Tone curve that clips each colour channel at 1.
     #[default]
     Clip,
-    /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It keeps hues,
-    /// compresses the brightest fifth of the range, and subtracts at most 0.04 from all
-    /// channels.
+    /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
+    /// 0.04 from all channels, then compresses the colours whose largest channel is above 0.76. It
+    /// keeps hues.
     Neutral,
 }
 
@@ -57,8 +57,8 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::codes`],
-    /// but is computed several times faster.
+    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::codes`].
+    /// A lookup table makes this method several times faster than that one.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }

@@ -183,8 +183,9 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Finds the cells that a tile overlaps along one axis. The tile begins at pixel `start` and
-    /// has `pixels` pixels.
+    /// Finds the cells that a column or a row of tiles overlaps along one axis. The tiles begin at
+    /// pixel `start` of the film, which has `pixels` pixels along this axis. `coverage` has the
+    /// pixels that each cell of the smaller image overlaps.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =

@@ -113,7 +113,8 @@ impl Estimator {
     }
 
     /// Estimates the error of a tile, even if replicate B (the second half of the samples) has
-    /// fewer samples than A. Returns `None` if A or B has no samples.
+    /// fewer samples than A. Returns `None` if A or B has no samples, or if only some pixels have
+    /// the first sample.
     ///
     /// Let A have n samples and B have m, each of variance v. (A - B)^2 then has the mean v (n + m)
     /// / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m). The half difference is

@@ -59,7 +59,7 @@ fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// Writes the part of a PNG file before the image data, and returns the writer of the rest.
+/// Writes the part of a PNG file before the image data, and returns a writer for the image data.
 fn start<W: Write>(
     picture: &ImageData,
     metadata: &[(String, String)],

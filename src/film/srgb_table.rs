@@ -1,4 +1,5 @@
-//! Lookup table for the sRGB encoding. It is many times faster than the power function.
+//! Lookup table for the sRGB encoding. A lookup is many times faster than the power function of the
+//! exact encoding.
 
 use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
@@ -46,8 +47,8 @@ impl SrgbTable {
         Self { chords }
     }
 
-    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded. It differs from the exact
-    /// value by less than 5.5e-4.
+    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded. The result differs from
+    /// the exact value by less than 5.5e-4 8-bit levels.
     #[inline(always)]
     pub fn code(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;

@@ -251,7 +251,8 @@ impl Tile {
         self.saturated_samples += samples;
     }
 
-    /// Returns the number of samples above the film's limit, which were clamped to it.
+    /// Returns the number of samples above the largest value that the film can store. They were
+    /// clamped to this value.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }

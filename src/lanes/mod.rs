@@ -66,8 +66,8 @@ pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     fn from_f64(x: f64) -> Self;
     /// Converts to double precision without rounding.
     fn to_f64(self) -> f64;
-    /// Converts to an integer, rounded towards zero. Numbers outside the range of `u32` become its
-    /// nearest end.
+    /// Converts to an integer, rounded towards zero. Negative numbers become 0; numbers above the
+    /// largest `u32` become the largest `u32`.
     fn to_u32(self) -> u32;
 }
 

@@ -8,8 +8,9 @@ use crate::material::{Fresnel, Highlight, Lobe, Material};
 use crate::sampling::warp;
 use std::f64::consts::FRAC_1_PI;
 
-/// Largest Phong exponent alpha for which a single-precision cosine is accurate enough. The
-/// relative error of the power cos^alpha is about alpha times 1.5e-7.
+/// Largest Phong exponent alpha for which the power cos^alpha is computed from a cosine. In single
+/// precision the relative error of this power is about alpha times 1.5e-7. For larger exponents the
+/// power is computed from a tangent.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
 /// Model of highlights (the reflections of lights in a surface), compiled for the kernels.
@@ -17,7 +18,7 @@ pub const SHARP_EXPONENT: f64 = 1024.0;
 pub enum SpecularModel<S> {
     /// No highlights.
     None,
-    /// Phong's model: k_s (R.V)^alpha.
+    /// Phong's model: k_s (R.V)^alpha / pi.
     Phong {
         /// Specular coefficient k_s of Phong's model.
         strength: S,
@@ -97,7 +98,8 @@ pub struct Bsdf<S> {
     /// `true` if the surface has a diffuse part or highlights, so that it reflects light that
     /// arrives directly from lights.
     pub has_direct: bool,
-    /// `true` if the back of a surface has the same material as its front.
+    /// `true` if the back of a surface has the same material as its front. `false` if the back has
+    /// no diffuse part, no highlights and no reflection lobe.
     pub two_sided: bool,
 }
 

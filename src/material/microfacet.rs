@@ -1,4 +1,5 @@
-//! Microfacet distributions: Beckmann and GGX, with V-cavity and Smith masking.
+//! Microfacet distributions, Beckmann and GGX, and their masking by V-cavities or by Smith's model.
+//! The formulas of the density D and the sampling of visible normals are in `sampling/warp.rs`.
 
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::Masking;

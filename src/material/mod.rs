@@ -106,7 +106,8 @@ choices! {
         Mirror = "mirror",
         /// uniform directions in a cone
         Cone = "cone",
-        /// uniform points of a square across the mirror direction: cheaper than a cone
+        /// uniform points of a square perpendicular to the mirror direction; takes less time than
+        /// `cone`
         Square = "square",
         /// microfacets with the Beckmann distribution
         Beckmann = "beckmann",

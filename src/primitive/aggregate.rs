@@ -14,12 +14,13 @@ use std::fmt;
 use std::ops::Range;
 
 /// Smallest number of primitives with finite bounds for which a BVH is built. Fewer primitives are
-/// tested one by one. This is faster, because each tile of the picture has a short list of the
-/// primitives that its rays may hit.
+/// tested one by one. For them this is faster than a BVH, because each tile of the picture has a
+/// short list of the primitives that its rays may hit.
 ///
-/// Measured with spheres that fill a ball (`benches/acceleration.rs`): for whole pictures, tests
-/// one by one are faster up to 95 primitives. Without the lists of tiles, the BVH is faster from
-/// about 50 primitives on for coherent packets, and from about 300 on for incoherent ones.
+/// Measured with spheres that fill a ball (`benches/acceleration.rs`): whole pictures with up to 95
+/// primitives render faster by tests one by one than by a BVH. If rays are tested against all
+/// primitives instead of the list of a tile, the BVH is faster from about 50 primitives on for
+/// coherent packets, and from about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
@@ -67,7 +68,8 @@ pub struct PrimitiveSet {
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles the canonical forms `forms` to primitives, with a BVH if there are many.
+    /// Compiles the canonical forms `forms` to primitives, with a BVH if at least
+    /// [`BVH_MIN_PRIMITIVES`] of them have finite bounds.
     pub fn new(forms: &[Form]) -> Self {
         Self::accelerated(forms, Acceleration::Auto)
     }
@@ -227,8 +229,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the result of [`Aggregate::closest_masked`] for the primitives of `set` outside of
-    /// the BVH. Each of these primitives is tested, without bounding boxes.
+    /// Returns the result of [`Aggregate::closest_masked`] for those primitives of `set` that are
+    /// tested one by one, without traversal of the BVH. No bounding boxes are used.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
@@ -320,8 +322,9 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the lanes of `wanted` whose ray hits a primitive of `set` outside of the BVH at a
-    /// distance between 0 and `limit`. Each of these primitives is tested, without bounding boxes.
+    /// Returns the lanes of `wanted` whose ray hits, at a distance between 0 and `limit`, one of
+    /// those primitives of `set` that are tested one by one, without traversal of the BVH. No
+    /// bounding boxes are used.
     #[inline(always)]
     pub fn occluded_linear(
         &self,

@@ -18,7 +18,7 @@ use std::ops::Range;
 /// Point on the surface of a primitive where a ray hits it, one per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
-    /// Hit point, projected onto the surface as exactly as the precision allows.
+    /// Hit point, projected onto the surface as exactly as the precision of the lanes allows.
     pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
     pub normal: Vec3<L>,
@@ -136,9 +136,9 @@ batches! {
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
-    /// Replaces `hit` by the hit with a primitive of the batch in the lanes in which the latter is
-    /// nearer. Only primitives with a number in `range` are tested. The id of a primitive is `base`
-    /// plus its number in the batch.
+    /// Replaces `hit` in the lanes whose ray hits a primitive of the batch nearer than `hit`. Only
+    /// primitives with a number in `range` are tested. The id of a primitive is `base` plus its
+    /// number in the batch.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,

@@ -5,8 +5,9 @@
 use crate::primitive::form::Form;
 use glam::{DVec2, DVec3};
 
-/// Largest error of rays in single precision, as a fraction of the largest coordinate. The true
-/// error is a few times 2^-24; the rest is a safety margin.
+/// Assumed largest displacement of a ray by rounding to single precision, as a fraction of the
+/// largest coordinate. The true displacement is a few times 2^-24; this bound is larger, for
+/// safety.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// Bounding sphere of geometry that rays may hit.
@@ -61,8 +62,8 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns a bound of the rounding error of the origins of the frustum's rays in single
-    /// precision, in scene units.
+    /// Returns the largest distance \[scene units\] by which rounding to single precision displaces
+    /// the origin of a ray of the frustum.
     fn origin_error(&self) -> f64 {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
@@ -109,7 +110,7 @@ pub struct BoundingVolume {
     plane: Option<(DVec3, f64)>,
     /// `true` if no ray that leaves the surface outwards hits the same object again.
     convex: bool,
-    /// Largest distance in scene units between the end of a shadow ray and the position of its
+    /// Largest distance \[scene units\] between the end of a shadow ray and the position of its
     /// light. Occlusion is tested with this tolerance.
     slack: f64,
 }
@@ -216,8 +217,8 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the tolerance for the height of `point` above the plane of this flat object, in
-    /// scene units. At larger heights, rounding errors cannot let a ray from or to `point` hit the
+    /// Returns the tolerance \[scene units\] for the height of `point` above the plane of this flat
+    /// object. At larger heights, rounding errors cannot let a ray from or to `point` hit the
     /// object.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
@@ -226,9 +227,10 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Returns `true` if the object is flat and the light and all points of the sphere `lit` are on
-    /// the same side of its plane. `above` gets this plane as unit normal and offset. It returns
-    /// two values: the height of the light above the plane, and the error of this height.
+    /// Returns `true` if the object is flat, and a light and all points of the sphere `lit` are on
+    /// the same side of the object's plane. `above` receives this plane as unit normal and offset.
+    /// `above` returns two values: the height of the light above the plane, and the error of this
+    /// height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
         let height = normal.dot(lit.center) - offset;

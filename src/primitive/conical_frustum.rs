@@ -213,13 +213,13 @@ struct Chord<L: SimdFloat> {
     point: Vec3<L>,
     /// Direction of the line, of unit length in canonical space.
     direction: Vec3<L>,
-    /// Distance in the scene from the ray's origin to `point`.
+    /// Distance in the scene from the ray's origin to `point`, a point of the ray's line.
     start: L,
     /// Length in the scene of a step of length 1 in canonical space.
     scale: L,
-    /// Distance in canonical space from `point` to the entry of the chord.
+    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's entry.
     enter: L,
-    /// Distance in canonical space from `point` to the exit of the chord.
+    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's exit.
     leave: L,
     /// Lanes whose ray enters through the lateral surface. In other lanes it enters through the
     /// base or the cap.
@@ -243,8 +243,8 @@ impl<L: SimdFloat> Chord<L> {
 /// crosses the lateral surface where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' -
 /// k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a cylinder it compares the
 /// radius with the line's distance from the axis. The roots are computed as q / a and c / q. Here q
-/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator a is
-/// 0; c / q stays finite.
+/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator (a
+/// straight line on the lateral surface), a is 0; c / q stays finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));

@@ -6,10 +6,10 @@
 //! the compound. The line crosses the surface of the compound where an inner and an outer piece
 //! meet.
 //!
-//! Two ends coincide if their distance, measured perpendicular to the surface, is at most [`TIE`]
-//! rounding errors. There is no piece between them. A cut flush with a face therefore leaves no
-//! skin, and parts in contact leave no crack, although rounding errors put equal faces into a
-//! random order. Parts thinner than this distance disappear.
+//! Two ends coincide if the distance between them, measured perpendicular to the surface, is at
+//! most [`TIE`] rounding errors. There is no piece between them. A cut flush with a face therefore
+//! leaves no skin, and parts in contact leave no crack, although rounding errors put equal faces
+//! into a random order. Parts thinner than this distance disappear.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -278,8 +278,8 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Replaces `hit` by the hit with `compound` in the lanes of `wanted` in which the latter is
-    /// nearer. The id of a part in `hit` is `base` plus the number of the part.
+    /// Replaces `hit` in the lanes of `wanted` whose ray hits `compound` nearer than `hit`. The id
+    /// of a part in `hit` is `base` plus the number of the part.
     fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -326,13 +326,13 @@ impl<S: Float> Compounds<S> {
     }
 
     /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this
-    /// surface is nearer. The function steps along each line through `ends`, the sorted ends of the
-    /// parts' spans.
+    /// surface is nearer than `hit`. The function steps along each line through `ends`, the sorted
+    /// ends of the parts' spans.
     ///
-    /// Two ends coincide only if their distance is at most the tolerance (`tie`) of each. The
-    /// tolerance along the line is large at a face that the line grazes. If this tolerance alone
-    /// were enough, the grazed face would absorb other faces. Coincident faces have equal
-    /// tolerances, because their angles to the line are equal.
+    /// Two ends coincide only if the distance between them is at most the tolerance (`tie`) of each
+    /// end. The tolerance along the line is large at a face that the line grazes. If the tolerance
+    /// of one end were enough, the grazed face would absorb other faces. Coincident faces have
+    /// equal tolerances, because their angles to the line are equal.
     #[inline(always)]
     fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,
@@ -374,9 +374,8 @@ impl<S: Float> Compounds<S> {
 }
 
 impl<S: Float> Compounds<S> {
-    /// Replaces `hit` by the hit with a compound in the lanes in which the latter is nearer. Only
-    /// compounds whose first part is in `range` are tested. The id of a part is `base` plus its
-    /// number.
+    /// Replaces `hit` in the lanes whose ray hits a compound nearer than `hit`. Only compounds
+    /// whose first part is in `range` are tested. The id of a part is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,

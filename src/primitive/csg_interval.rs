@@ -10,8 +10,8 @@ use crate::primitive::solid::Span;
 const FLATTEST: f64 = 1e-9;
 
 /// End of an interval in which a line is inside of a solid. `t` is the distance of this end along
-/// the line. Two ends are taken as coincident if their distance is at most the smaller one of their
-/// two tolerances `tie`.
+/// the line. Two ends are taken as coincident if the distance between them is at most the smaller
+/// one of their two tolerances `tie`.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,

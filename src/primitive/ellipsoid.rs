@@ -85,7 +85,8 @@ impl CanonicalShape for EllipsoidForm {
     }
 }
 
-/// Returns the distance between `point` and the image of the unit sphere.
+/// Returns the distance between `point` and the surface of an ellipsoid, the image of the unit
+/// sphere under the map `scene_from_unit`.
 ///
 /// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
 /// closest point q of the surface q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for

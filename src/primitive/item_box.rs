@@ -64,8 +64,9 @@ pub struct ItemBox<S> {
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// Sum of the magnitudes of each row of `rows`: the largest factor by which the map to object
-    /// space enlarges a rounding error.
+    /// Sum of the magnitudes of the entries of each row of `rows`, one sum for each axis of object
+    /// space. It is the largest factor by which the map to object space enlarges a rounding error
+    /// on that axis.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
@@ -80,9 +81,9 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// Assumed largest distance between the bounding box of a solid and the faces that touch the box,
-/// as a fraction of the box's largest coordinate. The distance is not 0, because double precision
-/// rounds the box and the faces differently far from the origin of the scene file.
+/// Assumed largest distance between a side of a solid's bounding box and the part of the solid that
+/// touches this side, as a fraction of the box's largest coordinate. The distance is not 0, because
+/// double precision rounds the box and the solid differently far from the origin of the scene file.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {

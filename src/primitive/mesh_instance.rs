@@ -421,8 +421,9 @@ impl<S: Float> Meshes<S> {
         occluded
     }
 
-    /// Returns the exact surface point and normal of mesh `item` at `point`, a hit point with
-    /// rounding errors. `triangle_tag` is the id of the hit triangle.
+    /// Returns the projection of `point` onto the plane of the hit triangle of mesh `item`, with
+    /// the normal of the triangle. `point` is the computed hit point of a ray, with rounding
+    /// errors. `triangle_tag` is the id of the triangle.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,

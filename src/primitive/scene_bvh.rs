@@ -21,19 +21,19 @@ use glam::DVec3;
 /// Measured with spheres inside a large ball and packets of eight rays. A packet is as fast as
 /// single rays if its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000.
 /// With 100 spheres, even packets of random rays are as fast as single rays. For packets of four
-/// rays the differences are at most half as large.
+/// rays, the differences at which both are equally fast are at most half as large.
 const COHERENCE_LIMIT: f64 = 1.5;
 
 /// BVH over the primitives of a scene, one primitive per leaf.
 pub struct SceneBvh {
     boxes: Bvh8,
-    /// Number of the primitive in each leaf of the BVH.
+    /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
     items: Vec<u32>,
-    /// Largest length of the difference between two ray directions of a coherent packet, divided by
-    /// the number of lanes.
+    /// Largest length of the difference between the direction of any ray of a coherent packet and
+    /// that of its first active ray, divided by the number of lanes.
     turn: f64,
-    /// Largest difference between two ray origins of a coherent packet along any axis, divided by
-    /// the number of lanes.
+    /// Largest difference, along any axis, between the origin of any ray of a coherent packet and
+    /// that of its first active ray, divided by the number of lanes.
     shift: f64,
 }
 
@@ -94,8 +94,8 @@ impl SceneBvh {
         });
     }
 
-    /// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as
-    /// a packet.
+    /// Returns `true` if the rays in the lanes `wanted` traverse the BVH as a packet, because they
+    /// are coherent (see [`COHERENCE_LIMIT`]).
     #[inline(always)]
     fn is_coherent<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {

@@ -267,9 +267,9 @@ impl<L: SimdFloat> UnitLine<L> {
         (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
     }
 
-    /// Returns two values at position `s` of the line: its height over the torus's surface, and the
-    /// derivative of this height by `s`. The height is the squared distance from the ring minus the
-    /// squared radius of the tube. It is negative inside of the torus.
+    /// Returns two values at position `s` of the line: the height of the point above the torus's
+    /// surface, and the derivative of this height by `s`. The height is the squared distance from
+    /// the ring minus the squared radius of the tube. It is negative inside of the torus.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);

@@ -24,7 +24,7 @@ use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
-/// For packets of four the differences are at most half as large.
+/// For packets of four rays, these limits are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
 /// Largest bound on the differences between the rays of a coherent packet, divided by the number of
@@ -258,8 +258,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns `true` if the rays in the bit mask `wanted` are coherent enough to traverse the mesh's
-/// BVH as a packet.
+/// Returns `true` if the rays in the bit mask `wanted` traverse the mesh's BVH as a packet, because
+/// they are coherent (see [`COHERENCE_LIMIT`]).
 #[inline(always)]
 fn is_coherent<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {

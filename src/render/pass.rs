@@ -100,10 +100,10 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     }
 
     /// Traces the samples of `job` in the replicate (half of the samples) with the number
-    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the ray
-    /// counts. A packet has `WIDTH` lanes. It holds `WIDTH` samples of one pixel if its first
-    /// sample index is a multiple of `WIDTH` and at least `WIDTH` samples remain. Otherwise it
-    /// holds samples of several pixels.
+    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the number
+    /// of rays, and a flag that is `true` if a path made a random choice. A packet has `WIDTH`
+    /// lanes. It holds `WIDTH` samples of one pixel if its first sample index is a multiple of
+    /// `WIDTH` and at least `WIDTH` samples remain. Otherwise it holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -150,9 +150,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         tracer.counts()
     }
 
-    /// Traces the samples `first..first + COUNT` of the pixels `pixels` and adds them to their
-    /// tile. A packet holds several pixels. Samples that the film cannot hold are recorded in
-    /// `rejected`.
+    /// Traces the samples `first..first + COUNT` of the pixels `pixels` and adds them to `tile`.
+    /// Each packet holds samples of several pixels. Samples that the film cannot hold are recorded
+    /// in `rejected`.
     #[inline(never)]
     fn trace_shared<const COUNT: usize>(
         &self,
@@ -228,7 +228,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 
     /// Implements [`Self::reject_invalid`] for a packet with at least one invalid sample. A sample
     /// that is NaN or negative in a channel of a light group becomes black in that group. A channel
-    /// above the film's limit, even an infinite one, is reduced to the limit.
+    /// above the largest value that the film can hold, even an infinite one, is reduced to this
+    /// value.
     #[cold]
     fn replace_invalid(
         &self,
@@ -259,7 +260,8 @@ pub(super) struct RejectedSamples {
     /// Samples that are NaN or negative in some light group; the film stores black for this group
     /// instead.
     pub(super) bad: Vec<InvalidSample>,
-    /// Samples above the film's limit in some light group; the film stores the limit instead.
+    /// Samples that are above the largest value that the film can hold in some light group; the
+    /// film stores this value instead.
     pub(super) saturated: Vec<InvalidSample>,
 }
 
@@ -311,8 +313,9 @@ mod tests {
     use crate::lanes::{Float, Single, Vec3};
     use crate::sampling::SamplerKind;
 
-    /// Checks that invalid samples are counted and stored as black, and that the film stores its
-    /// limit in place of samples above it. The sums of other light groups are not affected.
+    /// Checks that invalid samples are counted and stored as black, and that samples above the
+    /// largest value of the film are stored as this value. The sums of other light groups are not
+    /// affected.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
         let scene = crate::scene::Scene::parse(

@@ -18,7 +18,7 @@ pub const fn hash_scalar(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// Returns a 32-bit hash of `words`. It depends on their order.
+/// Returns a 32-bit hash of `words`, which depends on the order of the words.
 pub fn hash_words(words: &[u32]) -> u32 {
     words.iter().fold(0x9e37_79b9, |h, w| {
         hash_scalar(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ hash_scalar(*w))

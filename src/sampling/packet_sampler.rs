@@ -45,7 +45,8 @@ pub struct SampleSettings {
 
 /// Number of Sobol dimensions for a path's first choices between reflection and transmission, one
 /// dimension for each choice. They are the last two dimensions of the joint set, which consists of
-/// the first eight dimensions of a sample, stratified together.
+/// the first eight dimensions of a sample, stratified together. With indirect diffuse light, the
+/// direction of the first diffuse bounce uses them instead.
 const CHOICES: u32 = 2;
 
 /// Largest number of surfaces on a path at which the sampled direction uses the joint set (the
@@ -199,9 +200,8 @@ pub struct PacketSampler<'a, L: SimdFloat> {
 impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
     /// Each segment has numbers of its own for sampled directions and choices. The choices use only
-    /// padded sets (Sobol points with shuffled indices). The two Sobol dimensions for choices are
-    /// not reused here: the choices before the first diffuse bounce and the direction of that
-    /// bounce have used them.
+    /// padded sets (Sobol points with shuffled indices), because the direction of the first diffuse
+    /// bounce uses the two Sobol dimensions for choices.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;

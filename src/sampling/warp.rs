@@ -9,9 +9,10 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
 
 /// Maps the unit square to the unit disk with uniform density. Returns `(x, y, x^2 + y^2)`.
 ///
-/// Concentric squares become concentric circles, so that neighbouring points stay neighbours. An
-/// edge of the integrand across the disk therefore needs no more samples than an edge across the
-/// square. An edge parallel to an axis needs fewer samples than other edges.
+/// Concentric squares become concentric circles, so that neighbouring points stay neighbours. If
+/// the integrand has an edge (a jump) along a line through the disk, the same accuracy therefore
+/// needs no more samples than with such an edge in the square. An edge parallel to an axis needs
+/// fewer samples than other edges.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]

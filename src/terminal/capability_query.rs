@@ -125,7 +125,7 @@ fn listen(
             }
         }
     }
-    input.keep(others);
+    input.early.extend(others);
     Ok(())
 }
 

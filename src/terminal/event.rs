@@ -138,8 +138,7 @@ impl FromStr for Key {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut key = Self { code: Code::Esc, ctrl: false, alt: false, shift: false };
-        let mut name = text;
+        let (mut key, mut name) = (Self::plain(Code::Esc), text);
         for (prefix, flag) in
             [("Ctrl-", &mut key.ctrl), ("Alt-", &mut key.alt), ("Shift-", &mut key.shift)]
         {
@@ -149,18 +148,13 @@ impl FromStr for Key {
             }
         }
         let mut chars = name.chars();
-        key.code = match (chars.next(), chars.next()) {
-            (Some(only), None) => Code::Char(only),
-            (Some('F'), Some('0'..='9')) => {
-                Code::F(name[1..].parse().map_err(|_| format!("no key is called {text:?}"))?)
-            }
-            _ => NAMED
-                .iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, code)| *code)
-                .ok_or_else(|| format!("no key is called {text:?}"))?,
+        let code = match (chars.next(), chars.next()) {
+            (Some(only), None) => Some(Code::Char(only)),
+            (Some('F'), Some('0'..='9')) => name[1..].parse().ok().map(Code::F),
+            _ => NAMED.iter().find(|(known, _)| *known == name).map(|(_, code)| *code),
         };
-        Ok(key)
+        let code = code.ok_or_else(|| format!("no key is called {text:?}"))?;
+        Ok(Self { code, ..key })
     }
 }
 

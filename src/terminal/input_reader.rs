@@ -28,7 +28,9 @@ pub struct InputReader {
     stdin: Stdin,
     decoder: Decoder,
     buffer: Vec<u8>,
-    early: Vec<TimedEvent>,
+    /// Events that were read during the query of the terminal's capabilities. The next
+    /// [`InputReader::wait`] returns them.
+    pub(super) early: Vec<TimedEvent>,
 }
 
 impl InputReader {
@@ -78,12 +80,6 @@ impl InputReader {
                 return Ok(events.into_iter().map(|event| TimedEvent { at, event }).collect());
             }
         }
-    }
-
-    /// Stores `early`, terminal events that were read during the query of the terminal's
-    /// capabilities. The next [`InputReader::wait`] returns them.
-    pub fn keep(&mut self, early: Vec<TimedEvent>) {
-        self.early.extend(early);
     }
 
     /// Waits at most `wait` for input; `None` means without limit. Returns `Some(true)` if input

@@ -38,7 +38,7 @@ impl Restorer {
     /// Fails if there is no shell.
     pub fn start(modes_before: &Termios) -> io::Result<Self> {
         let mut shell = Command::new("/bin/sh")
-            .args(["-c", PROGRAM, LEAVE.as_str()])
+            .args(["-c", PROGRAM, LEAVE])
             .args(stty_arguments(modes_before))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
@@ -56,33 +56,24 @@ impl Restorer {
 /// mode is set to its value in `modes`: the argument is `echo` if `echo` is set there, otherwise
 /// `-echo`.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
-    let inputs = [
-        ("ignbrk", InputModes::IGNBRK),
-        ("brkint", InputModes::BRKINT),
-        ("parmrk", InputModes::PARMRK),
-        ("istrip", InputModes::ISTRIP),
-        ("inlcr", InputModes::INLCR),
-        ("igncr", InputModes::IGNCR),
-        ("icrnl", InputModes::ICRNL),
-        ("ixon", InputModes::IXON),
+    let (input, local) = (modes.input_modes, modes.local_modes);
+    let is_set = [
+        ("ignbrk", input.contains(InputModes::IGNBRK)),
+        ("brkint", input.contains(InputModes::BRKINT)),
+        ("parmrk", input.contains(InputModes::PARMRK)),
+        ("istrip", input.contains(InputModes::ISTRIP)),
+        ("inlcr", input.contains(InputModes::INLCR)),
+        ("igncr", input.contains(InputModes::IGNCR)),
+        ("icrnl", input.contains(InputModes::ICRNL)),
+        ("ixon", input.contains(InputModes::IXON)),
+        ("echo", local.contains(LocalModes::ECHO)),
+        ("echonl", local.contains(LocalModes::ECHONL)),
+        ("icanon", local.contains(LocalModes::ICANON)),
+        ("isig", local.contains(LocalModes::ISIG)),
+        ("iexten", local.contains(LocalModes::IEXTEN)),
+        ("opost", modes.output_modes.contains(OutputModes::OPOST)),
     ];
-    let locals = [
-        ("echo", LocalModes::ECHO),
-        ("echonl", LocalModes::ECHONL),
-        ("icanon", LocalModes::ICANON),
-        ("isig", LocalModes::ISIG),
-        ("iexten", LocalModes::IEXTEN),
-    ];
-    let is_set = inputs.map(|(name, mode)| (name, modes.input_modes.contains(mode)));
-    let is_set = is_set
-        .into_iter()
-        .chain(locals.map(|(name, mode)| (name, modes.local_modes.contains(mode))));
-    let output = ("opost", modes.output_modes.contains(OutputModes::OPOST));
-    let argument = |(name, is_set): (&str, bool)| match is_set {
-        true => name.to_string(),
-        false => format!("-{name}"),
-    };
-    is_set.chain([output]).map(argument).collect()
+    is_set.map(|(name, is_set)| format!("{}{name}", if is_set { "" } else { "-" })).to_vec()
 }
 
 impl Drop for Restorer {

@@ -3,63 +3,23 @@
 
 use crate::terminal::restorer::Restorer;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use crossterm::style::{Attribute, SetAttribute};
-use crossterm::terminal::{
-    self, Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
-};
-use crossterm::{Command, cursor};
+use crossterm::terminal;
 use rustix::termios::{OptionalActions, QueueSelector, Termios, tcflush, tcgetattr, tcsetattr};
-use std::fmt;
 use std::io::{self, Write};
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Command of crossterm that enables or disables bracketed paste and mouse reports. Reports cover
-/// buttons, the wheel and drags (mode 1002), with decimal coordinates (mode 1006).
-/// `EnableMouseCapture` of crossterm would also set mode 1003, which reports every motion.
-struct Input {
-    is_on: bool,
-}
-
-impl Command for Input {
-    fn write_ansi(&self, out: &mut impl fmt::Write) -> fmt::Result {
-        out.write_str(match self.is_on {
-            true => "\x1b[?2004h\x1b[?1002h\x1b[?1006h",
-            false => "\x1b[?1006l\x1b[?1002l\x1b[?2004l",
-        })
-    }
-}
-
 /// Bytes that prepare the terminal for full-screen use: alternate screen, hidden cursor, bracketed
-/// paste and mouse, an empty screen.
-pub static ENTER: LazyLock<String> = LazyLock::new(|| {
-    let mut out = String::new();
-    append(&mut out, EnterAlternateScreen);
-    append(&mut out, cursor::Hide);
-    append(&mut out, Input { is_on: true });
-    append(&mut out, Clear(ClearType::All));
-    out
-});
+/// paste, mouse reports, an empty screen. Mouse reports cover buttons, the wheel and drags (mode
+/// 1002), with decimal coordinates (mode 1006).
+pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J";
 
 /// Bytes that restore the terminal. They first end a frame (synchronised update) that was cut off
 /// and reset colours and attributes. Then they undo the parts of [`ENTER`] in the opposite order.
-pub static LEAVE: LazyLock<String> = LazyLock::new(|| {
-    let mut out = String::new();
-    append(&mut out, EndSynchronizedUpdate);
-    append(&mut out, SetAttribute(Attribute::Reset));
-    append(&mut out, Input { is_on: false });
-    append(&mut out, cursor::Show);
-    append(&mut out, LeaveAlternateScreen);
-    out
-});
-
-/// Appends the bytes of `command`, a command of crossterm.
-pub(crate) fn append(out: &mut String, command: impl Command) {
-    command.write_ansi(out).expect("a `String` takes any text");
-}
+pub const LEAVE: &str = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
 
 /// Longest time for which restoration of the terminal waits for a slow terminal that is still
 /// reading a frame.
@@ -149,9 +109,6 @@ impl Screen {
             leaving,
             exit_sequence: Mutex::default(),
         });
-        // `LEAVE` is computed here and not in the panic hook, because a panic hook should do
-        // little.
-        LazyLock::force(&LEAVE);
         let screen = Self { tty, left, restorer: None };
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
@@ -295,14 +252,27 @@ mod tests {
     /// Returns the expected output of a screen. Each character of `parts` stands for a part of the
     /// output: `[` for [`ENTER`], `]` for [`LEAVE`], any other character for itself.
     fn expected(parts: &str) -> String {
-        parts.replace(']', "LEAVE").replace('[', &ENTER).replace("LEAVE", &LEAVE)
+        parts.replace(']', "LEAVE").replace('[', ENTER).replace("LEAVE", LEAVE)
     }
 
+    /// Checks the bytes against the commands of crossterm, which has no commands for the modes of
+    /// paste and mouse without its event reader.
     #[test]
-    fn enter_and_leave_keep_their_bytes() {
-        assert_eq!(*ENTER, "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J");
-        let leave = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
-        assert_eq!(*LEAVE, leave);
+    fn enter_and_leave_consist_of_commands_of_crossterm() {
+        use crossterm::cursor::{Hide, Show};
+        use crossterm::queue;
+        use crossterm::style::{Attribute, Print, SetAttribute};
+        use crossterm::terminal::{
+            Clear, ClearType, EndSynchronizedUpdate, EnterAlternateScreen, LeaveAlternateScreen,
+        };
+        let (mut enter, mut leave) = (Vec::new(), Vec::new());
+        let input = Print("\x1b[?2004h\x1b[?1002h\x1b[?1006h");
+        queue!(enter, EnterAlternateScreen, Hide, input, Clear(ClearType::All)).unwrap();
+        assert_eq!(ENTER.as_bytes(), enter);
+        queue!(leave, EndSynchronizedUpdate, SetAttribute(Attribute::Reset)).unwrap();
+        let input = Print("\x1b[?1006l\x1b[?1002l\x1b[?2004l");
+        queue!(leave, input, Show, LeaveAlternateScreen).unwrap();
+        assert_eq!(LEAVE.as_bytes(), leave);
     }
 
     #[test]
@@ -349,9 +319,9 @@ mod tests {
         };
         // Visibility of the cursor is the only mode that `ENTER` resets and `LEAVE` sets. It is
         // left out here and checked below.
-        let mut set = modes(&ENTER, 'h');
+        let mut set = modes(ENTER, 'h');
         set.retain(|mode| !mode.contains('l'));
-        let mut reset = modes(&LEAVE, 'l');
+        let mut reset = modes(LEAVE, 'l');
         // Each frame sets and resets mode 2026 (synchronised update). `LEAVE` resets it too,
         // because the last frame may have been cut off.
         reset.retain(|mode| !mode.contains('h') && mode != "2026");

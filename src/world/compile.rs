@@ -271,8 +271,9 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// Candidate lists (primitives that a ray must be tested against) for rays of the whole picture,
-/// and the culler that makes the lists of a tile.
+/// Compiled culling of a scene: the method that makes the candidate lists of a tile (primitives
+/// that a ray must be tested against), the candidates of all rays of the picture together, and the
+/// light buffers.
 struct CompiledCulling<S> {
     mode: CullingMode,
     all_candidates: TileCandidates,

@@ -22,7 +22,8 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
-/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the cost of both.
+/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
+/// methods.
 pub(super) const MIN_LIGHTS: usize = 16;
 
 /// Smallest number of lights in a set. A set holds the lights to which a path traces shadow rays at
@@ -53,12 +54,13 @@ struct Stratum<S> {
     /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
     /// coordinates are NaN; the test whether the surface faces the light then fails.
     positions: [Table<S>; 3],
-    /// Irradiance of the stratum's lights at normal incidence, one value for each set. It is 0 for
-    /// lights whose irradiance decreases with the square of the distance. The irradiance of other
-    /// lights is the same at every distance.
+    /// Irradiance, at normal incidence, of the stratum's light in each set. It is 0 for lights
+    /// whose irradiance decreases with the square of the distance. The irradiance of other lights
+    /// is the same at every distance.
     constant: Table<S>,
-    /// Red, green and blue of the emission (colour times intensity) by which the tracer multiplies
-    /// the lights' samples.
+    /// Emission (colour times intensity) of the stratum's light in each set: red, green and blue.
+    /// The tracer multiplies the samples of the light by its emission. A set without a light of the
+    /// stratum has the emission 1.
     emission: [Table<S>; 3],
 }
 

@@ -12,16 +12,16 @@ use crate::world::light_choice::MIN_LIGHTS;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
-/// Largest number of light groups for lights and emissive materials. If there are more, the
-/// remaining ones share the last group.
+/// Largest number of light groups for lights and emissive materials. If a scene has more lights and
+/// emissive materials than that, several of them share the last of these groups.
 const MAX_LIGHT_GROUPS: usize = 8;
 
 /// Largest number of light groups: those of lights and emissive materials, one for ambient light,
 /// and one for the background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Largest size of the film's integer sums in bytes. Lights get groups of their own up to this
-/// size; further lights share the last group.
+/// Largest size \[bytes\] of the film's integer sums. Lights get groups of their own until the sums
+/// reach this size; further lights share the last group.
 const FILM_BYTES: u64 = 1 << 30;
 
 /// Bytes that the film stores per pixel for one light group. Each of the two replicates, which are
@@ -39,8 +39,8 @@ pub enum LightGroupSource {
     Light(usize),
     /// Emission of all objects with one material; the value is the name of the material.
     Material(String),
-    /// Several lights and materials. Their samples already contain the colour and intensity of
-    /// each.
+    /// Several lights and materials. The tracer multiplies the samples of each by its colour and
+    /// intensity.
     Shared(Vec<LightGroupSource>),
 }
 

@@ -19,9 +19,9 @@ const ON: f64 = 8.0;
 /// largest coordinate.
 const LIFT: f64 = 16.0;
 
-/// Largest distance between a light on a surface and the end point of its shadow rays, as a
-/// multiple of the end point's height above the surface. At a sharp edge the end point must be
-/// farther from the light to clear both sides of the edge.
+/// Largest distance by which one solid moves the end point of shadow rays away from a light on its
+/// surface, as a multiple of the height above the surface ([`LIFT`]). At a sharp edge this distance
+/// must exceed the height, so that the end point clears both sides of the edge.
 const SHARPEST: f64 = 4.0;
 
 /// Surfaces on which a point light is located.
@@ -57,8 +57,8 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// Returns the largest distance between the light and an end point of its shadow rays. The end
-    /// points are a little above the surface on which the light is located.
+    /// Returns an upper bound of the distance between the light and an end point of its shadow
+    /// rays. The end points are a little above the surfaces on which the light is located.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }

@@ -14,9 +14,9 @@ pub const MAX_BLOCK_PIXELS: usize = 256;
 /// packet; the last packet is filled with copies of the last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    /// Column of each pixel of the block in the picture.
+    /// Column in the picture of each pixel of the block.
     x: [u32; MAX_BLOCK_PIXELS],
-    /// Row of each pixel of the block in the picture.
+    /// Row in the picture of each pixel of the block.
     y: [u32; MAX_BLOCK_PIXELS],
     /// Key of each pixel's random numbers, see [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],

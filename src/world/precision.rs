@@ -17,16 +17,16 @@ use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Largest ratio of scene extent to the thickness of an object. At this ratio the ray offset is
-/// 1/128 of the thickness.
+/// Largest ratio of scene extent to the thickness of an object in single precision. At this ratio
+/// the ray offset is 1/128 of the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// Largest ratio of scene extent to the width of a gap between objects. At this ratio the gap is
-/// eight ray offsets wide.
+/// Largest ratio of scene extent to the width of a gap between objects in single precision. At this
+/// ratio the gap is eight ray offsets wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// Largest ratio of scene extent to the side of a pixel's footprint on the object closest to the
-/// eye. At this ratio the side is 32 ray offsets.
+/// Largest ratio, in single precision, of scene extent to the side of a pixel's footprint on the
+/// object closest to the eye. At this ratio the side is 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
 /// Factor by which the eye may be closer to flat objects than to curved ones in single precision.
@@ -34,8 +34,9 @@ const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 /// normal is constant.
 const FLAT: f64 = 8.0;
 
-/// Largest ratio of scene extent to the distance of a light from objects. At this ratio the ray
-/// offset is 1/512 of the distance, and the direction to the light is wrong by 1/512 radians.
+/// Largest ratio of scene extent to the distance of a light from objects in single precision. At
+/// this ratio the ray offset is 1/512 of the distance, and the direction to the light is wrong by
+/// 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
 /// Smallest angle between the rays of neighbouring pixels \[radians\] in single precision: 64 times
@@ -110,10 +111,10 @@ struct Clearance {
 }
 
 impl Clearance {
-    /// Returns `true` if the width of the gap is in the range `narrow`, and the region where the
-    /// gap is so narrow is wider than a pixel. `pixel` returns the side of a pixel's footprint at a
-    /// point. A sphere on a floor, for example, is close to the floor only in a spot that is too
-    /// small to see.
+    /// Returns `true` if the smallest width of the gap is in the range `narrow`, and the region in
+    /// which the gap is narrower than the end of this range is wider than a pixel. `pixel` returns
+    /// the side of a pixel's footprint at a point. A sphere on a floor, for example, is close to
+    /// the floor only in a spot that is too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);

@@ -16,10 +16,11 @@
 //!
 //! The two bounds are 28 bits apart. By default the typical radiance has 2^28 steps. The brightest
 //! spot may then be up to 2^16 times as bright as the typical radiance. The brightest spot of the
-//! dimmest surface may be down to 2^-12 times as bright. If a scene exceeds both bounds, the bright
-//! end has precedence: a saturated sample changes the picture visibly, a sample smaller than a step
-//! does not. The dim end has precedence over two kinds of bright light: spots smaller than a pixel,
-//! and light amplified by mirrors. Such samples may saturate; the film counts saturated samples.
+//! dimmest surface may be down to 2^-12 times as bright as the typical radiance. If a scene exceeds
+//! both bounds, the bright end has precedence: a saturated sample changes the picture visibly, a
+//! sample smaller than a step does not. The dim end has precedence over two kinds of bright light:
+//! spots narrower than a quarter of a pixel, and light amplified by mirrors. Such samples may
+//! saturate; the film counts saturated samples.
 
 use crate::asset::RadianceMap;
 use crate::camera::PerspectiveCamera;
@@ -39,15 +40,15 @@ const TYPICAL_BITS: f64 = 28.0;
 /// Smallest number of bits of an integer sample at the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Largest number of bits of an integer sample at the brightest spot that is at least as large as a
-/// pixel.
+/// Largest number of bits of an integer sample at the brightest of all spots that are at least a
+/// quarter of a pixel wide.
 const BRIGHT_BITS: f64 = 44.0;
 
 /// Largest number of bits of any integer sample.
 const SAMPLE_BITS: f64 = 49.0;
 
-/// Largest number of bits by which the integer scale of samples is lowered for bright spots smaller
-/// than a pixel.
+/// Largest number of bits by which the integer scale of samples is lowered for bright spots
+/// narrower than a quarter of a pixel.
 const SPOT_BITS: f64 = 12.0;
 
 /// Estimates of the radiance of a light group's samples at several places of the scene. The integer
@@ -62,8 +63,8 @@ pub(super) struct RadianceRange {
     /// Radiance of the brightest spot of the brightest surface: the maximum, over all surfaces, of
     /// the radiance of their brightest spots. Spots smaller than a quarter of a pixel are ignored.
     pub brightest: f64,
-    /// Radiance of the brightest spot of the picture outside of highlights, including spots smaller
-    /// than a pixel.
+    /// Radiance of the brightest spot of the picture outside of highlights, however small the spot
+    /// is.
     pub spots: f64,
     /// Largest radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
@@ -188,11 +189,13 @@ pub(super) struct SceneDistances<'a> {
     faintest: f64,
     /// Largest factor by which all mirrors of a path together multiply light; at least 1.
     gain: f64,
-    /// Distance from the scene's centre at which the irradiance of a light is taken as typical.
+    /// Smallest distance between a light and the scene's centre for the typical irradiance. If the
+    /// light is nearer, its irradiance at this distance is typical.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
-    /// Largest distance above a surface at which rays start.
+    /// Distance below which a light counts as on a surface: half of the largest distance above a
+    /// surface at which rays start.
     ray_offset: f64,
 }
 
@@ -448,8 +451,8 @@ mod tests {
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
-        // Spots smaller than a pixel and amplified light do not lower the scale below the bound for
-        // dim surfaces, 2^16 steps.
+        // Spots narrower than a quarter of a pixel and amplified light do not lower the scale below
+        // the bound for dim surfaces, 2^16 steps.
         assert_eq!(exponent(&|b| b.spots = far), 16.0);
         assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
         assert_eq!(exponent(&|b| b.extreme = bright), 28.0);

@@ -31,8 +31,9 @@ use std::collections::{HashMap, HashSet};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Largest distance behind the surface of a touching object at which a point sampled on an emissive
-/// object counts as covered by it. The unit is the height of the point above the emissive surface.
+/// Largest distance behind the surface of a touching object (an object that touches an emissive
+/// one) at which points of the emissive object count as covered by the touching object. The unit is
+/// the height of the sampled points above the emissive surface.
 const CONTACT_LIFTS: f64 = 4.0;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object

@@ -28,7 +28,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     /// [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) pairs of column and row. All pixels
     /// must be in the rectangle of the raster with corner `origin` and size `extent`, because
     /// culling uses this rectangle. Returns `None` if all samples in the rectangle are black: no
-    /// camera ray can hit a primitive or a visible light, and the background is black.
+    /// camera ray can hit a primitive, no light with a size and no environment is visible, and the
+    /// background is black.
     pub fn tile(
         &self,
         replicate: usize,

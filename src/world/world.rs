@@ -174,9 +174,9 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
-    /// those that can occlude the shadow rays from their hit points. The rectangle has the corner
-    /// `origin` and the size `extent` \[pixels\]. Returns `None` if rays must be tested against all
-    /// primitives.
+    /// those that can occlude shadow rays from the hit points of these camera rays. The rectangle
+    /// has the corner `origin` and the size `extent` \[pixels\]. Returns `None` if rays must be
+    /// tested against all primitives.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],

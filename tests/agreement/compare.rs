@@ -24,14 +24,14 @@ const BLOCK: usize = 4;
 /// probability of any false alarm is 1 / 1000.
 const LEVEL: f64 = 1e-3 / 100.0;
 
-/// Deviation of two pictures, and the largest deviation that chance explains.
+/// Difference between two pictures of a scene, and the largest difference that chance explains.
 #[derive(Debug)]
 pub struct Verdict {
-    /// Largest deviation of a block's mean, in standard errors.
+    /// Largest difference between the means of a block in both pictures, in standard errors.
     pub worst_z: f64,
     pub allowed_z: f64,
-    /// Sum of the squared deviations of all blocks' brightness, each in standard errors
-    /// (chi-square).
+    /// Chi-square: sum over all blocks of the squared difference in brightness, each in standard
+    /// errors.
     pub chi2: f64,
     pub allowed_chi2: f64,
     pub picture: Vec<DVec3>,
@@ -104,11 +104,11 @@ impl Picture {
         })
     }
 
-    /// Compares block means with those of the picture `reference`. The reference has `samples`
-    /// samples per pixel and is far noisier than this picture. The variance of single samples is
-    /// estimated twice: from the reference, and from this program's picture with independent random
-    /// numbers. The larger estimate is used, because few samples underestimate the variance of rare
-    /// events.
+    /// Compares the block means of this picture with those of the picture `reference`. The
+    /// reference has `samples` samples per pixel and is far noisier than this picture. The variance
+    /// of its single samples is estimated twice: from the reference, and from the program's picture
+    /// with independent random numbers. The larger estimate is used, because few samples
+    /// underestimate the variance of rare events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
@@ -152,7 +152,7 @@ fn chi2_quantile(n: f64, z: f64) -> f64 {
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
 }
 
-/// Returns the scene with the picture size of the comparison, [`SIZE`].
+/// Returns `scene` with the picture size of the comparison, [`SIZE`].
 pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
@@ -191,8 +191,8 @@ fn traced(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimat
     Ok(rows.concat())
 }
 
-/// Renders `scene` with the program. Returns the picture, and half the difference of its two
-/// replicates (halves of the samples).
+/// Renders `scene` with the program, with `samples` samples per pixel in each of the two replicates
+/// (halves of the samples). Returns the picture, and half the difference of the replicates.
 pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
@@ -213,9 +213,11 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
 }
 
-/// Compares the variance of single samples between the two programs. Returns the difference of the
-/// variances, pooled over the picture, in standard errors. The standard error is estimated from the
-/// spread of the differences over the blocks.
+/// Compares the variance of single samples in two pictures of a scene. The picture `reference` by
+/// the reference tracer has `reference_samples` samples per pixel. This program's picture is given
+/// by `half`, half the difference of its two replicates (halves of the samples), which have
+/// `samples` samples per pixel each. Returns the magnitude of the difference of the variances,
+/// averaged over blocks, in standard errors.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,
@@ -240,7 +242,8 @@ pub fn variances_differ_by(
     mean.abs() / (spread / n).sqrt()
 }
 
-/// Writes picture, reference and their difference to files. Returns the folder of the files.
+/// Writes the program's picture, the picture of the reference tracer, and their difference to
+/// files. Returns the folder of the files.
 pub fn keep(name: &str, verdict: &Verdict) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("agreement");
     std::fs::create_dir_all(&folder).unwrap();

@@ -44,12 +44,12 @@ pub struct Body {
     tree: Tree,
 }
 
-/// Distance of the two tested points, before and behind a crossing, from the crossing. The unit is
-/// the length of the ray's direction.
+/// Distance from a crossing to each of two tested points, one before and one behind it, in lengths
+/// of the ray's direction.
 const ASIDE: f64 = 1e-7;
 
-/// Hit of a ray on an object: distance, normal, index of the simple shape, and index of its piece or
-/// triangle.
+/// Hit of a ray on an object: distance, normal, index of the simple shape, and index of the shape's
+/// piece or triangle.
 pub type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
@@ -64,8 +64,8 @@ impl Leaf {
         })
     }
 
-    /// Passes the crossings of a line with the surface to `take`: distance, and index of the piece
-    /// or triangle.
+    /// Passes the crossings of a line with the surface to `take`: the distance of each, and the
+    /// index of the piece or triangle.
     fn crossings(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64, usize)) {
         let (origin, direction) = self.own(origin, direction);
         for (i, piece) in self.pieces.iter().enumerate() {
@@ -101,12 +101,13 @@ impl Leaf {
         Some(self.scene_from_own_normals * own)
     }
 
-    /// Returns the colour of triangle `i` in its file.
+    /// Returns the colour that the mesh file gives triangle `i`; white without colours in the file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
     }
 
-    /// Converts a point of the scene and its outward normal to the shape's own coordinates.
+    /// Converts a point of the scene and its outward normal `outer` to the shape's own coordinates.
+    /// `facet` is the index of the piece or triangle that contains the point.
     pub fn spot(&self, facet: usize, point: DVec3, outer: DVec3) -> Spot<'_> {
         let point = self.own_from_scene.transform_point3(point);
         Spot { leaf: self, facet, point, normal: self.own_normal(outer) }

@@ -52,7 +52,7 @@ impl Lamp {
         }
     }
 
-    /// Returns the radiance of the lamp if it is white and has intensity 1.
+    /// Returns the radiance of a white lamp of intensity 1, if intensities are in the unit `unit`.
     pub fn radiance(&self, unit: LightUnit) -> f64 {
         match unit {
             LightUnit::Radiance => 1.0,

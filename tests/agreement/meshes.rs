@@ -88,7 +88,8 @@ impl Triangles {
         }
     }
 
-    /// Passes distance and index of every triangle that a line crosses to `take`.
+    /// Passes every crossing of a line with a triangle to `take`: distance, and index of the
+    /// triangle.
     pub fn meet(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64, usize)) {
         if misses(&self.bounds, origin, direction) {
             return;

@@ -29,12 +29,13 @@ const REFERENCE_SAMPLES: u32 = 96;
 /// samples).
 pub(crate) const SAMPLES: u32 = 256;
 
-/// Smaller number of samples per pixel in each of the two replicates (halves of the samples). It is
-/// for slow scenes, and for pictures with rare bright samples: with more samples, the program would
-/// find some that the reference tracer misses.
+/// Number of samples per pixel in each of the two replicates (halves of the samples), half of
+/// [`SAMPLES`]. It is for slow scenes, and for pictures with rare bright samples: with more
+/// samples, the program would find some that the reference tracer misses.
 const FEW_SAMPLES: u32 = 128;
 
-/// Larger number of samples per pixel and replicate, for [`TEXTURED_SCENES`].
+/// Number of samples per pixel in each of the two replicates (halves of the samples), twice
+/// [`SAMPLES`]. It is for [`TEXTURED_SCENES`].
 const MANY_SAMPLES: u32 = 512;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
@@ -44,8 +45,8 @@ const SLOW_SCENES: [&str; 3] = ["torus.toml", "gallery-triptych.toml", "water-gl
 /// samples.
 const TEXTURED_SCENES: [&str; 3] = ["texture-image.toml", "footprint-square.toml", "bump.toml"];
 
-/// Returns the number of samples per pixel and replicate of the picture of a shipped scene. Tests
-/// that take the same number share the picture.
+/// Returns the number of samples per pixel in each of the two replicates (halves of the samples),
+/// for the picture of the shipped scene `name`. Tests that take the same number share the picture.
 fn samples_of(name: &str) -> u32 {
     match name {
         _ if SLOW_SCENES.contains(&name) => FEW_SAMPLES,
@@ -54,7 +55,7 @@ fn samples_of(name: &str) -> u32 {
     }
 }
 
-/// Files of scenes that must be among the compared ones.
+/// Files of scenes that the reference tracer must support, so that they are compared.
 const GALLERY: [&str; 18] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
@@ -130,8 +131,8 @@ fn check_detection(mutations: &[Mutation], name: &str, scene: &Scene, samples: u
     detected(mutations, name, scene, FEW_SAMPLES.max(samples / 6), samples);
 }
 
-/// Implements [`check_detection`] for a picture with `picture_samples` samples per pixel and
-/// replicate, and references with `samples` samples per pixel.
+/// Implements [`check_detection`] for a picture with `picture_samples` samples per pixel in each of
+/// the two replicates (halves of the samples), and for references with `samples` samples per pixel.
 fn detected(mutations: &[Mutation], name: &str, scene: &Scene, picture_samples: u32, samples: u32) {
     let picture = Picture::new(scene, picture_samples);
     let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
@@ -144,7 +145,8 @@ fn detected(mutations: &[Mutation], name: &str, scene: &Scene, picture_samples: 
     }
 }
 
-/// Returns the scene with eye, lights and objects scaled by 1/1000.
+/// Returns `scene` with the positions of eye, lights and objects, and the sizes of objects,
+/// multiplied by 1/1000.
 fn shrunk(mut scene: Scene) -> Scene {
     const FACTOR: f64 = 1e-3;
     let shrink = |v: &mut [f64; 3]| *v = v.map(|x| x * FACTOR);
@@ -309,8 +311,8 @@ fn lenses_agree_with_reference_tracer() {
     }
 }
 
-/// Returns a scene of objects of rough absorbing glass: a solid and a pane. The solid contains air
-/// and touches other glass. `keys` are further keys of the glass material.
+/// Returns a scene of rough absorbing glass: a pane, a ball that contains a ball of air, and a box
+/// that stands on a floor. `keys` are further keys of the glass material.
 fn rough_glass(keys: &str) -> Scene {
     let text = format!(
         "[camera]
@@ -354,9 +356,10 @@ fn rough_glass(keys: &str) -> Scene {
     small(parsed(&text))
 }
 
-/// Checks every lobe of rough glass, with Fresnel's equations and with constant coefficients. A
-/// glass box touches the floor. Lobes of microfacets do not depend on the horizon: both pictures
-/// are compared with the same reference.
+/// Checks every lobe of rough glass, two-sided with Fresnel's equations and with Schlick's formula,
+/// and one-sided. A glass box touches the floor. Lobe directions below the surface are mirrored up
+/// in one picture and absorbed in the other. With microfacets, both pictures are compared with the
+/// same reference, because such lobes do not depend on this setting.
 #[test]
 fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     for lobe in [
@@ -389,8 +392,9 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     }
 }
 
-/// Checks that the variance of single samples is equal in the renderer and in the reference tracer
-/// with independent random numbers, in scenes where both sample their lobes with equal densities.
+/// Checks that single samples have the same variance in the program, with independent random
+/// numbers, and in the reference tracer. Both sample the lobes of the tested scenes with equal
+/// densities.
 #[test]
 fn variances_agree_under_independent_random_numbers() {
     for name in ["lobe-cone.toml", "lobe-square.toml", "mirror-room.toml"] {

@@ -89,13 +89,13 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
     }
 }
 
-/// Smallest roughness of a lobe that finds the light of lamps by sampling points of the lamps.
-/// Narrower lobes find it by reflected rays.
+/// Smallest roughness of a lobe at which the light of lamps is found by sampling points of the
+/// lamps. With a smaller roughness it is found by reflected rays.
 const WIDE: f64 = 0.12;
 
 /// Returns the value of the reflection lobe, multiplied by the cosine of the angle between the
-/// normal `n` and the direction `l` to the light. Returns `None` for narrow lobes and for square
-/// lobes, which find lamps by reflected rays.
+/// normal `n` and the direction `l` to the light. Returns `None` for square lobes and for lobes of
+/// a smaller roughness than [`WIDE`], for which reflected rays find the light of lamps.
 pub fn wide_lobe(
     material: &Material,
     n: DVec3,
@@ -155,7 +155,8 @@ pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
 }
 
 /// Returns the two tangents of an orthonormal frame around `w` (Duff et al. 2017, *Building an
-/// Orthonormal Basis, Revisited*). They are the sides of the square lobe.
+/// Orthonormal Basis, Revisited*). The sides of a square lobe about the axis `w` are parallel to
+/// them.
 fn around(w: DVec3) -> (DVec3, DVec3) {
     let sign = 1f64.copysign(w.z);
     let a = -1.0 / (sign + w.z);
@@ -214,7 +215,8 @@ pub fn is_sharp(material: &Material) -> bool {
     }
 }
 
-/// Samples a direction in the cone or the square lobe about `axis`.
+/// Samples a direction in the cone or the square lobe about `axis`. `radius` is the radius of the
+/// cone at unit distance; the square has the area of the cone's base there.
 pub fn spread(material: &Material, axis: DVec3, radius: f64, numbers: &mut Numbers) -> DVec3 {
     let (a, b) = around(axis);
     let local = if material.lobe == Lobe::Cone {
@@ -290,8 +292,9 @@ pub fn refracted_at_facet(
     Some((l, f_cos / density, h))
 }
 
-/// Samples a microfacet normal h with the density D(h) (n.h), where D is the distribution of
-/// microfacet normals. Reflects the ray at the microfacet.
+/// Samples a ray that is reflected at a microfacet. The microfacet normal h has the density D(h)
+/// (n.h), where D is the distribution of microfacet normals. Returns the direction and the
+/// throughput of the ray. Returns `None` if the ray is below the surface.
 fn microfacet(
     material: &Material,
     n: DVec3,

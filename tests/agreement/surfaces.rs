@@ -16,7 +16,7 @@ pub enum Piece {
     Plane(DVec3, DVec3),
     /// Disc: centre, normal, radius.
     Disc(DVec3, DVec3, f64),
-    /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
+    /// Side of a cone: start, direction and length of the axis, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
     /// Torus: centre, axis, and the radii of ring and tube.
     Torus(DVec3, DVec3, [f64; 2]),
@@ -144,16 +144,17 @@ impl Piece {
     }
 }
 
-/// Returns the distance of the point `p` from the tube of a torus about the origin; negative inside
-/// of the tube.
+/// Returns the distance of the point `p` from the surface of a torus about the origin; it is
+/// negative inside of the torus.
 fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
     let along = p.dot(axis);
     ((p - axis * along).length() - ring).hypot(along) - tube
 }
 
-/// Passes the distances at which a line crosses a torus to `take`. The line is sampled in small
-/// steps through a ball around the torus. Where `height` changes its sign, [`root`] finds the
-/// crossing.
+/// Passes the distances at which a line crosses a torus to `take`. `from_center` is the origin of
+/// the line relative to the torus's centre. The line is sampled in small steps through a ball of
+/// radius `reach` around the torus. Where `height`, the distance from the surface at a point of the
+/// line, changes its sign, [`root`] finds the crossing.
 fn torus_crossings(
     from_center: DVec3,
     direction: DVec3,
@@ -188,9 +189,9 @@ fn torus_crossings(
     }
 }
 
-/// Returns the place between `low` and `high` where the magnitude of `f` is at most `tolerance`, by
-/// the Illinois method: false position that halves the value at an end which stays a second time.
-/// `f_low` and `f_high` are the values at the ends, of different signs.
+/// Returns an argument between `low` and `high` at which the magnitude of `f` is at most
+/// `tolerance`. Uses the Illinois method: false position that halves the value at an end which
+/// stays a second time. `f_low` and `f_high` are the values of `f` at the ends, of different signs.
 fn root(
     f: &impl Fn(f64) -> f64,
     [mut low, mut high]: [f64; 2],
@@ -218,7 +219,8 @@ fn root(
     t
 }
 
-/// Returns the distance at which a line crosses a plane, in lengths of the direction.
+/// Returns the distance at which a line crosses a plane, in lengths of the direction. Returns
+/// `None` for a parallel line.
 fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Option<f64> {
     let speed = normal.dot(direction);
     (speed != 0.0).then(|| normal.dot(point - origin) / speed)

@@ -45,8 +45,8 @@ pub fn medium<'a>(scene: &'a Scene, body: &Body) -> Option<&'a Material> {
 }
 
 impl Tracer<'_> {
-    /// Returns the solid that fills the space at `point`, and its index of refraction. Of several
-    /// solids there, the one listed last in the scene fills the space.
+    /// Returns the index of the solid that fills the space at `point`, and the index of refraction
+    /// there. Of several solids at the point, the one listed last in the scene fills the space.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
         self.filling(point).map_or((None, 1.0), |(i, material)| (Some(i), material.ior))
     }
@@ -60,8 +60,8 @@ impl Tracer<'_> {
             .map(|(i, _, material)| (i, material))
     }
 
-    /// Returns the share of light that is left on the way from `origin` to `end`. If `end` is
-    /// `None`, the way extends to infinity along `direction`.
+    /// Returns the share of light that is not absorbed on the way from `origin` to `end`. If `end`
+    /// is `None`, the way extends to infinity along `direction`.
     pub fn transmittance(&self, origin: DVec3, end: Option<DVec3>, direction: DVec3) -> DVec3 {
         if self.scene.trace.ray_types < RayTypes::Full || !self.absorbs {
             return DVec3::ONE;
@@ -77,7 +77,8 @@ impl Tracer<'_> {
         DVec3::from(material.attenuation_color.0.map(left))
     }
 
-    /// Chooses reflection or transmission at random, at the hit `hit` on a transmitting material.
+    /// Chooses reflection or transmission at random for a ray in the direction `direction` that
+    /// hits a transmitting material.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {
         let (material, n) = (hit.material, hit.seen);
         let open = self.bodies[hit.body].is_open();

@@ -11,7 +11,8 @@ const KILLS: u64 = 20;
 /// Size, stop criterion and threads of the interrupted renders. They take about a second.
 const LONG: [&str; 6] = ["--size", "160x120", "--noise", "0.35", "--threads", "2"];
 
-/// Returns the bytes of the film in the checkpoint at `path`, in their canonical form.
+/// Returns the film in the checkpoint at `path` as bytes, which are equal for films with equal
+/// samples.
 fn test_film(path: &Path) -> Vec<u8> {
     let read = FilmReader::open(path).and_then(FilmReader::read);
     read.unwrap_or_else(|error| panic!("{error}")).1.bytes()

@@ -223,7 +223,7 @@ fn files_named_by_meshes_stay_in_their_folder() {
     }
 }
 
-/// Checks that excessive sizes are refused before memory is allocated.
+/// Checks that excessive sizes in mesh files are refused before memory is allocated.
 #[test]
 fn sizes_are_checked_before_allocation() {
     let desk = Desk::new();

@@ -6,13 +6,14 @@ use super::*;
 /// Arguments of a uniform render, whose film has 7 MB for each light group.
 const UNIFORM: [&str; 5] = ["--size", "400x375", "--spp", "4", "--uniform"];
 
-/// Renders `scene` to the file `name` with at most the memory `memory`.
+/// Renders `scene` to the file `name` with at most the memory `memory` and the further arguments
+/// `more`.
 fn within(desk: &Desk, scene: &str, name: &str, memory: &str, more: &[&str]) -> Run {
     desk.run(&[&["render", scene, "-o", name, "--memory", memory], &UNIFORM[..], more].concat())
 }
 
-/// Returns the smallest amount of memory for a render, in megabytes, as the program's refusal
-/// states it.
+/// Returns the smallest amount of memory in megabytes that a render of `scene` accepts, as the
+/// program's refusal states it. `more` are further arguments.
 fn least(desk: &Desk, scene: &str, more: &[&str]) -> u64 {
     let run = within(desk, scene, "refused.png", "1KB", more);
     assert_eq!(run.status, 1, "{}", run.err);
@@ -66,9 +67,10 @@ fn regions_equal_the_picture_as_a_whole() {
     }
 }
 
-/// Checks that a lack of memory first puts all lights into one light group. Only then is the
-/// picture divided into regions. Samples of a shared group are multiplied by the lights' colours
-/// before they are added. The picture therefore differs by rounding from one with separate groups.
+/// Checks that a lack of memory first puts all lights into one light group. Only if the film is
+/// still too large is the picture divided into regions. Samples of a shared group are multiplied by
+/// the lights' colours before they are added. The picture therefore differs by rounding from one
+/// with separate groups.
 #[test]
 fn lights_are_merged_first() {
     let desk = Desk::new();

@@ -65,7 +65,7 @@ impl Desk {
     fn run(&self, args: &[&str]) -> Run {
         Run::from(self.command(args).output().unwrap())
     }
-    /// Renders `scene.toml` to the file `name` in 64x48 pixels.
+    /// Renders `scene.toml` to the file `name` in 64x48 pixels. `more` are further arguments.
     fn render(&self, name: &str, more: &[&str]) -> Run {
         let args = ["render", "scene.toml", "-o", name, "--size", "64x48"];
         self.run(&[&args, more].concat())

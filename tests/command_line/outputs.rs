@@ -102,8 +102,8 @@ fn stdout_is_a_target_of_results() {
 }
 
 /// Checks that results are not written through links of other users in shared folders. Runs only as
-/// superuser, because only the superuser can give a link to another user. Tests of `disk` check the
-/// rule itself.
+/// superuser, because only the superuser can give a link to another user. Unit tests of the module
+/// `disk` check further owners of links and folders.
 #[test]
 fn results_do_not_follow_links_of_other_users_in_shared_folders() {
     let desk = Desk::new();

@@ -6,14 +6,14 @@ use crate::support::test_film::TestFilm;
 use std::fs;
 use zerkalo::film::file::FilmReader;
 
-/// Runs the program with `args`, which succeeds. Returns its output on stdout.
+/// Runs the program with `args`, which must succeed. Returns the program's output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {
     let run = desk.run(args);
     assert_eq!(run.status, 0, "{args:?}: {}", run.err);
     run.out
 }
 
-/// Runs the program with `args`, which fails with exit status 1. Returns its message.
+/// Runs the program with `args`, which must fail with exit status 1. Returns the program's message.
 fn refused(desk: &Desk, args: &[&str]) -> String {
     let run = desk.run(args);
     assert_eq!(run.status, 1, "{args:?}: {}{}", run.out, run.err);
@@ -29,7 +29,8 @@ pub fn plan(desk: &Desk, name: &str, shards: usize) {
     done(desk, &[&args[..], &["--noise", "0.5", "--pilot", "2", "--shards", &shards]].concat());
 }
 
-/// Traces shard `number` of the plan `NAME.plan`. Returns the name of its file, `NAME-number.zk`.
+/// Traces shard `number` of the plan `NAME.plan`. Returns the name of the shard's film file,
+/// `NAME-number.zk`.
 pub fn trace(desk: &Desk, name: &str, number: usize) -> String {
     let (plan, part, number) =
         (format!("{name}.plan"), format!("{name}-{number}.zk"), number.to_string());

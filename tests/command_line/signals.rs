@@ -12,8 +12,9 @@ pub fn signal(name: &str, id: u32) {
 /// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Waits until `condition` is `true` for a set of signals of a process. `set` is the name of the
-/// set's line in Linux's `/proc/PID/status`. On other systems, waits for a second.
+/// Waits until `condition` is `true` for a set of signals of the process `id`, such as the pending
+/// ones. `set` is the name of the line of Linux's `/proc/PID/status` that shows the set. On other
+/// systems, waits for a second.
 fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
     if cfg!(not(target_os = "linux")) {
         return std::thread::sleep(Duration::from_secs(1));

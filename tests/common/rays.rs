@@ -41,7 +41,8 @@ pub fn to_dvec3<L: SimdFloat>(v: Vec3<L>, lane: usize) -> DVec3 {
     DVec3::from(v.lane(lane).map(Float::to_f64))
 }
 
-/// Returns the surface points of all lanes, gathered primitive by primitive.
+/// Returns the point and the normal of the surface that the ray of each lane hits. Lanes that hit
+/// the same primitive are computed together.
 pub fn surface<L: SimdFloat>(
     geometry: &Aggregate<L>,
     ray: &Ray<L>,
@@ -81,7 +82,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
     out
 }
 
-/// Returns one value for each ray: `true` if an occluder is nearer than `limit`.
+/// Returns one value for each ray: `true` if it hits a surface before the distance `limit`.
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -170,12 +171,16 @@ impl Traced {
 
 /// Returns a random ray around `form`, of one of six kinds:
 ///
-/// - through the form
-/// - beside it
-/// - from inside
-/// - along an axis
-/// - from a corner, or the centre of a face or edge, of its bounding box
-/// - with zeros of both signs in its direction
+/// - from outside towards a random point in and around the form
+/// - from such a point in any direction
+/// - along an axis towards such a point
+/// - along an axis from a corner of the form's bounding box, or from the centre of an edge, of a
+///   face or of the box
+/// - along an axis towards such a corner or centre
+/// - from one such corner or centre towards another
+///
+/// The zeros in directions along an axis have either sign. Half of these directions are inclined to
+/// the axis in a coordinate plane.
 pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, 2.0));
     let axis = |numbers: &mut Numbers| {

@@ -5,17 +5,18 @@
 
 use zerkalo::lanes::SimdFloat;
 
-/// Prints `text` for a cell of the table: row `number`, and the column `single`, `double`, `both`,
-/// `auto`, `about` or `criterion`.
+/// Prints `text` for a cell of the table of extremes: row `number`, and the column `single`,
+/// `double`, `both`, `auto`, `about` or `criterion`.
 pub fn report(number: usize, column: &str, text: &str) {
     println!("extreme {number:02} | {column} | {text}");
 }
 
-/// Returns the table's column for the precision of `L`: `single` or `double`.
+/// Returns the name of the column for the precision of `L` in the table of extremes: `single` or
+/// `double`.
 pub fn precision<L: SimdFloat>() -> &'static str {
     if L::EPSILON < 1e-10 { "double" } else { "single" }
 }
 
-/// Text of the cell for an extreme that single precision cannot represent. A test in `precision.rs`
-/// checks that `auto` selects double precision for such a scene.
+/// Text of a cell in the table of extremes, for an extreme that single precision cannot represent.
+/// A test in `precision.rs` checks that `auto` selects double precision for such a scene.
 pub const LEFT_TO_DOUBLE: &str = "left to double";

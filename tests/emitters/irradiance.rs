@@ -10,8 +10,8 @@ use zerkalo::scene::Scene;
 /// lifted off surfaces and rays start above surfaces.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
-/// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by a light
-/// that the camera does not see.
+/// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by the
+/// light `light`, which the camera does not see. `rest` is the text of further objects.
 fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
     scene(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
@@ -28,7 +28,7 @@ fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
     ))
 }
 
-/// Returns name, scene, and expected radiance of the receiver: irradiance / pi.
+/// Returns name, scene, and expected radiance of the receiver, which is `irradiance` / pi.
 fn case(name: String, scene: Scene, irradiance: f64) -> (String, Scene, f64) {
     (name, scene, irradiance / PI)
 }
@@ -143,9 +143,9 @@ fn flat_lights_shine_from_one_side_only() {
     }
 }
 
-/// Checks the penumbra of a black half-plane at height 1, which covers the part of the light beyond
-/// its straight edge. The visible part is the polygon on one side of the plane through the receiver
-/// and the edge.
+/// Checks the penumbra of a black half-plane at height 1, whose straight edge is below the light.
+/// The receiver sees the part of the light on one side of the plane through the receiver and the
+/// edge.
 #[test]
 fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
@@ -215,8 +215,7 @@ fn tiny_and_huge_lights_keep_their_irradiance() {
     check(&cases, 1 << 15, [1e-3, 1e-6]);
 }
 
-/// Checks that a light that lies in the surface of an object shines, and that the surface beside it
-/// stays dark.
+/// Checks a light that lies in the surface of a ceiling: the ceiling does not cover the light.
 #[test]
 fn light_in_a_ceiling_shines_into_the_room() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);

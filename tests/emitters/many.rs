@@ -12,8 +12,8 @@ use zerkalo::scene::Scene;
 /// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;
 
-/// Returns positions of `count` lights around the origin. A quarter of them are below the plane y =
-/// 0, and some are at the same place.
+/// Returns positions of `count` lights around the origin. About a quarter of them are below the
+/// plane y = 0, and some are at the same place.
 fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
     let position = |i: usize| match i % 9 {
         8 => DVec3::new(0.5, 0.75, 0.25),
@@ -64,8 +64,8 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
     check(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
-/// Checks many lights of which each path samples a few. They share one light group, which has the
-/// right mean. A spot light beside them has a group of its own.
+/// Checks many point lights of which each path samples only a few. The lights share one light
+/// group, whose mean radiance is right. A spot light beside them has a group of its own.
 #[test]
 fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
@@ -92,7 +92,8 @@ fn chosen_lights_have_one_light_group() {
     }
 }
 
-/// Checks that each path samples all lights, without noise, if there are fewer than [`CHOSEN`].
+/// Checks that each path samples all lights if there are fewer than [`CHOSEN`]. The radiance then
+/// has no noise.
 #[test]
 fn few_lights_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));

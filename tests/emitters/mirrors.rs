@@ -72,7 +72,7 @@ fn rough_panes_find_small_lights_on_both_sides() {
     check(&cases, 1 << 14, [2e-3, 1e-6]);
 }
 
-/// Checks that a cone lobe reflects the fraction of its solid angle that the light covers.
+/// Checks that a cone lobe reflects the fraction of the lobe's solid angle that the light covers.
 #[test]
 fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     let mut cases = Vec::new();

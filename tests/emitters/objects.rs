@@ -13,8 +13,9 @@ use zerkalo::scene::Scene;
 /// points are lifted off the emitter and rays start above the receiver.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
-/// Returns the scene of a camera that looks at a receiver at the origin. It has the materials
-/// `white`, `lamp` (black and emissive) and `black`.
+/// Returns the scene of a camera that looks at a receiver at the origin. `white` is the text of the
+/// receiver's material. `rest` is the text of further objects; they may have the materials `lamp`
+/// (black and emissive), `front` (the same, one-sided) and `black`.
 fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
     scene(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
@@ -38,8 +39,8 @@ fn object(material: &str, shape: &str) -> String {
     format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
 }
 
-/// Returns a rectangle across `x` and `z` at `center` that faces down: its description as a shape
-/// or light, and its corners.
+/// Returns a horizontal rectangle that faces down: its description as a shape or a light, and its
+/// corners.
 fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     let corner = |x: f64, z: f64| center + DVec3::new(x * width, 0.0, z * depth);
     let text = format!(
@@ -50,8 +51,8 @@ fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| corner(x, z)).into())
 }
 
-/// Returns the 6 x 6 equal pieces of the rectangle with the given corners, which a mesh divides
-/// into 72 triangles.
+/// Returns 6 x 6 equal pieces of the rectangle with the given corners. A mesh of the pieces has 72
+/// triangles.
 fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
     let (u, v) = ((corners[1] - corners[0]) / 6.0, (corners[3] - corners[0]) / 6.0);
     let corner = |i: u32, j: u32| corners[0] + u * f64::from(i) + v * f64::from(j);
@@ -162,8 +163,8 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Checks an emissive box that stands on a surface. Its lower face must light nothing behind the
-/// surface.
+/// Checks an emissive box that stands on a surface. The box's lower face must light nothing behind
+/// the surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let turned = "transform = [{ rotate_y = 30.0 }]\n";
@@ -228,7 +229,8 @@ fn back_of_a_flat_emissive_object_follows_two_sided() {
     check(&cases, 1 << 14, ROUNDING);
 }
 
-/// Checks that the mean radiances of the scenes `a` and `b` differ by no more than chance explains.
+/// Checks that the mean radiances of the scenes `a` and `b`, each over `count` samples, differ by
+/// no more than chance explains.
 fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
     for (precision, rounding) in ["single", "double"].into_iter().zip(ROUNDING) {
         let mean = |scene: &Scene, seed| match precision {

@@ -16,9 +16,9 @@ pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Passes the red radiance of each light group in `count` independent samples of the pixel (0, 0)
-/// to `visit`. A light with a group of its own counts with unit intensity, and lights in a shared
-/// group count with their own intensities.
+/// Calls `visit` for each of `count` independent samples of the pixel (0, 0), with the red radiance
+/// of every light group. A light with a group of its own counts with unit intensity, and lights in
+/// a shared group count with their own intensities.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: impl FnMut(&[f64])) {
     let world = World::<L>::new(scene);
     let settings = SampleSettings { seed, kind: SamplerKind::Random };

@@ -25,13 +25,14 @@ const SHEET_Z: f64 = 2.0;
 /// Angle in degrees between the edge of the bright sheet and the vertical. It makes all rows and
 /// columns of pixels different.
 const TILT: f64 = 20.0;
-/// Coordinate x at which the edge of the bright sheet crosses the axis of the picture.
+/// Coordinate x at which the edge of the bright sheet crosses the height y = 0.
 const EDGE_X: f64 = 0.15;
 const SHEET: [f64; 3] = [0.9, 0.55, 0.2];
 const SKY: [f64; 3] = [0.08, 0.2, 0.45];
 
 /// Returns the scene of a glossy mirror in the plane z = 0 that fills the picture. It shows a
-/// blurred reflection of the edge of a bright sheet behind the eye, in front of a sky.
+/// blurred reflection of a bright sheet with a straight edge, behind the eye, and of the sky beside
+/// the sheet.
 fn closed_form(filter: Filter) -> Scene {
     let [width, height] = SIZE;
     let (s, c) = TILT.to_radians().sin_cos();
@@ -84,8 +85,9 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     a.map(|x| x / dot(a, a).sqrt())
 }
 
-/// Returns the share of a uniform cone of half-angle `theta` that is inside of a half-space through
-/// its apex. `delta` is the angle of the axis above the half-space's plane.
+/// Returns the share of the directions in a cone that are inside of a half-space through the cone's
+/// apex. `theta` is the half-angle of the cone. `delta` is the angle of its axis above the plane of
+/// the half-space; it is positive inside of the half-space.
 fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta >= theta {
         1.0
@@ -259,8 +261,9 @@ fn outcomes(filter: Filter, adaptive: bool, stop: Stop, expected: StoppedBy) -> 
         .collect()
 }
 
-/// Checks the estimated errors of one kind of render. Returns the true RMSE of the displayed
-/// picture, divided by the estimated one.
+/// Compares estimated with true errors of pictures with several seeds and `spp` samples per pixel.
+/// Also checks that the mean error is 0 within noise. Returns the true RMSE of the displayed
+/// picture, divided by the estimated one, averaged over the seeds.
 fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let outcomes = outcomes(filter, adaptive, stop, StoppedBy::Spp);
@@ -301,7 +304,8 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     mean(outcomes.iter().map(|o| o.codes_ratio))
 }
 
-/// Checks the estimated errors for both pixel filters and for few and many samples.
+/// Compares estimated with true errors for both pixel filters and for 32, 128 and 1024 samples per
+/// pixel.
 fn assert_always_honest(adaptive: bool) {
     let filters = [Filter::Point, Filter::Box].into_iter();
     let cases = filters.flat_map(|filter| [32, 128, 1024].map(|spp| (filter, spp)));
@@ -366,8 +370,9 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     }
 }
 
-/// Renders the physical mirror room to a noise target in linear radiance. Checks that the true
-/// RMSE, against a reference of another seed, exceeds the target by at most 5 %.
+/// Renders the scene mirror-room-physical to a noise target in linear radiance, with several seeds.
+/// Checks that the true RMSE, against a reference of another seed, exceeds the target by at most 5
+/// %.
 fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let scene = sized(shipped("mirror-room-physical.toml"), size);
     let pool = pool(2);

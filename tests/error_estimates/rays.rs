@@ -1,5 +1,5 @@
-//! Cost of adaptive pictures: the number of their rays, divided by the number of rays of uniform
-//! pictures with the same true error.
+//! Cost of adaptive pictures: the number of their rays, divided by the number of rays that uniform
+//! pictures with the same true error have.
 
 use crate::error_estimates::scenes::{KINDS, Sample, scene};
 use crate::error_estimates::survey::{LIMIT_SPP, Reference, run, target_of};
@@ -7,8 +7,8 @@ use crate::support::{begin, pool, trace, wave};
 use zerkalo::render::schedule::Stop;
 use zerkalo::world::Precision;
 
-/// Largest number of rays of an adaptive picture in the survey of rays. A picture may have 64
-/// samples per pixel even if these take more rays.
+/// Number of rays at which the survey of rays ends an adaptive picture, unless the picture has less
+/// than 64 samples per pixel.
 const MAX_RAYS: u64 = 12_000_000;
 /// Number of samples of a reference picture, divided by that of the adaptive pictures.
 const REFERENCE_FACTOR: u32 = 16;
@@ -104,8 +104,9 @@ fn uniform_curve(
     curve
 }
 
-/// Returns the number of rays at which a convergence curve has the mean squared error `square`. The
-/// curve is interpolated, and extrapolated beyond its end, by a power law.
+/// Returns the number of rays at which the true error on a convergence curve reaches the mean
+/// squared error `square`. The curve is interpolated, and extrapolated beyond its end, by a power
+/// law.
 fn rays_at(curve: &[Point], square: f64) -> f64 {
     let next = curve.iter().position(|point| point.square <= square).unwrap_or(curve.len() - 1);
     let [before, after] = [next.max(1) - 1, next.max(1)].map(|i| curve[i]);

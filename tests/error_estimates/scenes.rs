@@ -93,8 +93,8 @@ fn head(size: [u32; 2], background: &str, ambient: f64) -> String {
     )
 }
 
-/// Returns balls of constant radiance. They are about as large as a pixel, or they are smaller and
-/// brighter than white.
+/// Returns `count` balls of constant radiance. They are about as large as a pixel if `radiance` is
+/// at most 1 (white), and smaller if it is above 1.
 fn balls(n: &mut Numbers, size: [u32; 2], count: u32, radiance: f64) -> Balls {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let across = HALF_HEIGHT * f64::from(size[0]) / f64::from(size[1]);
@@ -153,7 +153,8 @@ fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
     parsed(&text)
 }
 
-/// Returns a scene of lit balls, in a small part of the picture or all over it.
+/// Returns a scene of lit balls, in a small part of the picture or all over it. If `mirrors` is
+/// `true`, about a quarter of the balls are glossy mirrors.
 fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.05);
     text += "[[light]]\npoint = { position = [3.0, 5.0, 8.0] }\nintensity = 1.0\n";

@@ -24,8 +24,9 @@ fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
     radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
 }
 
-/// Reference for the true error of a picture: its closed form, or a uniform picture of another seed
-/// with its own estimated error.
+/// Reference for the true error of a picture: displayed values of every pixel, from a closed form
+/// or from a uniform picture of another seed. `own` is the estimated RMSE of the uniform picture in
+/// 8-bit levels, or 0 for a closed form.
 pub struct Reference {
     codes: Vec<f64>,
     pub own: f64,
@@ -45,8 +46,8 @@ impl Reference {
         Self { codes: codes(&picture(&rendering, Replicates::Both)), own }
     }
 
-    /// Returns the true mean squared error of a picture in squared 8-bit levels, without the error
-    /// of the reference. By chance it may be below 0.
+    /// Returns the mean squared difference between a picture and the reference, minus the mean
+    /// squared error of the reference, in squared 8-bit levels. By chance it may be below 0.
     pub fn square(&self, rendering: &RenderState) -> f64 {
         let got = codes(&picture(rendering, Replicates::Both));
         let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
@@ -55,7 +56,8 @@ impl Reference {
 }
 
 /// Renders a scene by a schedule. `each` receives the state after every allocation round, and
-/// returns `true` to end the render.
+/// returns `true` to end the render. Returns the final state, the schedule, and the criterion that
+/// ended the render, or `None` if `each` ended it.
 pub fn run(
     sample: &Sample,
     seed: u64,
@@ -100,8 +102,8 @@ pub fn target_of(number: u64) -> f64 {
 /// Compares the reported and the true error of adaptive pictures of a scene. If k pixels carry the
 /// noise of a picture, its true error has the relative standard deviation 1 / sqrt(2 k), and so has
 /// any estimate of this error. Seeds are therefore added until their pictures together have
-/// [`ENOUGH`] such pixels, but at most `seeds`. The first `uniform_seeds` seeds are compared with
-/// uniform pictures.
+/// [`ENOUGH`] such pixels, but at most `seeds`. The pictures of the first `uniform_seeds` seeds are
+/// also compared with uniform pictures, by their numbers of rays.
 fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
@@ -144,9 +146,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) 
 
 /// Checks that the true error agrees with the reported one within their uncertainty. Each error is
 /// the root of a mean of k squares, where k is the number of effective pixels (pixels that carry
-/// the noise). Its relative standard deviation is 1 / sqrt(2 k), and that of the ratio of two
-/// errors is 1 / sqrt(k). Also checks that adaptive sampling takes at most 1.5 times the rays of
-/// uniform sampling.
+/// the noise). The relative standard deviation of an error is 1 / sqrt(2 k), and that of the ratio
+/// of two errors is 1 / sqrt(k). Also checks that adaptive pictures take at most 1.5 times the rays
+/// of uniform pictures with the same true error.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
@@ -163,7 +165,7 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// Checks 13 scenes. They are of eight of the ten kinds, the kinds that are cheap to render.
+/// Compares true with reported errors in 13 scenes, of the eight kinds that are cheap to render.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 24, 25, 35];
@@ -183,8 +185,8 @@ fn reported_error_of_stars_is_not_selected() {
 }
 
 /// Checks adaptive pictures of single balls, whose true error once was 0.77 to 0.8 of the reported
-/// one. The reported error must be that of all pixels, not the larger one of two estimates from
-/// half of the pixels each. The ratio of each ball is uncertain by 6 %.
+/// one. The reported error must be that of all pixels. It must not be the larger one of two
+/// estimates, each from half of the pixels. The ratio of each ball is uncertain by 6 %.
 #[test]
 fn reported_error_of_few_pixels_is_that_of_all() {
     let ratios = [60, 130, 180].map(|number| examine(number, 0, 96, 0).ratio);
@@ -211,9 +213,10 @@ fn survey_of_200_scenes() {
     assert!(100 * inside >= 95 * outcomes.len() && extreme <= 1.3 && highest <= 1.5);
 }
 
-/// Checks a picture of a white ball as large as a pixel: adaptive sampling takes at most 1.5 times
-/// the rays of uniform sampling. The allocation estimate, which is made from half of the pixels,
-/// sees no noise in the ball's tile; only the other pixels are noisy.
+/// Checks a picture of a white ball that is smaller than a pixel. For the same noise target,
+/// adaptive sampling takes at most 1.5 times the rays of uniform sampling. The allocation estimate,
+/// which is made from half of the pixels, sees no noise in the ball's tile; only the other pixels
+/// are noisy.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "
@@ -240,8 +243,9 @@ fn single_ball_ends_with_few_samples() {
     }
 }
 
-/// Checks that the mean of a closed glossy room is the same with and without adaptive sampling.
-/// Skewed noise in the allocation estimates must bias no tile by more than the tile's own noise.
+/// Checks that the mean of the picture of a closed glossy room is the same with adaptive and with
+/// uniform sampling. Skewed noise in the allocation estimates must bias no tile by more than the
+/// tile's own noise.
 #[test]
 fn adaptive_mean_of_a_closed_room_is_unbiased() {
     let mut sample = scene(7);

@@ -141,7 +141,7 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// Checks that a colour c in light of the intensity 1 / c is white.
+/// Checks that a surface of the colour c in light of the intensity 1 / c is white.
 #[test]
 fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
@@ -155,8 +155,8 @@ fn dim_colour_in_bright_light_is_white() {
     }
 }
 
-/// Checks that a colour of 1e6 does not saturate the film after a million samples in each of two
-/// pixels.
+/// Checks that a colour of 1e6 does not saturate the film after half a million samples in each of
+/// two pixels.
 #[test]
 fn bright_colour_does_not_saturate_film() {
     let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
@@ -167,8 +167,8 @@ fn bright_colour_does_not_saturate_film() {
     assert!((mean(&rendering) - 1.0).abs() < 1e-6, "{}", mean(&rendering));
 }
 
-/// Checks two facing mirrors that amplify light in front of a bright background. The radiance of
-/// every pixel is finite and above 1, which is displayed as white.
+/// Checks two facing mirrors that amplify light, with a bright background. The red radiance of
+/// every pixel is finite and above 1, the largest displayed value.
 #[test]
 fn amplifying_mirrors_give_finite_white() {
     let text = |k: f64, depth: u32| {

@@ -45,7 +45,8 @@ fn ellipsoid_surface(m: DMat3) -> f64 {
     sum * 4.0 * PI / f64::from(rows * columns)
 }
 
-/// Returns surface area and volume of the image of the canonical tapered cylinder under `m`.
+/// Returns surface area and volume of the image under `m` of a tapered cylinder with height 1 and
+/// the radii 1 and `top`.
 fn tapered(m: DMat3, top: f64) -> (f64, f64) {
     let volume = m.determinant().abs() * PI * (1.0 + top + top * top) / 3.0;
     let disc = PI * m.x_axis.cross(m.y_axis).length();
@@ -116,7 +117,8 @@ struct Tally {
 
 impl Tally {
     /// Adds lines, each given by its middle and direction. Each is traced from both of its ends, at
-    /// distance `far` from the middle.
+    /// distance `far` from the middle. If `flat` is `true`, the normals at the hits are not
+    /// checked.
     fn add<L: SimdFloat>(&mut self, geometry: &Aggregate<L>, lines: &[Line], far: f64, flat: bool) {
         let ends = |sign: f64| -> Vec<Line> {
             lines.iter().map(|(p, d)| (*p - *d * (sign * far), *d * sign)).collect()
@@ -141,8 +143,8 @@ impl Tally {
         }
     }
 
-    /// Checks the share of lines that hit and the mean chord. Returns the larger of both deviations
-    /// in units of its standard deviation.
+    /// Checks the share of lines that hit and the mean chord against the expected values `share`
+    /// and `mean_chord`. Returns the larger of the two deviations, each in standard deviations.
     fn check(&self, name: &str, share: f64, mean_chord: f64) -> f64 {
         let found = self.hits / self.lines;
         let sigma = (share * (1.0 - share) / self.lines).sqrt();

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::world::Precision;
 
-/// Returns `x` moved by `units` spacings between the precision's numbers near 1.
+/// Returns `x` moved by about `units` rounding errors. `epsilon` is the relative rounding error of
+/// the precision.
 fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
     x * (1.0 + f64::from(units) * epsilon)
 }
@@ -69,7 +70,7 @@ fn extreme_10_coincident_faces() {
 }
 
 /// Checks that two adjacent boxes act as one: no ray passes between them, and no surface is left
-/// inside.
+/// inside. The boxes overlap, or have a gap, by `units` times the rounding error.
 fn check_fused<L: SimdFloat>(units: i32) {
     let boundary = nudged(0.3, units, L::EPSILON);
     let right = block([(boundary + 1.0) / 2.0, 0.0, 0.0], [1.0 - boundary, 1.0, 1.0]);
@@ -120,8 +121,8 @@ fn extreme_10_touching_parts_have_no_crack() {
     report(10, "both", "0 cracks");
 }
 
-/// Checks that coincident faces of two materials show the part listed first. Rounding must not mix
-/// the materials.
+/// Checks that coincident faces of two parts show the material of the part listed first. Rounding
+/// must not mix the materials.
 #[test]
 fn coincident_faces_show_the_first_part() {
     let parts =

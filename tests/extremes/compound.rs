@@ -41,7 +41,8 @@ pub fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
     Aggregate::new(std::slice::from_ref(form))
 }
 
-/// Returns a line from outside the ball of radius 4 through a random point near the origin.
+/// Returns a line in a random direction through a random point near the origin. The line starts 6
+/// units before this point.
 fn line(numbers: &mut Numbers) -> Line {
     let d = numbers.direction();
     (numbers.in_cube(1.5) - d * 6.0, d)
@@ -76,8 +77,8 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
     out
 }
 
-/// Returns the length of a line inside of the solid. Checks that its hits enter and leave
-/// alternately.
+/// Returns the length of a line inside of a solid, from the hits of the line. Checks that the line
+/// enters and leaves the solid alternately at these hits.
 fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
     let context = || format!("{name}: {line:?} {hits:?}");
     assert!(hits.len().is_multiple_of(2), "odd: {}", context());
@@ -171,7 +172,8 @@ fn extreme_08_parity_at_length() {
     check_parity(10_000);
 }
 
-/// Checks random trees with `rays` rays each.
+/// Checks 100 random trees of set operations, with `rays` rays from outside and `rays` rays from
+/// random points for each.
 fn check_parity(rays: usize) {
     let (mut seen, mut odd, mut line_count) = (0, 0, 0);
     for seed in 0..100 {
@@ -230,7 +232,7 @@ fn check_parity(rays: usize) {
     report(8, "single", &format!("{odd} of {line_count} lines out of turn"));
 }
 
-/// Returns `true` if the ray enters and leaves the solid alternately.
+/// Returns `true` if the ray `line` enters and leaves a solid alternately at the hits `hits`.
 fn alternates(line: &Line, hits: &[LineHit]) -> bool {
     let right_side = |(i, m): (usize, &LineHit)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
     hits.len().is_multiple_of(2) && hits.iter().enumerate().all(right_side)

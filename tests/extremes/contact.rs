@@ -12,11 +12,10 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Width of the gap between the objects in the scene with which the scene of objects in contact is
-/// compared.
+/// Width of the gap in scenes that are compared with the same scene without a gap.
 const GAP: f64 = 1e-4;
 
-/// Shapes on the plane y = 0 that reach up to y = 1 or are in that plane.
+/// Shapes that stand on the plane y = 0, and a flat one in that plane.
 const UPPER: [&str; 7] = [
     "box = { center = [0, 0.5, 0], size = [2, 1, 2] }",
     "mesh = { file = \"upper.obj\", normals = \"flat\" }",
@@ -62,7 +61,8 @@ fn slab(low: DVec3, high: DVec3) -> String {
     out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
 }
 
-/// Returns a folder with the two mesh files.
+/// Returns a folder with the files `upper.obj` and `lower.obj`, the meshes of two boxes that touch
+/// in the plane y = 0.
 fn meshes() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write_file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -79,7 +79,8 @@ struct Setting<'a> {
     folder: &'a Path,
 }
 
-/// Text of a box whose lower face is in the plane of the lower face of a smaller box inside it.
+/// Text of a box whose lower face is in the plane of the lower face of [`INNER`], a smaller box
+/// inside it.
 const OUTER: &str = "box = { center = [0, 0.5, 0], size = [3, 1, 3] }";
 const INNER: &str = "box = { center = [0, 0.25, 0], size = [1.4, 0.5, 1.4] }";
 
@@ -128,7 +129,7 @@ impl Setting<'_> {
         Traced::new(&scene.unwrap_or_else(|e| panic!("{e}\n{text}")), precision)
     }
 
-    /// Returns lines through the middle of the contact area, from above or from below.
+    /// Returns `count` lines through the middle of the contact area, from above or from below.
     fn lines(&self, above: bool, count: usize) -> Vec<Line> {
         let mut numbers = Numbers::new(5);
         let line = |_| {
@@ -145,7 +146,8 @@ impl Setting<'_> {
         (0..count).map(line).collect()
     }
 
-    /// Checks the contact of both shapes by rays from above and from below.
+    /// Compares the scene of both shapes in contact with the scene with a gap, by `count` rays from
+    /// above and `count` rays from below.
     fn check(&self, precision: Precision, count: usize) {
         let both_flat = !is_solid(self.upper) && !is_solid(self.lower);
         // Of two flat shapes in one plane, a transparent one is in front of an opaque one. If both
@@ -157,7 +159,8 @@ impl Setting<'_> {
         }
     }
 
-    /// Compares the scene with one whose upper shape is lifted by `gap`.
+    /// Compares the radiance along `count` rays in the scene and in a copy whose upper shape is
+    /// lifted by `gap`. At most 2 % of the rays may differ visibly.
     fn compare(&self, gap: f64, above: bool, precision: Precision, count: usize) {
         let lines = self.lines(above, count);
         let touching = self.traced(0.0, precision).radiance(&lines);

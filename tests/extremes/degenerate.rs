@@ -10,7 +10,7 @@ use zerkalo::primitive::{
 };
 use zerkalo::shape::{Cuboid, ShapeDesc};
 
-/// Returns `true` for convex solids. Compounds and meshes have tests of their own.
+/// Returns `true` if `form` is a convex solid. Compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
     form.is_solid() && form.is_convex()
 }
@@ -127,7 +127,7 @@ fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
     ends.filter(|[enter, leave]| !less(*leave, *enter))
 }
 
-/// Number of steps of the lattice of ray origins in half a side of the box.
+/// Number of lattice steps in half a side of the box. Rays start at the points of this lattice.
 const UNIT: i64 = 2;
 
 fn check_lattice<L: SimdFloat>() -> [usize; 3] {

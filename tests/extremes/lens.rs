@@ -10,15 +10,15 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
-/// Largest deviation from a closed form, in standard errors. All comparisons below, some 4,000
-/// pixels, give a false alarm in 1 of 1,000 runs.
+/// Largest allowed deviation of a pixel from a closed form, in standard errors. The comparisons of
+/// this file, some 4,000 pixels, give a false alarm in 1 of 1,000 runs.
 const MAX_Z: f64 = 5.3;
 
 /// Width and height of the picture of the edge of a white half-plane, in pixels.
 const EDGE: [u32; 2] = [96, 4];
 
-/// Returns the scene of a white half-plane x < 0 at `depth` in front of a black background. The
-/// lens has the radius `radius` and is focused at the distance `focus`.
+/// Returns the scene of a white half-plane x < 0 in front of a black background, at the distance
+/// `depth` from the lens. The lens has the radius `radius` and is focused at the distance `focus`.
 fn edge(depth: f64, radius: f64, focus: f64) -> Scene {
     Scene::parse(
         &format!(
@@ -156,8 +156,7 @@ fn pixels_bytes(scene: &Scene) -> Vec<u8> {
     rendered(scene, 1, Precision::Auto, 2).film.bytes()
 }
 
-/// Checks lenses as large as the room and larger, focused anywhere. Every sample is finite, and no
-/// brighter than the brightest object.
+/// Checks lenses as large as the room and larger, focused anywhere. Every sample is finite.
 #[test]
 fn huge_aperture_gives_finite_samples() {
     for name in ["mirror-room.toml", "mirror-room-physical.toml", "glass.toml", "torus.toml"] {

@@ -77,7 +77,8 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 }
 
 /// Returns the number of rays that miss the mesh, by closest hit or by occlusion. `rays` rays start
-/// inside of the mesh and point to its corners, its edges and into its triangles.
+/// inside of the mesh and point to its corners, its edges and into its triangles. `place`
+/// transforms the mesh, an ellipsoid with the half-axes `axes`.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });

@@ -65,7 +65,7 @@ struct Family {
     text: fn(f64) -> String,
     /// Smallest tested proportion of the family.
     least: f64,
-    /// Smallest error of single precision at the smallest proportion, in 8-bit levels.
+    /// Error that single precision must have at least at the smallest proportion, in 8-bit levels.
     visible: f64,
 }
 
@@ -95,7 +95,7 @@ fn small_ball(r: f64) -> String {
         )
 }
 
-/// Returns the scene of a sheet of thickness `t` on the floor, seen from close to its edge.
+/// Returns the scene of a sheet of thickness `t` on a floor, seen from close to its edge.
 fn thin_slab(t: f64) -> String {
     camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0)
         + SUN
@@ -108,7 +108,7 @@ fn thin_slab(t: f64) -> String {
         )
 }
 
-/// Returns the scene of a pane of glass at the height `g` above the floor.
+/// Returns the scene of a pane of glass at the height `g` above a floor.
 fn narrow_gap(g: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
         + SUN
@@ -134,7 +134,7 @@ fn thin_shell(t: f64) -> String {
         )
 }
 
-/// Returns the scene of a lamp at the height `h` above the floor, bright enough for the floor to be
+/// Returns the scene of a lamp at the height `h` above a floor, bright enough for the floor to be
 /// visible.
 fn low_lamp(h: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
@@ -145,7 +145,7 @@ fn low_lamp(h: f64) -> String {
         )
 }
 
-/// Returns a scene with a narrow view, 40 degrees times `a`, of the edges of objects.
+/// Returns a scene with a narrow view, 40 degrees times `a`, of a corner of a cube on a floor.
 fn narrow_view(a: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a)
         + SUN
@@ -154,8 +154,8 @@ fn narrow_view(a: f64) -> String {
         + "[[object]]\nmaterial = \"red\"\nshape.cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }\n"
 }
 
-/// Returns the scene of an eye at the height `h` above the floor, in front of the shadow of a far
-/// pole.
+/// Returns the scene of an eye at the height `h` above a floor that looks at the edge of a box's
+/// shadow.
 fn low_eye(h: f64) -> String {
     camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
         + &format!("[[light]]\npoint = {{ position = [3.0, 4.0, {:?}] }}\n", 0.2 - 3.0 * h)
@@ -166,7 +166,7 @@ fn low_eye(h: f64) -> String {
         )
 }
 
-/// Returns the scene of a ball on a ground ball of radius 1 / `p`.
+/// Returns the scene of a ball on the ground, which is a ball of radius 1 / `p`.
 fn round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
@@ -180,7 +180,7 @@ fn round_ground(p: f64) -> String {
         )
 }
 
-/// Returns the scene of a bare ground ball of radius 1 / `p`, seen from eye height.
+/// Returns the scene of bare ground, a ball of radius 1 / `p`, seen from the height 1.7.
 fn bare_round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0)
@@ -191,7 +191,8 @@ fn bare_round_ground(p: f64) -> String {
         )
 }
 
-/// Returns the scene of two balls at the distance 1 / `p`, seen from near one of them.
+/// Returns the scene of two balls at the distance 1 / `p` from each other, seen from near one of
+/// them.
 fn far_apart(p: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
         + SUN
@@ -374,9 +375,9 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     }
 }
 
-/// Checks eyes inside of the bounding box of a cylinder, a cone, an ellipsoid or a mesh. The box
-/// contains points close to the surface and points far from it, with different choices of
-/// precision.
+/// Checks eyes inside of the bounding box of a cylinder, a cone or an ellipsoid. The box contains
+/// points close to the surface, for which `auto` selects double precision, and points far from it,
+/// for which it selects single.
 #[test]
 fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() {
     let scene = |shape: &str, eye: [f64; 3]| {

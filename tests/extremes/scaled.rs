@@ -48,8 +48,8 @@ fn changed(mut scene: Scene, s: f64, by: DVec3) -> Scene {
     scene
 }
 
-/// Returns the root mean square difference of two scenes' pictures with equal samples, in 8-bit
-/// levels. The `left_out` pixels that differ most are left out.
+/// Returns the root mean square difference between the pictures of the scenes `a` and `b` with
+/// equal samples, in 8-bit levels. The `left_out` pixels that differ most are left out.
 fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -> f64 {
     let display = Display::default();
     let levels_of_picture = |scene: &Scene| -> Vec<[f64; 3]> {
@@ -70,10 +70,10 @@ fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -
     (most.iter().sum::<f64>() / (3 * a.len()) as f64).sqrt()
 }
 
-/// Compares all scenes with copies that are scaled by `s` and moved by `by`. `limits` are the
-/// largest differences in 8-bit levels, in double precision and with `auto`. `flipped` is the
-/// number of pixels that may differ by more with `auto`, because a path passes an edge on the other
-/// side.
+/// Compares the picture of each scene with that of a copy that is scaled by `s` and moved by `by`.
+/// `limits` are the largest RMS differences in 8-bit levels: first in double precision, then in the
+/// precision that `auto` selects. In the latter, the `flipped` pixels that differ most are left
+/// out. In them, a path may pass an edge on another side than in the original scene.
 fn check(name: &str, s: f64, by: DVec3, limits: [f64; 2], flipped: usize) {
     for file in SCENES {
         let scene = sized(shipped(file), SIZE);
@@ -98,12 +98,13 @@ fn scaled_scenes_give_the_same_picture() {
     check("scaled by 2^20", 1_048_576.0, DVec3::ZERO, [0.0; 2], 0);
 }
 
-/// Number of pixels, of 3,072, in which a path in single precision may pass an edge on another side
-/// than in the original scene.
+/// Number of pixels, of 3,072, that may differ from the original picture by more than rounding: a
+/// path in single precision passes an edge on another side.
 const FLIPPED: usize = 2;
 
-/// Largest RMSE that rounding may cause with equal samples, in 8-bit levels: in double precision
-/// and with `auto`. The measured RMSE is 3e-7 in double and 5e-5 in single precision.
+/// Largest RMS difference between two pictures with equal samples that rounding may cause, in 8-bit
+/// levels: in double precision, and in the precision that `auto` selects. Measured are 3e-7 in
+/// double and 5e-5 in single precision.
 const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
 
 /// Checks moved scenes. Numbers in a scene file that are moved by ten million units are rounded to

@@ -18,8 +18,8 @@ enum ConvexShape {
     Cone,
 }
 
-/// Scene text and surface points. All shapes but the infinite plane are 2 wide, in units of the
-/// scale.
+/// Scene text and surface points of the shapes. All shapes but the infinite plane are 2 wide, in
+/// units of `scale`.
 impl ConvexShape {
     fn scene_text(self, scale: f64, place: DVec3) -> String {
         let [x, y, z] = place.to_array();
@@ -116,8 +116,8 @@ impl ConvexShape {
     }
 }
 
-/// Returns the number of points of a convex shape that its own surface hides from the light by
-/// error.
+/// Returns the number of surface points of a convex shape that face the light, in the direction
+/// `towards`, but are dark by error.
 fn falsely_dark(
     shape: ConvexShape,
     scale: f64,

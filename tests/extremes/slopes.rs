@@ -10,15 +10,16 @@ use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
 const SIZE: [u32; 2] = [24, 16];
-/// Number of samples per pixel of the first point of the fit, in both replicates (halves of the
-/// samples) together.
+/// Smallest number of samples per pixel of the pictures whose errors are fitted, in both replicates
+/// (halves of the samples) together.
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
-/// Ratio of two sample counts: that of the reference, and the largest of the compared pictures,
-/// [`LAST`].
+/// Number of samples of the reference, divided by [`LAST`], the largest number of samples of the
+/// compared pictures.
 const REFERENCE: u32 = 16;
 
-/// Returns the slope of log RMSE against log samples, over several pictures with different seeds.
+/// Returns the slope of the logarithm of the RMSE against the logarithm of the number of samples,
+/// over pictures with several seeds.
 fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     const SEEDS: u64 = 6;
     let pool = pool(2);
@@ -44,7 +45,8 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     slope
 }
 
-/// Returns the slopes of the error of `scene` with Sobol points and with random numbers.
+/// Returns the slopes of the error of `scene` against the number of samples, both logarithmic: with
+/// Sobol points and with random numbers.
 fn slopes(name: &str, scene: &Scene) -> [Slope; 2] {
     let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
     let mut best = begin_with(scene, settings, Precision::Auto);

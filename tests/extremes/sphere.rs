@@ -61,8 +61,8 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     (across2.0.sqrt() - radius, DVec3::from_array(point))
 }
 
-/// Checks rays from the distance `far` at a unit sphere. They are aimed at points within 0.7 of the
-/// radius and at points near the limb. Returns the largest distance of a hit point from the
+/// Checks rays from the distance `far` at a unit sphere. They are aimed at points within 0.7 of its
+/// centre and at points near its limb. Returns the largest distance of a hit point from the
 /// surface.
 fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let mut worst = 0f64;
@@ -251,8 +251,8 @@ fn closed_form_10_silhouettes() {
     }
 }
 
-/// Checks the mask of a sphere's whole picture, through the compiled camera, against the exact
-/// mask.
+/// Checks which pixels of a sphere's whole picture show the sphere. The camera rays are those of
+/// the compiled camera. The expected pixels follow from the exact silhouette.
 #[test]
 fn closed_form_10_every_pixel_of_a_sphere() {
     let camera = Camera {
@@ -290,9 +290,9 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
 }
 
-/// Returns the longest chord that rounding can give a tangent. Rounding moves a line that starts at
-/// the distance 8 sideways, by up to 4 x 8 times the rounding error. The returned chord is that of
-/// a line at this depth below the surface.
+/// Returns the longest chord that rounding can give a tangent of the unit sphere. Rounding moves a
+/// line that starts at the distance 8 sideways, by up to 4 x 8 times the rounding error. The
+/// returned chord is that of a line at this depth below the surface.
 fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }

@@ -23,7 +23,8 @@ fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
     Some((hits[0]?.t - far, far - hits[1]?.t))
 }
 
-/// Returns lines through the canonical solids, from all sides.
+/// Returns random lines through a box around the canonical solids, which have the axis from z = 0
+/// to z = 1 and the radius 1 at z = 0.
 fn lines(seed: u64, count: usize) -> Vec<Line> {
     let mut numbers = Numbers::new(seed);
     (0..count)
@@ -39,8 +40,9 @@ fn lines(seed: u64, count: usize) -> Vec<Line> {
         .collect()
 }
 
-/// Returns the span of a line inside of the canonical solid, by the plain quadratic formula.
-/// Returns `None` if the line misses, or is too close to a tangent for the formula.
+/// Returns the distances at which a line enters and leaves a canonical solid (radius 1 at z = 0,
+/// radius `s` at z = 1), by the plain quadratic formula. Returns `None` if the line misses, or is
+/// too close to a tangent for the formula.
 fn quadratic_span(s: f64, (o, d): Line) -> Option<(f64, f64)> {
     let k = s - 1.0;
     let r = 1.0 + k * o.z;
@@ -81,8 +83,8 @@ fn frustum_spans_match_the_quadratic_formula() {
     }
 }
 
-/// Checks that the transition from cylinder to cone has no step where the quadratic changes its
-/// degree.
+/// Checks that hits change by no more than rounding from a cylinder to solids with almost equal
+/// radii, where the quadratic changes its degree.
 #[test]
 fn extreme_11_tapered_cylinders() {
     let mut worst = 0f64;
@@ -111,8 +113,8 @@ fn extreme_11_tapered_cylinders() {
     report(11, "single", LEFT_TO_DOUBLE);
 }
 
-/// Checks that a tapered cylinder of equal radii is bit-equal to the cylinder, and one of radius 0
-/// to the cone.
+/// Checks that a tapered cylinder of two equal radii is bit-equal to a cylinder, and one with the
+/// top radius 0 to a cone.
 #[test]
 fn extreme_11_untapered_solid_is_bit_equal_to_cylinder() {
     let (base, end) = ([0.1, -0.2, 0.3], [0.5, 0.9, -0.4]);
@@ -214,7 +216,8 @@ fn extreme_12_along_a_generator() {
     report(12, "single", "finite");
 }
 
-/// Checks tangents. Their hits are finite, and no line has a chord longer than `limit`.
+/// Checks tangents of cylinders, cones and conical frusta. Their hits are finite, and no tangent
+/// has a chord longer than `limit`.
 fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);

@@ -10,8 +10,9 @@ use zerkalo::lanes::Double;
 use zerkalo::primitive::{Form, PlaneForm};
 use zerkalo::shape::{Cylinder, ShapeDesc};
 
-/// Returns the volume of `form` in the cube from -`half` to `half`, and its standard error. They
-/// are computed from the chords of parallel lines, one in each cell of a lattice.
+/// Returns the volume of `form`, which is in the cube from -`half` to `half`, and the standard
+/// error of this volume. They are computed from the chords of parallel lines, one in each cell of a
+/// lattice.
 fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     let mut numbers = Numbers::new(seed);
     let side = 400;
@@ -124,7 +125,8 @@ fn extreme_09_volumes() {
     report(9, "double", &format!("volumes {worst:.1} sigma off at most"));
 }
 
-/// Checks the inclusion-exclusion principle on every line: V(A or B) + V(A and B) = V(A) + V(B).
+/// Checks the inclusion-exclusion principle on every line: L(A or B) + L(A and B) = L(A) + L(B),
+/// where L is the length of the line inside of a solid.
 #[test]
 fn extreme_09_inclusion_and_exclusion() {
     let solids = [

@@ -47,8 +47,8 @@ impl AnalyticShape {
     }
 }
 
-/// Returns the crossings of a rectangle: the points `center` + a `u` + b `v` with |a| <= 1, |b| <=
-/// 1; `u` and `v` are perpendicular.
+/// Returns the function that intersects rays with a rectangle: the points `center` + a `u` + b `v`
+/// with |a| <= 1 and |b| <= 1. The vectors `u` and `v` are perpendicular.
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
     let normal = u.cross(v);
     Box::new(move |origin, direction| {
@@ -59,7 +59,8 @@ fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
     })
 }
 
-/// Returns the crossings of triangles, by solving origin + t direction = a + x (b - a) + y (c - a).
+/// Returns the function that intersects rays with triangles. It solves origin + t direction = a + x
+/// (b - a) + y (c - a), where a, b, c are the corners of a triangle.
 pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings {
     let placed = move |t: &[DVec3; 3]| t.map(|corner| scene_from_mesh.transform_point3(corner));
     let list: Vec<[DVec3; 3]> = list.iter().map(placed).collect();

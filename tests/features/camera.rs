@@ -124,7 +124,7 @@ fn b3_camera_frame() {
 }
 
 /// Checks that circles of confusion in the picture of `tested` agree with those of `original`,
-/// around two points: the bright bead on the right, and the ball in front of it.
+/// around two points: a bright bead on the right, and a ball in front of it.
 fn discs_agree(original: &Scene, tested: &Scene) -> Verdict {
     [[0.9, 1.5, -6.5], [0.7, 0.35, 2.3]].into_iter().try_for_each(|point| {
         agrees(&zoomed(original, point, 6.0), &zoomed(tested, point, 6.0), 1536)

@@ -21,7 +21,8 @@ fn d6_rough_transmission() {
             ("microfacets for the cone", &|s| material(s, "spread").lobe = Lobe::Beckmann),
         ],
     );
-    // A lamp instead of the sun: points of it are sampled through the pane and from inside of solids.
+    // A lamp instead of the sun: points of it are sampled through the pane and from inside of
+    // solids.
     let mut lit = original;
     let lamp = &mut lit.lights[0];
     lamp.clear_kind();

@@ -18,7 +18,7 @@ fn exact(file: &str, mutations: &[(&str, crate::features::row::Change)]) {
     row(file, |tested| agrees_exactly(&original, tested), mutations);
 }
 
-/// Returns `scene` with a camera for which the blurred ball fills the picture.
+/// Returns `scene` with a camera for which a ball with blurred reflection fills the picture.
 fn close_up(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.camera.target = Some([1.65, 0.5, 0.3]);
@@ -334,8 +334,8 @@ fn d2_spot_light() {
     );
 }
 
-/// Returns `scene` with a point light in place of the panel, which the reference tracer does not
-/// support with diffuse bounces. One side of the room reflects, so that caustics light much of it.
+/// Returns `scene` with a point light as its only light. One wall of the room reflects, so that
+/// caustics light much of the room.
 fn with_point_light(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     material(&mut scene, "green").reflection = 0.8;

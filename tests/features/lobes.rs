@@ -12,8 +12,8 @@ use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::shape::Shape;
 use zerkalo::world::Precision;
 
-/// Returns `scene` with the mirror as its only reflecting material, without ambient and diffuse
-/// parts.
+/// Returns `scene` with the mirror as its only reflecting object. The mirror's material has no
+/// ambient and no diffuse part.
 fn stripped(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     for (name, m) in &mut scene.materials {
@@ -26,7 +26,8 @@ fn stripped(scene: &Scene) -> Scene {
     scene
 }
 
-/// Returns `scene` without the mirror, mirrored at its plane z = -2.
+/// Returns `scene` without the mirror, and with objects and lights mirrored at the mirror's plane z
+/// = -2.
 fn mirrored_scene(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");
@@ -40,7 +41,8 @@ fn mirrored_scene(scene: &Scene) -> Scene {
     scene
 }
 
-/// Checks that the mirror's pixels have 0.92 of the radiance of the mirrored scene.
+/// Checks that each pixel of `tested` that shows the mirror has k_r = 0.92 times the radiance of
+/// the same pixel in the mirrored scene, [`mirrored_scene`].
 fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
     let mirror = number(original, "mirror") as u32;
     let hits = first_hits(&sized(original.clone(), RASTER));
@@ -61,7 +63,7 @@ fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
     })
 }
 
-/// Returns the standard deviation of the brightness of the mirror's pixels.
+/// Returns the standard deviation of the brightness of the pixels that show the mirror.
 fn contrast(scene: &Scene) -> f64 {
     let mirror = number(scene, "mirror") as u32;
     let scene = sized(stripped(scene), RASTER);
@@ -137,7 +139,8 @@ struct Footprint {
     error: DVec3,
 }
 
-/// Returns the pixels of the mirror in the picture of `tested`, with the balls of `original`.
+/// Returns the pixels of `tested` that show the mirror, each with the balls of `original` as seen
+/// from the point of the mirror.
 fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     let original = sized(original.clone(), FINE);
     let mut tested = sized(tested.clone(), FINE);
@@ -202,7 +205,7 @@ fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> V
 /// Radius of the lobe's cone at unit distance.
 const RADIUS: f64 = 0.2;
 
-/// Returns half the side of the square whose area equals that of the cone's base.
+/// Returns half the side of the square whose area equals that of a circle of radius [`RADIUS`].
 fn half_side() -> f64 {
     0.5 * PI.sqrt() * RADIUS
 }
@@ -213,7 +216,8 @@ fn reach(angle: f64) -> f64 {
     if angle < 0.5 * PI { angle.tan() } else { f64::INFINITY }
 }
 
-/// Checks that reflected directions are uniform in the cone: a ball's share is its solid angle.
+/// Checks that reflected directions are uniform in the lobe's cone: the share of the lobe that a
+/// ball covers is the ratio of their solid angles.
 fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
     let edge = RADIUS.atan();
     shows_shares(&footprints(original, tested), |spot| {
@@ -225,9 +229,10 @@ fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
     })
 }
 
-/// Checks that reflected directions are uniform on the square: a ball's share is the area of its
-/// ellipse in the plane at unit distance. The corners of the square are outside of the cone, and
-/// the middles of its sides are inside.
+/// Checks that reflected directions are uniform on a square at unit distance: the share of the lobe
+/// that a ball covers is the ratio of the areas of the ball's ellipse and of the square, both in
+/// the square's plane. The corners of the square are outside of the cone of equal area, and the
+/// middles of its sides are inside.
 fn spreads_over_a_square(original: &Scene, tested: &Scene) -> Verdict {
     let half = half_side();
     let pixels = footprints(original, tested);

@@ -31,7 +31,7 @@ fn b1_tracing_depth() {
     row("level-full.toml", |tested| agrees(&original, tested, 96), &[primary, shadows]);
 }
 
-/// Upright pane of the scene with the ray tree.
+/// Upright pane of a scene of panes, each of which reflects and transmits rays.
 struct Pane {
     center: DVec3,
     /// Half the width and half the height of the pane.
@@ -65,7 +65,7 @@ fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, dept
         + pane.transmission * incoming(direction)
 }
 
-/// Checks that the mean over each band of six rows is that of the full ray tree.
+/// Checks that the mean radiance of each band of six rows is that of the full ray tree.
 fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     let pane = |o: &zerkalo::scene::Object| {
         let Shape::Rectangle(r) = &o.shape else { panic!("not a pane") };
@@ -105,9 +105,9 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Checks two facing square mirrors, each 1e4 units wide, to whose reflection ambient light adds
-/// the radiance 1. Every pixel has the sum of `terms`, the throughputs with which a path reaches
-/// its successive surfaces.
+/// Checks two facing square mirrors, each 1e4 units wide. Ambient light adds the radiance 1 at
+/// every surface. Every pixel has the sum of `terms`, the throughputs with which a path reaches its
+/// successive surfaces.
 fn sums_reflections(
     tested: &Scene,
     mirrors: [&str; 2],

@@ -112,8 +112,8 @@ fn is_the_experiment(scene: &Scene) -> Verdict {
     ensure(right, || "not the scene of the thread experiment".into())
 }
 
-/// Returns the film of an adaptive render by `threads` threads, whose tiles get different sample
-/// counts.
+/// Returns the film of an adaptive render by `threads` threads. The tiles of the film have
+/// different sample counts.
 fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     let mut rendering = begin(&sized(scene.clone(), [100, 70]), seed, Precision::Auto);
     let stop = Stop { spp: Some(96), ..Stop::default() };
@@ -121,7 +121,8 @@ fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     rendering.film
 }
 
-/// Checks that the film has the same bytes for 1, 2 and 7 threads, and that every tile has samples.
+/// Checks that the film of `scene` has the same bytes for 1, 2 and 7 threads, and that every tile
+/// has samples. `seed_of` returns the seed for a number of threads.
 fn threads_do_not_matter(scene: &Scene, seed_of: impl Fn(usize) -> u64) -> Verdict {
     is_the_experiment(scene)?;
     let one = film(scene, seed_of(1), 1);
@@ -151,7 +152,7 @@ const SMALL: [u32; 2] = [40, 30];
 /// Stop criterion of the pictures after edits.
 const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, seconds: None };
 
-/// Session: handle of a thread that renders scenes as they are edited.
+/// Client of a session, which renders scenes on its own thread while they are edited.
 struct Desk {
     session: Session,
 }
@@ -269,7 +270,8 @@ fn a15_user_edits() {
     assert!(desk.finished_picture(&capped) == saved_and_rendered(&first));
 }
 
-/// Checks that two scenes differ, and that `equalise` removes their only difference.
+/// Checks that two scenes differ, and that `equalise`, which copies a part of the second scene to
+/// the first, removes their only difference.
 fn differ_only(left: &Scene, right: &Scene, equalise: impl Fn(&mut Scene, &Scene)) -> Verdict {
     ensure(left != right, || "the scenes are equal".into())?;
     let mut same = left.clone();
@@ -277,7 +279,8 @@ fn differ_only(left: &Scene, right: &Scene, equalise: impl Fn(&mut Scene, &Scene
     ensure(same == *right, || "the scenes have other differences, too".into())
 }
 
-/// Returns the brightness of the floor left of the ball, divided by that right of the ball.
+/// Returns the brightness of the floor left of the ball, divided by that right of the ball, both
+/// seen from above.
 fn left_to_right(scene: &Scene) -> f64 {
     let mut scene = sized(scene.clone(), RASTER);
     let ball = scene.objects.iter().find(|o| o.name == "ball").unwrap().shape.clone();
@@ -348,8 +351,9 @@ fn a16_demonstrations() {
     }
 }
 
-/// Renders the scene of `generation` until it is finished. Writes a checkpoint after the first
-/// samples if `path` is given. Returns the film and the number of rays.
+/// Waits until the session has rendered the scene with the version number `generation`. Writes a
+/// checkpoint after the first samples if `path` is given. Returns the bytes of the film, and the
+/// number of rays.
 fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> (Vec<u8>, u64) {
     let mut path = path;
     loop {

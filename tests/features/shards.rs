@@ -21,7 +21,8 @@ use std::time::SystemTime;
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
 
-/// Returns the film of an adaptive render by one process, whose tiles get different sample counts.
+/// Returns the film of an adaptive render by one process. The tiles of the film have different
+/// sample counts.
 fn film_of_one(scene: &Scene) -> Film {
     let mut state = begin(&sized(scene.clone(), SIZE), SEED, Precision::Auto);
     follow(&mut state, settings(true, 0, Stop { spp: Some(96), ..Stop::default() }), &pool(2));
@@ -57,7 +58,7 @@ fn plan(film: &Film, shards: u32) -> Plan {
     }
 }
 
-/// Returns the films of the plan's base and of all shards.
+/// Returns the films of the plan's base (samples that the plan starts from) and of all shards.
 fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
     let scene = sized(scene.clone(), SIZE);
     let part = |shard: u32| {
@@ -107,7 +108,8 @@ fn e1_shards() {
     assert!(plan.differing_tile(&left_out, &[0, 1, 2]).is_none());
 }
 
-/// Returns the bytes of the film file of shard `number`.
+/// Returns the bytes of the film file of shard `number` with the samples of `film`. If `complete`
+/// is `false`, the file says that the shard is unfinished.
 fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     let mut header = FilmFileHeader {
         film: film.header().clone(),
@@ -125,8 +127,9 @@ fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     pieces.concat()
 }
 
-/// Watches the films of the shards of `scene` while they are written. Each film file is first
-/// damaged, then unfinished, then complete. Compares the sum with the film `one`.
+/// Watches the film files of the shards of `scene` while they are written. Each file is first
+/// damaged, then unfinished, then complete. Compares the sum of the films with `one`, the film of a
+/// render by one process.
 fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     let plan = plan(one, 3);
     let parts = parts(scene, &plan)?;

@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Returns the names of the rows: A1 to A19, B1 to B15, C1 to C4, D1 to D11, E1 to E3.
+/// Returns the names of the rows of docs/features.md: A1 to A19, B1 to B15, C1 to C4, D1 to D11, E1
+/// to E3.
 fn expected() -> BTreeSet<String> {
     let rows = |letter: char, last: u32| (1..=last).map(move |n| format!("{letter}{n}"));
     let last_rows = [('A', 19), ('B', 15), ('C', 4), ('D', 11), ('E', 3)];
@@ -17,7 +18,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("ZERKALO_ROOT"))
 }
 
-/// Returns the texts between backticks in a cell of the table.
+/// Returns the texts between backticks in a cell of a Markdown table.
 fn quoted(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }

@@ -57,8 +57,9 @@ fn ball(scene: &Scene, name: &str) -> (DVec3, f64) {
     }
 }
 
-/// Checks the pixels that show the picture on the wall, and those that show the ball. Their
-/// radiance must be the colour of the texture image times the untextured radiance.
+/// Checks the pixels of two textured objects: a picture on a wall, and a ball. The radiance of
+/// these pixels in `tested` must be the colour of the texture image, times the radiance in
+/// `original` without textures.
 fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     let mut bare = plain(original);
     bare.materials.values_mut().for_each(|m| m.texture = None);
@@ -114,8 +115,8 @@ fn b13_image_texture() {
     );
 }
 
-/// Checks that the ball is shaded with the normals of a surface raised by the image's heights, and
-/// that it keeps its silhouette.
+/// Checks that the plaster ball is shaded with the normals of a surface that is raised by the
+/// heights of an image, and that the ball keeps its silhouette.
 fn is_raised(original: &Scene, tested: &Scene) -> Verdict {
     let picture = without_chance(&plain(tested));
     let heights = image("brick-heights.png");

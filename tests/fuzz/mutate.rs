@@ -34,7 +34,7 @@ impl Random {
         Self(Numbers::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
-    /// Returns a random number below `n`, which is greater than 0.
+    /// Returns a random integer from 0 to `n` - 1; `n` must be greater than 0.
     pub fn below(&mut self, n: usize) -> usize {
         self.0.below(n)
     }
@@ -84,7 +84,7 @@ impl Random {
         }
     }
 
-    /// Replaces the first number in the text after the position `at`.
+    /// Replaces the first number after the position `at` of a text by one of [`NUMBERS`].
     fn number(&mut self, out: &mut Vec<u8>, at: usize) {
         let digit = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-');
         let Some(begin) = out[at..].iter().position(digit).map(|b| b + at) else { return };

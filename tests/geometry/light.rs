@@ -18,7 +18,8 @@ fn ground(extra: &str, light: DVec3) -> String {
     )
 }
 
-/// Returns a ray from above to a random point of the ground, and this point.
+/// Returns a ray from above to a random point of the ground, and this point. The point's
+/// coordinates x and z are between -`half` and `half`.
 fn to_ground(numbers: &mut Numbers, half: f64) -> (Line, DVec3) {
     let p = DVec3::new(numbers.between(-half, half), 0.0, numbers.between(-half, half));
     let from = DVec3::new(numbers.between(-5.0, 5.0), 2.0, numbers.between(-5.0, 5.0));

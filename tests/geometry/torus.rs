@@ -149,7 +149,8 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Checks that hits in a lane depend neither on the other lanes of the packet nor on its width.
+/// Checks that hits in a lane depend neither on the other lanes of the packet nor on the width of
+/// the packet.
 #[test]
 fn torus_hits_do_not_depend_on_other_lanes() {
     let mut numbers = Numbers::new(3);
@@ -256,8 +257,9 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Checks compounds (CSG) of a torus, a ball and a half-space. For the middle of each interval
-/// between two hits, hits and set operation agree on whether it is inside.
+/// Checks compounds (CSG) of a torus, a ball and a half-space. The middle of each interval between
+/// two hits is inside of the compound by the number of hits before it, and also by the set
+/// operations.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -309,9 +311,9 @@ fn torus_in_compounds_has_two_intervals() {
     assert!(several > 30, "{several}");
 }
 
-/// Checks a torus under three affine maps. Its bounds touch the image of the surface. Its
-/// clearance, a lower bound of the distance between a point and the surface, is not too large.
-/// Normals exist where rays hit.
+/// Checks bounds, clearance and normals of a torus under three affine maps. The bounds touch the
+/// image of the surface. The clearance, a lower bound of the distance between a point and the
+/// surface, does not exceed this distance. Normals exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

@@ -106,8 +106,8 @@ fn trees_boxes_and_lists_give_identical_hits() {
     }
 }
 
-/// Compares rays that graze the outermost points of spheres along an axis. There the rounding of
-/// the sphere test decides whether a ray hits.
+/// Compares BVH and linear list by rays that graze the outermost points of spheres along an axis.
+/// There the rounding of the sphere test decides whether a ray hits.
 #[test]
 fn tree_and_list_agree_at_limbs() {
     let mut numbers = Numbers::new(77);

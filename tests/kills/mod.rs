@@ -24,20 +24,21 @@ use zerkalo::film::read_exr;
 use zerkalo::scene::Recovery;
 use zerkalo::terminal::{ENTER, LEAVE};
 
-/// Numbers of programs that are started and ended, in the test and in its long form.
+/// Number of programs that are started and ended.
 const RUNS: usize = 100;
+/// Number of programs in the long form of the test.
 const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
-/// Period of the recoveries: of so many consecutive runs, the first four are followed by a
-/// recovery, one for each cause of the end. In a recovery the program is started again and restores
-/// the unsaved edits.
+/// Number of consecutive runs of which the first four are followed by a recovery, one for each
+/// cause of the end. In a recovery the program is started again and restores the unsaved edits.
 const RECOVERY_PERIOD: usize = 20;
-/// Smallest time from an edit's key press to SIGKILL after which the edit must not be lost.
+/// Smallest age of an edit that must survive SIGKILL. The age is the time from the edit's key press
+/// to the signal.
 const KEPT_AFTER: Duration = Duration::from_secs(2);
-/// Smallest time from an edit's key press to SIGTERM, SIGHUP or the closing of the terminal after
-/// which the edit must not be lost.
+/// Smallest age of an edit that must survive SIGTERM, SIGHUP or the closing of the terminal. The
+/// age is the time from the edit's key press to the signal or the closing.
 const READ_AFTER: Duration = Duration::from_millis(300);
 
 /// Cause of the program's end.
@@ -52,8 +53,8 @@ enum End {
 const ENDS: [End; 4] = [End::Term, End::Hup, End::Kill, End::Closed];
 
 impl End {
-    /// Returns two values: the expected exit status, or `None` for SIGKILL, and the smallest time
-    /// from the key press of an edit to the program's end after which the edit must be kept.
+    /// Returns the expected exit status, `None` for SIGKILL, and the smallest age of an edit that
+    /// must survive. The age is the time from the edit's key press to the program's end.
     fn consequences(self) -> (Option<u32>, Duration) {
         match self {
             Self::Term => (Some(143), READ_AFTER),
@@ -132,9 +133,8 @@ fn stall_allowance(start: Instant) -> Duration {
 /// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
 /// program's end, or 0 if no edit is lost.
 ///
-/// # Errors
-/// Fails if a file is damaged, if an edit that must be kept is lost, or if the terminal is not
-/// restored after SIGTERM or SIGHUP.
+/// # Errors Fails if the exit status is wrong, if a file is damaged, if an edit that must be kept
+/// is lost, or if the terminal is not restored after SIGTERM or SIGHUP.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
@@ -195,8 +195,8 @@ fn run(number: usize) -> Result<Duration, String> {
     Ok(sent.get(state).map_or(Duration::ZERO, |(at, _)| ended_at - *at))
 }
 
-/// Checks that the output leaves the alternate screen and sends no control sequences afterwards,
-/// and that the terminal has its original modes.
+/// Checks that the output `bytes` leaves the alternate screen and contains no control sequences
+/// afterwards. `restored` must be `true`: the terminal has its original modes.
 fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     let left = find(bytes, LEAVE.as_bytes()).ok_or("the terminal was not left")?;
     let after = &bytes[left + LEAVE.len()..];
@@ -213,7 +213,8 @@ fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
 }
 
 /// Checks that every file in `folder` is complete. The scene file must have its original text or a
-/// text that was saved.
+/// text that was saved. `states` has the texts of the scene before the first and after each of
+/// `keys`.
 fn check_files(folder: &Path, states: &[String], keys: &[usize]) -> Result<(), String> {
     let text = fs::read_to_string(folder.join("scene.toml")).map_err(|error| error.to_string())?;
     let saved = |(i, key): (usize, &usize)| (*key == SAVE).then(|| &states[i + 1]);
@@ -261,8 +262,9 @@ fn effective(scene: &Path) -> Result<String, String> {
     }
 }
 
-/// Starts the program again, which offers to restore the unsaved edits. Accepts the offer and saves
-/// the edits.
+/// Starts the program again. If there are unsaved edits, the program offers to restore them; this
+/// function accepts the offer and saves the edits. The scene file must then contain the text
+/// `kept`.
 fn recover(folder: &Path, kept: &str) -> Result<(), String> {
     let scene = folder.join("scene.toml");
     let is_saved = || fs::read_to_string(&scene).is_ok_and(|text| text == kept);
@@ -301,7 +303,7 @@ fn many_random_ends_damage_no_file_and_lose_no_old_edit() {
     check_runs((0..MANY_RUNS).collect());
 }
 
-/// Checks the runs with these numbers.
+/// Executes the runs with the given numbers, several at a time. Panics if a run fails.
 fn check_runs(numbers: Vec<usize>) {
     let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
     let results = Mutex::new(Vec::new());

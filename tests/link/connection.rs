@@ -6,8 +6,8 @@ use std::time::Duration;
 use zerkalo::terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo::terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
-/// Simulated connection and terminal, driven by the program's own flow control and frame
-/// difference.
+/// Simulated connection and terminal. Flow control and the computation of frame differences are the
+/// program's own.
 pub struct Connection {
     pub flow: FlowControl,
     pub diff: FrameDiff,
@@ -36,7 +36,8 @@ pub struct Connection {
     pub waited: [Duration; 2],
 }
 
-/// Sizes of a frame that was sent.
+/// Sizes of a frame that was sent. `flushed` of its bytes are for differences too small to be
+/// visible.
 #[derive(Clone, Copy, Debug)]
 pub struct Sent {
     pub bytes: usize,
@@ -130,9 +131,9 @@ impl Connection {
         }
     }
 
-    /// Simulates a key press. Before the key press the target frame is `old`. The frame `new` shows
-    /// the effect of the key. Returns the time from the key press until the first kilobyte of the
-    /// first new frame arrives.
+    /// Simulates a key press. Until the key reaches the program, the target frame is `old`. Then it
+    /// is `new`, which shows the effect of the key. Returns the time from the key press until the
+    /// first kilobyte of the first new frame arrives.
     pub fn press(&mut self, old: &TargetFrame, new: &TargetFrame) -> Duration {
         let pressed = self.now;
         self.pass(old, self.one_way);

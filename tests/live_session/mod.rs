@@ -74,7 +74,7 @@ fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
     panic!("no such snapshot in time")
 }
 
-/// Renders `scene` and waits until the render is finished.
+/// Renders `scene` and waits until the render is finished. Returns the last snapshot.
 fn finish(session: &mut Session, scene: &Scene) -> Snapshot {
     let generation = session.set_scene(Arc::new(scene.clone()));
     resting(session, generation)
@@ -291,7 +291,7 @@ fn submitted_tasks_always_run_without_waiting() {
     assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
 }
 
-/// Returns the scene of a wall. The colour and the distance of the wall identify the scene's
+/// Returns the scene of a wall. The colour of the wall and its distance from the eye identify
 /// `number`, modulo 50.
 fn wall(number: u64) -> Scene {
     let mut scene = scene();
@@ -342,7 +342,7 @@ fn snapshot_picture_features_and_generation_match() {
     assert!(seen > 20, "{seen} snapshots");
 }
 
-/// Checks that threads that wait for a command wake only for a command.
+/// Checks that the thread of a finished or paused session sleeps until a command arrives.
 #[cfg(target_os = "linux")]
 #[test]
 fn finished_or_paused_session_stays_asleep() {
@@ -357,8 +357,8 @@ fn finished_or_paused_session_stays_asleep() {
     assert_eq!((idle_switches, switches_in(&session)), (0, 0));
 }
 
-/// Returns the number of wake-ups of the session's threads during an interval. It is the minimum of
-/// several tries, because the threads need a moment to fall asleep.
+/// Returns the number of wake-ups of the session's thread in 0.2 seconds. It is the minimum of five
+/// tries, because the thread needs a moment to fall asleep.
 #[cfg(target_os = "linux")]
 fn switches_in(session: &Session) -> u64 {
     let ids = session

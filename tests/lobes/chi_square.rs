@@ -70,7 +70,8 @@ impl Chart {
         }
     }
 
-    /// Returns the microfacet normal that sends rays in the direction `d`.
+    /// Returns the normal of the microfacet that reflects or transmits the ray in the direction
+    /// `d`.
     fn half(&self, d: Vector) -> Vector {
         let h = match self.through {
             None => combine(&[(1.0, self.view), (1.0, d)]),
@@ -171,8 +172,8 @@ fn framed(axis: Vector) -> [Vector; 3] {
     [t, b, axis]
 }
 
-/// Returns the expected fraction of directions in each bin, from the density of `material`. The
-/// last value is the fraction outside of all bins.
+/// Returns the expected fraction of directions in each bin of the chart, from the density of
+/// `material`. The last value is the fraction outside of all bins.
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     let finish = Bsdf::<f64>::new(material, true);
     let (_, spread) = finish.reflection.unwrap();
@@ -221,8 +222,9 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// Returns the chart (map between directions and coordinates) for a lobe seen at an angle, and the
-/// expected fraction of directions in each bin.
+/// Returns the chart (map between directions and coordinates) for a lobe that is seen at the angle
+/// `degrees`, and the expected fraction of directions in each bin. `through` is the interface of
+/// transmitted rays; it is `None` for reflected ones.
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
@@ -232,8 +234,8 @@ fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Ch
     (chart, shares)
 }
 
-/// Returns the p-value of a chi-square test: directions sampled from the material `drawn` against
-/// the expected fractions `shares`.
+/// Returns the p-value of a chi-square test: directions sampled from the material `drawn`, counted
+/// in the bins of `chart`, against the expected fractions `shares`.
 fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
     let (view, n) = (chart.view, chart.n);
     let mut counts = vec![0u64; shares.len()];
@@ -282,8 +284,8 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// Returns the cases of transmission: every lobe with every masking, for light that enters and
-/// leaves glass and crosses a pane.
+/// Returns the cases of transmission: every lobe with every masking, for light that enters glass,
+/// leaves glass, or crosses a pane.
 fn transmitted_cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let sides = [(1.0, 1.5, false), (1.5, 1.0, false), (1.0, 1.5, true)];
@@ -355,8 +357,8 @@ fn transmitted_directions_have_the_stated_density_in_single_precision() {
     check_cases::<f32, Single>(&cases);
 }
 
-/// Checks the power of the test: in every lobe it rejects directions sampled with an alpha that is
-/// 5 % too large.
+/// Checks the power of the test: in every lobe it rejects sampled directions if the expected
+/// fractions are those of an alpha that is 5 % larger.
 #[test]
 fn chi_square_rejects_wrong_alpha() {
     for (material, degrees, through) in cases().into_iter().chain(transmitted_cases()) {

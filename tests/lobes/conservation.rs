@@ -90,7 +90,8 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
 }
 
 /// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: the weight of
-/// a sample, times its density, divided by the cosine of the angle between the normal and `l`.
+/// a sample, times its density, divided by the cosine of the angle between the surface normal and
+/// `l`.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
@@ -108,7 +109,8 @@ fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     }
 }
 
-/// Returns the largest relative difference between f(l, v) and f(v, l).
+/// Returns the largest relative difference between f(v, l) and f(l, v) over many pairs of
+/// directions.
 fn asymmetry(f: impl Fn(Vector, Vector) -> f64) -> f64 {
     let of = |(v, l): &(Vector, Vector)| {
         let (there, back) = (f(*v, *l), f(*l, *v));
@@ -176,8 +178,9 @@ fn mirror_is_reciprocal(material: &Material) {
     }
 }
 
-/// Checks the reciprocity of Lambert's law in traced paths: if light and eye are exchanged, the
-/// radiance divided by the cosine of the light's angle to the normal stays the same.
+/// Checks Lambert's law in traced paths. The radiance, divided by the cosine of the angle between
+/// the normal and the direction to the light, is 0.5, the albedo, for a light of intensity 1. It
+/// stays the same if the directions to the light and to the eye are exchanged.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     assert_eq!(
@@ -211,8 +214,8 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     }
 }
 
-/// Returns the mean weight of sampled reflections at an angle, estimated with a set of Sobol
-/// points.
+/// Returns the mean weight of sampled reflections. The angle of incidence is `degrees`, and the
+/// reflections are sampled with 65,536 Sobol points.
 fn mean_weight(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
@@ -242,7 +245,8 @@ fn closed_form_7_energy_is_as_claimed() {
     }
 }
 
-/// Returns the albedo of a highlight for light from all directions, by the midpoint rule.
+/// Returns the albedo of a highlight that is seen at the angle `degrees`, for light from all
+/// directions. It is computed by the midpoint rule.
 fn highlight_albedo(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let v = at_angle(n, degrees.to_radians(), 0.0);

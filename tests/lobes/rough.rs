@@ -40,8 +40,7 @@ fn erf(x: f64) -> f64 {
     (0..=steps).map(term).sum::<f64>() * h / 3.0 * 2.0 / PI.sqrt()
 }
 
-/// Microfacet distribution, implemented from the papers a second time, independently of the
-/// program.
+/// Microfacet distribution. It is implemented from the papers, independently of the program.
 struct Facets {
     ggx: bool,
     masking: Masking,
@@ -137,7 +136,8 @@ impl Facets {
     }
 }
 
-/// Returns the mean weights of sampled reflection and of sampled transmission.
+/// Returns the albedos of reflection and transmission at the angle of incidence `degrees`,
+/// estimated as mean weights of `count` sampled pairs of rays.
 fn sampled_albedo<L: SimdFloat>(
     (lobe, masking, alpha): (Lobe, Masking, f64),
     degrees: f64,
@@ -158,8 +158,8 @@ fn sampled_albedo<L: SimdFloat>(
     sums
 }
 
-/// Checks that sampled albedos of rough glass equal those of single scattering, computed by
-/// quadrature. The sampled ones have an error of a thousandth (16,384 Sobol points).
+/// Checks that sampled albedos of rough glass equal the albedos of single scattering, which are
+/// computed by quadrature. The sampled ones have an error of a thousandth (16,384 Sobol points).
 #[test]
 fn rough_glass_has_the_albedo_of_single_scattering() {
     let mut worst = 0f64;
@@ -285,7 +285,7 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
     assert!(compared > 20_000, "{compared}");
 }
 
-/// Checks that glass with an alpha below 0.001 is clear.
+/// Checks that glass with an alpha of 1e-8 is clear.
 #[test]
 fn smooth_glass_is_clear() {
     for (lobe, masking) in every_lobe() {
@@ -296,8 +296,8 @@ fn smooth_glass_is_clear() {
     }
 }
 
-/// Checks that the value of an interface in the direction of a sampled ray, divided by the density,
-/// is the weight of the ray.
+/// Checks that the value of an interface in the direction of a sampled ray, divided by the density
+/// in this direction, is the weight of the ray.
 fn check_evaluation<L: SimdFloat>(tolerance: f64) {
     let sides = [(1.0, 1.5, false), (1.5, 1.0, false), (1.0, 1.5, true), (1.0, 1.0, false)];
     let n = [0.0, 0.0, 1.0];

@@ -82,8 +82,8 @@ fn scrambled_sets_remain_nets() {
     nets::<Single>();
 }
 
-/// Checks that the numbers have the same bits at every vector width and with any number of pixels
-/// in a packet.
+/// Checks that the sampler's numbers have the same bits at every vector width and with any number
+/// of pixels in a packet.
 fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
     let bits = |x: f64| x.to_bits();
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
@@ -192,7 +192,8 @@ fn pixels_and_replicates_are_independent() {
     }
 }
 
-/// Integrand over the film plane and the first lobe, with its exact integral.
+/// Integrand over the film plane and the first lobe, with its exact integral. Both are functions of
+/// a parameter k, which differs between pixels.
 struct Integrand {
     value: fn([f64; 4], f64) -> f64,
     exact: fn(f64) -> f64,
@@ -213,7 +214,8 @@ const EDGE: Integrand = Integrand {
     exact: |k| 0.25 + 0.25 * k,
 };
 
-/// Returns the errors of the estimates of many pixels in one replicate (half of the samples).
+/// Returns the errors of the estimated integrals in 400 pixels, from the first `count` samples of
+/// one replicate (half of the samples).
 fn errors(kind: SamplerKind, f: &Integrand, replicate: usize, count: u32) -> Vec<f64> {
     let sampler = sampler::<Double>(kind, 4, true);
     (0..400)

@@ -97,7 +97,8 @@ impl Numbers {
 }
 
 /// Samples `count` reflections as the program does, in the SIMD type `L`. Passes each direction and
-/// weight to `take`. `incident` points towards the surface.
+/// weight to `take`. `incident` points towards the surface. If `fold` is `true`, directions below
+/// the surface are mirrored up; otherwise they are absorbed.
 pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -174,7 +175,8 @@ pub struct Crossing {
 }
 
 /// Samples `count` pairs of reflected and transmitted rays as the program does, in the SIMD type
-/// `L`. Passes each pair to `take`.
+/// `L`. Passes each pair to `take`. If `fold` is `true`, directions on the wrong side of the
+/// surface are mirrored; otherwise they are absorbed.
 pub fn each_crossing<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),

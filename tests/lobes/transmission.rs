@@ -20,9 +20,9 @@ const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmissio
 /// thickness t.
 ///
 /// The slab displaces a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and keeps its direction.
-/// Two rounding errors bound the difference. The first is that of the direction, times the length
-/// of the path through the slab. The path is up to 430 long, at 89.9 degrees. The second is that of
-/// the two ray offsets, each 8 roundings of the slab's half width.
+/// The sum of two rounding errors bounds the error. The first is that of the direction, times the
+/// length of the path through the slab. The path is up to 430 long, at 89.9 degrees. The second is
+/// that of the two ray offsets, each 8 roundings of the slab's half width.
 fn check_slab<L: SimdFloat>() -> f64 {
     /// Half width of the slab. It is large enough for a ray at 89.9 degrees if the index is 1.
     const HALF_WIDTH: f64 = 450.0;
@@ -135,7 +135,7 @@ fn closed_form_11_a_slab_with_all_orders() {
 }
 
 /// Returns the radiance of a white background, seen at an angle through an absorbing slab of
-/// thickness 0.8.
+/// thickness 0.8. `keys` are further keys of the slab's material.
 fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let all = samples::<L>(
@@ -225,7 +225,8 @@ fn closed_form_an_absorbing_slab_with_all_orders() {
     }
 }
 
-/// Returns a scene with objects between camera and background. `inner` are keys of their material.
+/// Returns a scene with the text `objects` between camera and background. `inner` are the keys of
+/// the material `m` of these objects.
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
     scene(&format!(
         "film = {{ size = [24, 24] }}
@@ -246,7 +247,7 @@ const BALL: &str =
 const TILES: &str = "[[object]]\nmaterial = \"tile\"\n\
     shape.box = { center = [0.3, 0.2, -2.0], size = [1.0, 0.7, 0.5] }\n";
 
-/// Checks that a lossless ball is invisible in a white furnace, with any objects nested in it.
+/// Checks that a lossless ball is invisible in a white furnace, also with a bubble of air in it.
 #[test]
 fn glass_is_invisible_in_white_furnace() {
     let nested = "[[object]]\nmaterial = \"air\"\n\

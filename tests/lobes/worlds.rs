@@ -42,8 +42,8 @@ fn closed_form_7_a_white_furnace_is_exact() {
     furnace::<f64>();
 }
 
-/// Checks that at roughness 0 every lobe equals the mirror in every bit, and that the square
-/// converges to it near 0.
+/// Checks that at roughness 0 every lobe equals the mirror in every bit. Also checks that the
+/// square lobe is close to the mirror at a roughness of 1e-9.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
     let mut scene = scene(
@@ -128,9 +128,9 @@ fn extreme_26_parallel_mirrors() {
     report(26, "single", &format!("{:.0e} off (relative)", worst[1]));
 }
 
-/// Smallest denominator of relative differences: a hundredth of the radiance of a lit wall of the
-/// physical room. Darker samples are compared by absolute differences, because in grazing light N.L
-/// is tiny, and the rounding of a direction is a large fraction of it.
+/// Smallest denominator of relative differences: a hundredth of the radiance of a lit wall in the
+/// scene mirror-room-physical. Darker samples are compared by absolute differences, because in
+/// grazing light N.L is tiny, and the rounding of a direction is a large fraction of it.
 const DIM: f64 = 1e-4;
 
 /// Compares samples traced alone with samples in packets. Returns the fraction of samples that

@@ -90,7 +90,7 @@ fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
 }
 
 /// Requests checkpoints, named `room-FIRST.zk` and so on, until one has as many samples as `whole`.
-/// Checks that its film equals `whole`.
+/// Checks that the film of this checkpoint equals `whole`.
 fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: usize) {
     for number in first.. {
         terminal.send("K");

@@ -19,8 +19,8 @@ fn built_in_scene_opens_and_quits() {
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0);
-    assert!(bytes.starts_with(ENTER.as_str()), "{:?}", &bytes[..100]);
-    assert!(bytes.ends_with(LEAVE.as_str()), "{:?}", &bytes[bytes.len() - 100..]);
+    assert!(bytes.starts_with(ENTER), "{:?}", &bytes[..100]);
+    assert!(bytes.ends_with(LEAVE), "{:?}", &bytes[bytes.len() - 100..]);
     assert_eq!(fs::read_dir(fixture.path(".")).unwrap().count(), 0, "nothing was written");
 }
 
@@ -33,7 +33,7 @@ fn signals_restore_the_terminal() {
         signal(name, terminal.process_id());
         let (status, bytes) = terminal.end();
         assert_eq!(status, expected, "{name}");
-        assert!(bytes.ends_with(LEAVE.as_str()), "{name}");
+        assert!(bytes.ends_with(LEAVE), "{name}");
     }
 }
 
@@ -67,11 +67,10 @@ fn panic_message_follows_restored_terminal() {
     };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let [entered, left, message, after] =
-        [ENTER.as_str(), LEAVE.as_str(), "as the test wants it", "still alive"]
-            .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
+    let [entered, left, message, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
+        .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
     assert!(entered < left && left < message && message < after, "{bytes:?}");
-    assert_eq!(bytes.matches(LEAVE.as_str()).count(), 1);
+    assert_eq!(bytes.matches(LEAVE).count(), 1);
 }
 
 #[test]
@@ -107,7 +106,7 @@ fn missing_file_is_reported_without_dashboard() {
     let fixture = Fixture::new();
     let (status, bytes) = fixture.open(&["nowhere.toml"], [80, 24]).end();
     assert_eq!(status, 1);
-    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER.as_str()), "{bytes:?}");
+    assert!(bytes.contains("nowhere.toml") && !bytes.contains(ENTER), "{bytes:?}");
 }
 
 #[test]
@@ -154,7 +153,8 @@ fn pasted_text_is_not_keys() {
 /// Environment variables of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
-/// Opens the dashboard over SSH, in a terminal that replies to requests or does not.
+/// Opens the dashboard with the environment variables of an SSH connection. The terminal replies to
+/// requests if `replies` is `true`.
 fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
     let (folder, size) = (fixture.0.path(), [120, 36]);
     let terminal = Terminal::start(&Start { command: &[PROGRAM], folder, size, env: SSH, replies });
@@ -201,7 +201,7 @@ fn signal_ends_the_capability_query() {
         signal("TERM", terminal.process_id());
         let (status, bytes) = terminal.end();
         assert_eq!(status, 143);
-        assert!(bytes.ends_with(LEAVE.as_str()));
+        assert!(bytes.ends_with(LEAVE));
         !bytes.contains("room.toml")
     });
     assert!(is_prompt, "the query goes on after the signal");

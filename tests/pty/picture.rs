@@ -24,8 +24,8 @@ impl Picture {
         Self { size: [info.width as usize, info.height as usize], rgb }
     }
 
-    /// Divides the picture into equal boxes, as many as `cells` says. Returns the mean colour of
-    /// the box in column and row `index`, averaged in linear light, as 8-bit sRGB.
+    /// Divides the picture into boxes of equal size, in `cells` columns and rows. Returns the mean
+    /// colour of the box in column and row `index`, averaged in linear light, as 8-bit sRGB.
     fn averaged(&self, cells: [usize; 2], index: [usize; 2]) -> [u8; 3] {
         let edge = |i: usize, n: usize| (n * self.size[i]) as f64 / cells[i] as f64;
         let overlap = |i: usize, pixel: usize| {
@@ -58,7 +58,8 @@ fn encoded(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Returns the colours of the upper and the lower half of a cell.
+/// Returns the colours of the upper and the lower half of a cell. Returns `None` if the cell shows
+/// no picture.
 fn halves(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     let rgb = |color| match color {
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
@@ -73,6 +74,7 @@ fn halves(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
 }
 
 /// Returns the mean OKLab distance between the cells that show the picture and a picture file.
+/// Returns `None` if one of these cells shows no picture.
 fn distance(screen: &vt100::Screen, layout: &Layout, picture: &Picture) -> Option<f64> {
     let [columns, rows] = layout.raster;
     let mut sum = 0.0;

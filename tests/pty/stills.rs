@@ -19,8 +19,8 @@ const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
 /// Bytes that remove an image from the screen in kitty's graphics protocol.
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
-/// Starts the dashboard in a terminal with `replies` and exports a picture. Returns the terminal
-/// and the picture.
+/// Starts the dashboard and exports a picture. `replies` are additional replies of the terminal to
+/// requests. Returns the terminal and the picture.
 fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
     let command = [&[PROGRAM, "room.toml"], args].concat();
     let start =
@@ -36,7 +36,7 @@ fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (
     (terminal, file)
 }
 
-/// Waits until the output of the program contains `text`. Returns the output from there on.
+/// Waits until the output of the program contains `text`. Returns the output from `text` on.
 fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     let mut all = String::new();
     terminal.wait_for(text, |_| {
@@ -96,7 +96,7 @@ fn kitty_protocol_shows_the_exported_file() {
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!((status, bytes.matches(REMOVAL).count()), (0, 1), "nothing is left to remove");
-    assert!(bytes.ends_with(LEAVE.as_str()));
+    assert!(bytes.ends_with(LEAVE));
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn signal_removes_the_image() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     assert!(
-        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}", LEAVE = *LEAVE)),
+        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}")),
         "{:?}",
         &bytes[bytes.len() - 200..]
     );
@@ -176,7 +176,7 @@ fn sixel_shows_the_exported_file_in_strips() {
         let (strips, after) = bytes.rsplit_once("\x1bP").unwrap();
         assert!(strips.contains("\x1bP") || is_interrupted);
         let (_, after) = after.split_once("\x1b\\").unwrap();
-        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE.as_str()));
+        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE));
         assert_eq!(status, 0);
     }
 }

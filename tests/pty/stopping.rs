@@ -18,7 +18,7 @@ fn shell(fixture: &Fixture) -> Terminal {
 /// `ENTER`.
 fn is_left(terminal: &Terminal) -> bool {
     let bytes = String::from_utf8_lossy(&terminal.bytes()).into_owned();
-    bytes.rfind(LEAVE.as_str()) > bytes.rfind(ENTER.as_str())
+    bytes.rfind(LEAVE) > bytes.rfind(ENTER)
 }
 
 fn suspend_and_resume(stop: impl Fn(&mut Terminal)) {
@@ -123,7 +123,7 @@ fn unsaved_edits_are_recovered_by_the_next_start() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     let message = "unsaved edits are kept in ";
-    assert!(bytes.find(message) > bytes.rfind(LEAVE.as_str()), "{bytes:?}");
+    assert!(bytes.find(message) > bytes.rfind(LEAVE), "{bytes:?}");
     assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), BUILT_IN);
 
     let mut terminal = fixture.open(&["room.toml"], [120, 36]);
@@ -182,7 +182,7 @@ fn doctor_reports_after_restoring_the_terminal() {
     let start = Start { command: &command, folder, size, env: &env, replies: true };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let report = &bytes[bytes.find(LEAVE.as_str()).expect("the terminal is left") + LEAVE.len()..];
+    let report = &bytes[bytes.find(LEAVE).expect("the terminal is left") + LEAVE.len()..];
     assert!(!report.contains('\x1b'), "{report:?}");
     for part in [
         "TERM=xterm-256color",

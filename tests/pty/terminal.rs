@@ -245,8 +245,8 @@ impl Terminal {
     }
 }
 
-/// Returns the terminal's replies to requests in `unread` and `bytes`. An incomplete request at the
-/// end is kept in `unread`.
+/// Returns the replies that `table` lists for the requests in `unread` and `bytes`. An incomplete
+/// request at the end of `bytes` is kept in `unread`.
 fn replies_to(table: &[RequestReply], unread: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
     unread.extend_from_slice(bytes);
     let mut replies = Vec::new();

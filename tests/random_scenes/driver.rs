@@ -106,7 +106,8 @@ fn write_scenes() {
     println!("{}", folder.display());
 }
 
-/// Creates the folder for scenes, with copies of the files to which scenes refer.
+/// Creates the folder for scenes, with copies of the files to which scenes refer. Returns the path
+/// of the folder.
 fn folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("random_scenes");
     let root = Path::new(env!("ZERKALO_ROOT"));
@@ -121,7 +122,8 @@ fn folder() -> PathBuf {
     folder
 }
 
-/// Writes a failing scene and its reduced form to files. Returns the path of the reduced form.
+/// Writes the failing scene `text` and its reduced form `small` to files. The descriptions of their
+/// failures, `what` and `last`, are comments in the files. Returns the path of the reduced form.
 fn keep(name: &str, seed: u64, what: &str, text: &str, last: &str, small: &str) -> PathBuf {
     let folder = folder();
     let comment = |what: &str| what.lines().map(|line| format!("# {line}\n")).collect::<String>();

@@ -17,7 +17,7 @@ const GAP: f64 = 1e-5;
 /// bounding box. Scenes with wider gaps are skipped.
 const MAX_GAP: f64 = 1e-2;
 const SAMPLES: u32 = 4;
-/// Allowed effect of the gap on the mean of a block of pixels, in 8-bit levels.
+/// Allowed change of the mean of a block of pixels by gaps, in 8-bit levels.
 const FLOOR: f64 = 1.0;
 
 /// Turns off the lights that are on surfaces of objects. Such a light shines on both sides of its
@@ -43,9 +43,9 @@ fn without_lights_on_surfaces(scene: &mut Scene) {
 enum Change {
     /// All objects shrink, by different fractions.
     AllShrink,
-    /// Transparent objects shrink. Opaque objects shrink by a smaller fraction.
+    /// Transparent objects shrink. Opaque objects shrink by a smaller fraction than these.
     OpaqueShrink,
-    /// Transparent objects shrink. Opaque objects grow by a smaller fraction.
+    /// Transparent objects shrink. Opaque objects grow, by a smaller fraction than these shrink.
     OpaqueGrow,
 }
 
@@ -58,8 +58,8 @@ fn is_transparent(scene: &Scene, object: &Object) -> bool {
     object.shape.part_materials(&object.material).iter().any(transmits)
 }
 
-/// Returns the lengths of an object's bounding box. Returns `None` for flat and unbounded objects,
-/// which keep their size.
+/// Returns the lengths of the sides of an object's bounding box. Returns `None` for flat and
+/// unbounded objects, which keep their size.
 fn lengths(object: &Object) -> Option<DVec3> {
     let (low, high) = object.form().bounds()?;
     let size = high - low;

@@ -196,7 +196,7 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
 }
 
 /// Returns a random compound in a box of the size `size` that stands on the point `base`. Faces of
-/// its parts often coincide.
+/// its parts often coincide. Compounds are nested at most `levels` deep.
 pub fn combined(
     numbers: &mut Numbers,
     base: DVec3,
@@ -295,7 +295,8 @@ pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) ->
     object_of(numbers, stock, kind, base, size)
 }
 
-/// Returns a random object of the kind that the key `key` names.
+/// Returns a random object of the kind that `key` names, such as `sphere`. The object stands on the
+/// point `base` and is about as large as `size`.
 pub fn named(numbers: &mut Numbers, stock: &Stock, key: &str, base: DVec3, size: DVec3) -> Object {
     let kind = KINDS.iter().find(|kind| kind.name == key).expect("a registered kind");
     object_of(numbers, stock, kind, base, size)

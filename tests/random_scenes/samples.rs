@@ -17,38 +17,41 @@ use zerkalo::world::Precision;
 
 /// Number of seeds of the first comparison.
 const SEEDS: u64 = 8;
-/// Samples per pixel of the uniform pictures, over both replicates (halves of the samples).
+/// Samples per pixel of the uniform pictures, in both replicates (halves of the samples) together.
 const SAMPLES: u32 = 32;
 /// Number of pictures whose mean is the reference.
 const REFERENCE_PICTURES: u64 = 8;
 /// Samples per pixel of each picture of the reference in the first comparison.
 const REFERENCE: u32 = 128;
-/// Factor from the first to the second comparison, for the number of seeds and for the sample count
-/// of the reference. A scene that differs in the first comparison is compared a second time with
-/// other seeds, and only this result counts. The first is unreliable, because the standard error of
-/// eight numbers with a skewed distribution is often far too small: if one of 20 pictures contains
-/// a rare bright sample, eight pictures without it agree.
+/// Ratio of the second comparison to the first, in the number of seeds and in the sample count of
+/// the reference. A scene that differs in the first comparison is compared a second time with other
+/// seeds, and only this result counts. The first is unreliable, because the standard error of eight
+/// numbers with a skewed distribution is often far too small: if one of 20 pictures contains a rare
+/// bright sample, eight pictures without it agree.
 const REPETITION: u32 = 8;
 /// Allowed range of the true error, divided by the reported one.
 const HONEST: [f64; 2] = [0.9, 1.15];
-/// Largest squared error of the reference, relative to that of the uniform pictures. The expected
-/// value is 1/32, because a uniform picture of the first comparison has a 32nd of the reference's
-/// samples. The constant also limits the relative change of the uniform pictures' squared error if
-/// half of the reference is left out.
+/// Largest allowed squared error of the reference, relative to that of the uniform pictures. The
+/// expected value is 1/32, because a uniform picture of the first comparison has a 32nd of the
+/// reference's samples. The constant also limits the relative change of the uniform pictures'
+/// squared error if half of the reference is left out.
 const MAX_REFERENCE_ERROR: f64 = 0.125;
-/// Largest number of rays of an adaptive picture, divided by that of a uniform one with the same
-/// true error.
+/// Largest allowed number of rays of an adaptive picture, divided by that of a uniform one with the
+/// same true error.
 const MAX_RAY_RATIO: f64 = 1.5;
 /// Number of rays after which a picture that has not reached its noise target is stopped, divided
 /// by the mean number of rays of the uniform pictures.
 const STOP_FACTOR: u64 = 4;
-/// Largest allowed deviation of a measurement from its limit, in standard deviations of a normal
-/// distribution.
+/// Largest amount by which a measurement may exceed its limit in the second comparison, in standard
+/// errors. For ratios of errors, a value of Student's t is first converted to the equally probable
+/// value of a normal distribution.
 const MAX_DEVIATION: f64 = 5.0;
-/// Smallest deviation, in standard deviations, at which a scene is compared a second time.
+/// Smallest amount by which a measurement must exceed its limit in the first comparison, in
+/// standard errors, for a second comparison to follow.
 const SUSPICIOUS: f64 = 1.0;
 
-/// Picture of one seed, with its reported error.
+/// Picture of one seed, with the error that the program reports for it. `ended` is `false` if the
+/// render was stopped at a limit on its rays.
 struct Shot {
     picture: Vec<[f64; 3]>,
     /// Number of samples of each pixel.
@@ -109,7 +112,7 @@ struct Reference {
     error: f64,
 }
 
-/// Returns the displayed mean of `pictures`.
+/// Returns the mean of `pictures` as displayed, in 8-bit levels.
 fn mean_codes(pictures: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
     let mean = |i: usize| {
         [0, 1, 2].map(|c| pictures.iter().map(|p| p[i][c]).sum::<f64>() / pictures.len() as f64)
@@ -117,7 +120,8 @@ fn mean_codes(pictures: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
     (0..pictures[0].len()).map(|i| Display::default().codes(mean(i))).collect()
 }
 
-/// Returns the mean squared difference between a picture and the displayed values `wanted`.
+/// Returns the mean squared difference between a picture as displayed and the values `wanted`, in
+/// squared 8-bit levels.
 fn square(picture: &[[f64; 3]], wanted: &[[f64; 3]]) -> f64 {
     let display = Display::default();
     let squares = picture.iter().zip(wanted).flat_map(|(p, wanted)| {
@@ -128,7 +132,7 @@ fn square(picture: &[[f64; 3]], wanted: &[[f64; 3]]) -> f64 {
 }
 
 impl Reference {
-    /// Renders a reference of `samples` samples per pixel and picture.
+    /// Renders a reference: several pictures with `samples` samples per pixel each.
     fn new(scene: &Scene, first_seed: u64, samples: u32) -> Self {
         let render = |seed| {
             let rendering = rendered(scene, seed, Precision::Auto, samples / 2);
@@ -150,15 +154,16 @@ impl Reference {
         Self { pictures, samples, codes, half_codes, error }
     }
 
-    /// Returns the mean squared error of a picture against this reference, in squared 8-bit levels.
+    /// Returns the mean squared difference between a picture and this reference, minus the error of
+    /// the reference, in squared 8-bit levels.
     fn error_of(&self, picture: &[[f64; 3]]) -> f64 {
         square(picture, &self.codes) - self.error
     }
 
     /// Returns `true` if the reference is good enough to measure the error of the pictures `shots`.
-    /// Its own error must be small, and the measured error must not change much when half of the
-    /// reference is left out. The second condition finds bright samples that are rare even in the
-    /// reference; they make its own error look too small.
+    /// The error of the reference must be small, and the measured error must not change much when
+    /// half of the reference is left out. The second condition finds bright samples that are rare
+    /// even in the reference; they make the error of the reference look too small.
     fn is_sufficient(&self, shots: &[Shot]) -> bool {
         let mean =
             |of: &dyn Fn(&Shot) -> f64| mean_and_error(&shots.iter().map(of).collect::<Vec<_>>()).0;
@@ -170,10 +175,10 @@ impl Reference {
             && self.half_codes.iter().all(|half| (from_half(half) - truth).abs() <= allowed)
     }
 
-    /// Returns the largest difference of block means between pictures and reference, if it is
-    /// significant. The variance of a single sample is estimated from the pictures and from the
-    /// reference. The larger estimate is used, because pictures without a rare bright sample
-    /// underestimate it.
+    /// Returns a text with the largest difference of block means between pictures and reference, if
+    /// it is significant. The variance of a single sample is estimated from the pictures and from
+    /// the reference. The larger estimate is used, because pictures without a rare bright sample
+    /// underestimate the variance.
     fn differs(&self, name: &str, shots: &[Shot], size: [u32; 2]) -> Option<String> {
         let blocks = blocks(size);
         let seeds = shots.len().min(self.pictures.len());
@@ -235,12 +240,13 @@ impl Errors {
         [&self.truths, &self.reports].map(|values| mean_and_error(values).0)
     }
 
-    /// Returns the true squared error minus `factor` times the reported one, and the uncertainty of
-    /// this difference.
+    /// Returns the mean true squared error minus `factor` times the mean reported one, and the
+    /// uncertainty of this difference.
     ///
-    /// The uncertainty is the larger one of two estimates. The first is the standard error over the
-    /// pictures. It is too small if a few pixels contribute most of the reported error: one such
-    /// pixel more or less would change the sum much.
+    /// The uncertainty is the larger one of two estimates, combined with the uncertainty of the
+    /// reference. The first is the standard error over the pictures. It is too small if a few
+    /// pixels contribute most of the reported error: one such pixel more or less would change the
+    /// sum much.
     ///
     /// The second estimate therefore counts pixels. The sum R of the reported squared errors
     /// consists of independent contributions r of pixels. Its variance is at most the expectation
@@ -260,8 +266,8 @@ impl Errors {
         (mean, spread.max(of_pixels).hypot(0.5 * self.reference) + 1e-6)
     }
 
-    /// Returns the true squared error divided by the reported one, and the relative uncertainty of
-    /// this ratio.
+    /// Returns the mean true squared error divided by the mean reported one, and the relative
+    /// uncertainty of this ratio.
     fn ratio(&self) -> (f64, f64) {
         let [truth, reported] = self.means();
         let ratio = truth.max(0.0) / reported;

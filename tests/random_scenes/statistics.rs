@@ -54,7 +54,7 @@ impl Worst {
     }
 
     /// Records a difference with its standard error. `floor` is the difference that rounding may
-    /// cause.
+    /// cause. `what` returns a description of the difference.
     pub fn note(&mut self, difference: f64, floor: f64, error: f64, what: impl FnOnce() -> String) {
         let excess = (difference.abs() - floor).max(0.0);
         let t = if excess == 0.0 { 0.0 } else { excess / error };
@@ -64,7 +64,8 @@ impl Worst {
         }
     }
 
-    /// Returns the largest deviation if it is significant among all comparisons (Bonferroni).
+    /// Returns a text about the largest deviation if it is significant among all comparisons
+    /// (Bonferroni).
     pub fn beyond_chance(self) -> Option<String> {
         let allowed = two_sided_z(LEVEL / self.count);
         let wrong = self.z.is_nan() || self.z > allowed;

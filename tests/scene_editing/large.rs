@@ -24,8 +24,8 @@ fn cpu_seconds() -> f64 {
     times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
 }
 
-/// Returns the seconds of processor time that it takes to update the text of a document after
-/// `edit`.
+/// Returns the processor time, in seconds, of updating the text of a document after `edit` has
+/// changed its scene.
 fn seconds(document: &Document, edit: fn(&mut Scene)) -> f64 {
     let count = document.scene().objects.len();
     let times = (0..3).map(|_| {
@@ -49,8 +49,9 @@ fn move_object(object: &mut Object) {
 /// Name of an edit, and the function that applies it.
 type NamedEdit = (&'static str, fn(&mut Scene));
 
-/// Checks that the time grows at most by the factor `limit` if the number of objects doubles. The
-/// time for `fewest` objects is compared with that for four times as many, after two doublings.
+/// Checks that the time of updating the text after an edit grows at most by the factor `limit` if
+/// the number of objects doubles. The time for `fewest` objects is compared with that for four
+/// times as many, after two doublings.
 fn check_growth(fewest: usize, limit: f64) {
     let edits: [NamedEdit; 3] = [
         ("one moved", |scene| {
@@ -72,9 +73,9 @@ fn check_growth(fewest: usize, limit: f64) {
     }
 }
 
-/// Checks the growth of the time from 2,000 to 8,000 objects. The limit for a doubling is halfway
-/// between linear (2) and quadratic (4), on a logarithmic scale. The growth is not exactly linear,
-/// because only small scenes fit into the caches.
+/// Checks the growth of the time of an edit from 2,000 to 8,000 objects. The limit for a doubling
+/// is halfway between linear (2) and quadratic (4), on a logarithmic scale. The growth is not
+/// exactly linear, because only small scenes fit into the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {

@@ -78,7 +78,7 @@ fn perform(
     }
 }
 
-/// Two numbers for each operation: performed calls, and refused ones.
+/// Numbers of calls of each operation: those that gave an edit, and refused ones.
 type Tally = BTreeMap<&'static str, [u32; 2]>;
 
 fn check_sequence(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {

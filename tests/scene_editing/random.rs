@@ -275,7 +275,8 @@ pub fn scene() -> impl Strategy<Value = Scene> {
     )
 }
 
-/// Applies the edit with the number `what` to a scene.
+/// Applies the edit with the number `what` to `scene`. The edit may copy parts of the scene
+/// `other`. `at` selects the objects.
 pub fn edit(scene: &mut Scene, other: &Scene, (what, at): (u8, usize)) {
     let n = scene.objects.len();
     let some = |n: usize| if n == 0 { 0 } else { at % n };

@@ -24,11 +24,11 @@ fn radius(desk: &Desk) -> f64 {
     }
 }
 
-/// Opens the inspector of the ball, with the cursor on the radius.
+/// Opens the inspector of a ball, with the cursor on the radius of the ball.
 fn at_radius() -> Desk {
     let desk = desk(BALL, "Enter Down Down Down Down Down Down");
     let lines = desk.model.field_lines();
-    assert_eq!(lines[desk.model.inspector.cursor].field().unwrap().label, "radius");
+    assert_eq!(lines[desk.model.inspector.cursor].entry().unwrap().label, "radius");
     desk
 }
 

@@ -4,7 +4,7 @@ use crate::stories::simulated_dashboard::{Desk, ROOM};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::panel_lines::{OutlineLine, outline};
+use zerkalo::dashboard::panel_lines::outline;
 use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
 use zerkalo::terminal::event::{Button, Mouse, MouseKind};
@@ -128,8 +128,8 @@ fn click_selects_lines_of_outline_and_inspector() {
             break;
         }
         desk.click(rows.x + 2, rows.y + i as u16);
-        if let OutlineLine::Entry { subject, .. } = line {
-            assert_eq!(desk.model.selection, subject);
+        if let Some(entry) = line.entry() {
+            assert_eq!(desk.model.selection, entry.subject);
         }
     }
     desk.select(Target::Object(1));

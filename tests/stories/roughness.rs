@@ -17,15 +17,15 @@ fn picture(scene: &Scene) -> RenderState {
     rendered(&sized(scene.clone(), SIZE), 0, Precision::Auto, SAMPLES)
 }
 
-/// Returns one value for each pixel: `true` if it differs in any bit.
+/// Returns one value for each pixel: `true` if the pixel differs in any bit between `a` and `b`.
 fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     let [width, height] = SIZE.map(|n| n as usize);
     let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.mix);
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
-/// Renders the scene with another colour and a higher ambient coefficient of the materials that
-/// `of` selects. The pixels whose paths hit these materials change.
+/// Renders the scene with another colour and a higher ambient coefficient of the materials for
+/// whose names `of` returns `true`. The pixels whose paths hit these materials change.
 fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {

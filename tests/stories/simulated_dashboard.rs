@@ -283,7 +283,7 @@ impl Desk {
         self.model.notice.as_ref().map_or("", |notice| &notice.text)
     }
 
-    /// Text editor that receives the keys.
+    /// Returns the text editor that receives the keys; `None` if no text is edited.
     pub fn editor(&self) -> Option<&Editor> {
         match &self.model.overlay {
             Some(Overlay::CommandPalette(palette)) => Some(&palette.editor),

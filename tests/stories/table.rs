@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use zerkalo::dashboard::update::commands::{COMMANDS, Chapter, lookup};
+use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::terminal::event::Key;
 
 #[test]
@@ -55,9 +55,10 @@ fn keys_manual() -> String {
         .to_string();
     // A vertical bar would end a cell of the Markdown table.
     let quoted = |key: &str| format!("`{}`", key.replace('|', "\\|"));
-    for (chapter, title) in Chapter::ALL {
+    for commands in COMMANDS.chunk_by(|a, b| a.chapter == b.chapter) {
+        let title = commands[0].chapter;
         page += &format!("\n## {title}\n\n| keys | action |\n|---|---|\n");
-        for command in chapter.commands() {
+        for command in commands {
             page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
         }
     }

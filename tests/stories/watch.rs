@@ -43,7 +43,8 @@ fn watching(rows: usize) -> Desk {
     desk
 }
 
-/// Returns `true` if the effect shows, exports or quits; all others would edit or render.
+/// Returns `true` if the effect shows, exports or quits, and `false` for effects that edit the
+/// scene or start a render.
 fn only_shows(effect: &Effect) -> bool {
     matches!(
         effect,

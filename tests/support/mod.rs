@@ -170,7 +170,8 @@ pub fn without_chance(scene: &mut Scene) {
     }
 }
 
-/// Renders by a schedule until it stops, with a clock that always shows 0.
+/// Renders by a schedule until it stops, with a clock that always shows 0. Returns the criterion
+/// that stopped the render.
 pub fn follow(rendering: &mut RenderState, settings: Settings, pool: &ThreadPool) -> StoppedBy {
     let mut schedule = rendering.schedule(settings);
     loop {

@@ -166,8 +166,8 @@ impl Case {
     }
 }
 
-/// Returns the fraction of the covered pixels whose values in two pictures differ by more than
-/// `tolerance`.
+/// Returns the fraction of pixels whose values in two pictures differ by more than `tolerance`.
+/// Pixels that are black in both pictures, or NaN in `expected`, do not count.
 pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     assert_eq!(shown.len(), expected.len());
     let pairs = shown.iter().zip(expected).filter(|(_, e)| !e.is_nan());
@@ -177,8 +177,9 @@ pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     wrong.count() as f64 / seen.len() as f64
 }
 
-/// Returns two fractions of pixels that differ from the direct evaluation: in double and in single
-/// precision. In single precision an edge may be on the other side of a pixel's centre.
+/// Returns the fractions of pixels in which the program's pictures `shown` differ from the direct
+/// evaluation: in double precision and in single precision. In single precision an edge may be on
+/// the other side of a pixel's centre.
 pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2] {
     let expected = case.expected(desk);
     [differing(&shown[0], &expected, 2e-5), differing(&shown[1], &expected, 4e-3)]
@@ -186,8 +187,8 @@ pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2
 
 pub const ALLOWED: [f64; 2] = [0.001, 0.01];
 
-/// Smallest fraction of pixels in which the picture of a variant must differ. It is at least eight
-/// times the fraction that may differ for the object itself.
+/// Smallest fraction of pixels in which the picture of a variant must differ from the direct
+/// evaluation. It is at least eight times [`ALLOWED`], the fractions for the object itself.
 pub const TOLD: f64 = 0.08;
 
 pub fn check(case: &Case, desk: &Desk) {
@@ -260,8 +261,8 @@ pub fn lay(mapping: &'static str, scale: [f64; 2], offset: [f64; 2]) -> Lay {
     Lay { scale, offset, ..Lay::new(mapping) }
 }
 
-/// Returns the object with a rotation, a scaling and a translation, both as transform steps and as
-/// a map.
+/// Returns the object with a rotation, a scaling and a translation, both as transform steps in the
+/// scene file and as an affine map.
 pub fn moved(mut case: Case) -> Case {
     case.transform = "{ rotate_y = 35 }, { scale = [1.2, 0.8, 1.0] }, { rotate_x = 20 }, \
                       { translate = [0.05, -0.1, 0.1] }, ";

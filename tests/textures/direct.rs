@@ -197,7 +197,8 @@ fn coordinates(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec2 {
     mapped(&object.solid, lay, p, n) * DVec2::from(lay.scale) + DVec2::from(lay.offset)
 }
 
-/// Returns the pixel in column `i` and row `j`, counted from below. Both may be out of range.
+/// Returns the pixel in column `i` and row `j`, counted from below. Both may be outside of the
+/// image.
 fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     let (w, h) = (f64::from(image.width()), f64::from(image.height()));
     let wrap = |i: f64, n: f64| if clamp { i.clamp(0.0, n - 1.0) } else { i - n * (i / n).floor() };

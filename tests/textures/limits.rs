@@ -17,8 +17,8 @@ fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
 }
 
-/// Checks that a bump map of height 0 or of a uniform image changes no bit of the picture, and that
-/// one higher pixel does.
+/// Checks that a bump map of height 0 changes no bit of the picture, and that the same map with its
+/// own height does.
 #[test]
 fn bump_without_height_changes_no_bit() {
     let bumpy = sized(shipped("bump.toml"), [64, 48]);
@@ -39,8 +39,8 @@ fn bump_without_height_changes_no_bit() {
     }
 }
 
-/// Checks that on a linear ramp of heights all normals tilt by the angle of its slope. Light along
-/// the tilted normal has the full effect, and light across it none.
+/// Checks that a linear ramp of heights tilts all normals by the angle of its slope. Light from
+/// behind the surface has no effect, even if it is in front of the tilted normals.
 #[test]
 fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();

@@ -61,7 +61,8 @@ fn bumps_on_transformed_and_textured_objects() {
     }
 }
 
-/// Checks textures at the seam of the angle and at the poles.
+/// Checks textures at the seam of the angular coordinate and at the poles, for spherical and
+/// cylindrical mappings.
 #[test]
 fn seams_and_poles() {
     let desk = Desk::new();
@@ -77,8 +78,8 @@ fn seams_and_poles() {
     }
 }
 
-/// Checks that pictures of objects far from the origin equal those at the origin, although
-/// coordinates there are rounded by about 1e-10.
+/// Checks that pictures of objects far from the origin equal the direct evaluation at the origin,
+/// although far coordinates are rounded to about 1e-10.
 #[test]
 fn textures_are_accurate_far_from_the_origin() {
     let desk = Desk::new();

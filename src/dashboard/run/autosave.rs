@@ -1,6 +1,7 @@
 //! Autosave of unsaved edits to a recovery file, delayed until a pause in editing.
 
 use crate::dashboard::message::{Message, OrphanedEdits};
+use crate::dashboard::model::first_line;
 use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
 use crate::value::sanitized;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ const MAX_DELAY: Duration = Duration::from_secs(1);
 /// also looks for recovery files with unsaved edits of crashed runs (orphaned edits).
 pub struct Autosave {
     /// Recovery file of this run of the program.
-    recovery: Recovery,
+    pub recovery: Recovery,
     /// State folder of the user (XDG), for recovery files that cannot be written beside the scene
     /// file.
     state: Option<PathBuf>,
@@ -131,7 +132,7 @@ impl Autosave {
     /// # Errors
     /// Fails with a message for the user if the last edits could not be written.
     pub fn kept(&self) -> Result<Option<PathBuf>, String> {
-        match (&self.failed, self.path()) {
+        match (&self.failed, self.recovery.path()) {
             (None, path) => Ok(path.map(Path::to_path_buf)),
             (Some(why), None) => {
                 Err(format!("unsaved edits are lost: they cannot be kept ({why})"))
@@ -141,16 +142,6 @@ impl Autosave {
                 path.display()
             )),
         }
-    }
-
-    /// Returns a second writer of recovery files for the same scene. It uses only the state folder.
-    pub fn elsewhere(&self) -> Recovery {
-        self.recovery.elsewhere()
-    }
-
-    /// Returns the path of the recovery file, if it exists.
-    pub fn path(&self) -> Option<&Path> {
-        self.recovery.path()
     }
 
     /// Searches for unsaved edits of crashed runs, and removes incomplete files that killed runs of
@@ -206,10 +197,8 @@ impl Autosave {
                 Err(errors) => {
                     // The recovery file is kept so that the user can repair it.
                     self.found.pop();
-                    let first = errors.messages().first().map(ToString::to_string);
-                    let first = first.unwrap_or_default();
-                    let first: Vec<_> = first.lines().map(str::trim).collect();
-                    Message::Warning(format!("unsaved edits cannot be read: {}", first.join(" ")))
+                    let why = first_line(&errors);
+                    Message::Warning(format!("unsaved edits cannot be read: {why}"))
                 }
             });
         }
@@ -280,7 +269,7 @@ mod tests {
         assert!(first.search(Ok(&file)).is_empty());
         first.note(Some(scene(3)), Instant::now());
         assert!(first.write(&file).is_none());
-        assert_eq!(first.path(), Some(&*folder.path().join(".a.toml.unsaved")));
+        assert_eq!(first.recovery.path(), Some(&*folder.path().join(".a.toml.unsaved")));
         // Edits of a run that has not ended yet are reported but not offered.
         let mut second = Autosave::new(Some(&path), "", None);
         let messages = second.search(Ok(&file));
@@ -324,7 +313,7 @@ mod tests {
         assert!(hidden.exists());
         autosave.note(Some(scene(3)), Instant::now());
         assert!(autosave.write(&file).is_none());
-        assert_eq!(autosave.path(), Some(&*folder.path().join(".a.toml.unsaved-2")));
+        assert_eq!(autosave.recovery.path(), Some(&*folder.path().join(".a.toml.unsaved-2")));
     }
 
     #[test]

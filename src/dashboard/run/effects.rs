@@ -3,18 +3,17 @@
 
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::autosave_worker::AutosaveJob;
-use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
+use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport};
 use crate::dashboard::run::file_worker::{Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{export_paths, image_viewer};
 use crate::film::LinearImage;
+use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, Snapshot};
-use crate::render::{Checkpoint, Options};
-use crate::scene::{Scene, SceneFile};
-use crate::terminal::Capabilities;
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crate::scene::SceneFile;
+use crossbeam_channel::{Receiver, Sender};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -49,47 +48,31 @@ pub trait Effects {
     /// it has been taken already.
     fn take_snapshot(&self) -> Option<Snapshot>;
 
-    /// Pauses rendering if `resting` is `true`, otherwise resumes it. The event loop pauses it
-    /// while the connection to the terminal is silent.
-    fn rest(&self, resting: bool);
+    /// Pauses rendering if the argument is `true`, otherwise resumes it. The event loop pauses it
+    /// while the connection to the terminal is silent. Does nothing without a renderer.
+    fn rest(&self, _resting: bool) {}
 
-    /// Returns the receiver of the results of effects, as messages. The caller must pass each
-    /// message to [`Effects::observe`] before it updates the model with the message.
-    fn done(&self) -> &Receiver<Message>;
-
-    /// Updates the executor after an effect, whose result is `message`.
-    fn observe(&mut self, message: &Message);
-
-    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
-    /// and `terminal` its capabilities.
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome;
+    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal.
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome;
 
     /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
     /// editing. Blocks until the edits are written, at most for `patience`.
-    fn flush(&self, patience: Duration);
+    fn flush(&self, _patience: Duration) {}
 
     /// Completes pending writes and ends the threads. First writes unsaved edits. Then waits until
     /// `deadline` for the renderer and for pictures that are being written, or without limit if
     /// `deadline` is `None`.
     ///
-    /// Returns two values: the remaining messages, and the path of the recovery file. The path is
-    /// `None` if there are no unsaved edits. If unsaved edits are lost, an error with the reason
-    /// takes the place of the path.
-    fn finish(
-        self: Box<Self>,
-        deadline: Option<Instant>,
-    ) -> (Vec<Message>, Result<Option<PathBuf>, String>);
+    /// Returns the path of the recovery file, or `None` if there are no unsaved edits. If unsaved
+    /// edits are lost, returns an error with the reason.
+    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String>;
 }
 
 /// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
 /// thread of the scene file and the exports.
 pub struct EffectRunner {
-    session: Session,
+    /// Renderer of the scene.
+    pub session: Session,
     files: Files,
     exporter: Exporter,
     resized: Option<ResizedExport>,
@@ -98,32 +81,27 @@ pub struct EffectRunner {
     options: Options,
     settings: Settings,
     results: Sender<Message>,
-    done: Receiver<Message>,
 }
 
 impl EffectRunner {
     /// Creates the executor and starts the threads that render, read and write. `file` is the scene
     /// file, or the path of a scene file that is unreadable. `state` is the folder for recovery
     /// files that cannot be written beside their scene file. `threads` is the number of threads
-    /// that trace rays.
+    /// that trace rays. The results of effects are sent to `results`.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
         threads: usize,
         options: Options,
         settings: Settings,
+        results: Sender<Message>,
     ) -> io::Result<Self> {
-        let (results, done) = unbounded();
-        let stem = match &file {
-            Ok(file) => stem(file.path(), file.document().name()),
-            Err(path) => stem(Some(path), ""),
-        };
+        let unreadable_path = file.as_ref().err().cloned();
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
             file: files.shared.clone(),
-            folder: PathBuf::new(),
-            stem,
+            unreadable_path,
             sampler: options.sampling.kind,
             adaptive: settings.adaptive,
         };
@@ -137,19 +115,7 @@ impl EffectRunner {
             options,
             settings,
             results,
-            done,
         })
-    }
-
-    /// Starts rendering `scene`. Returns the number of this version of the scene (its generation).
-    /// The renderer's reports repeat this number.
-    pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
-        self.session.set_scene(scene)
-    }
-
-    /// Continues the render of `checkpoint`, and shows its samples as a picture of `scene`.
-    pub fn resume(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) {
-        self.session.continue_from(scene, checkpoint);
     }
 
     fn export(&mut self, format: Format) {
@@ -168,11 +134,6 @@ impl EffectRunner {
         // the renderer's reports contain the number of threads.
         let _ = self.session.set_threads(self.threads, self.niceness);
     }
-
-    fn refuse(&self, error: &io::Error) {
-        let why = format!("cannot start a rendering thread: {error}");
-        let _ = self.results.send(Message::Exported(Err(why)));
-    }
 }
 
 impl Effects for EffectRunner {
@@ -188,26 +149,9 @@ impl Effects for EffectRunner {
         if resting { self.session.pause() } else { self.session.resume() }
     }
 
-    fn done(&self) -> &Receiver<Message> {
-        &self.done
-    }
-
-    /// Derives the names of later exports from the new path, if `message` reports that the scene
-    /// was saved.
-    fn observe(&mut self, message: &Message) {
-        if let Message::Saved(_, Ok(path)) = message {
-            self.exporter.stem = stem(Some(path), "");
-        }
-    }
-
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome {
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
-            Effect::Show(scene) => return Outcome::Rendering(self.show(scene)),
+            Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
             Effect::Restart => return Outcome::Rendering(self.session.restart()),
             Effect::Display(display) => {
                 self.options.display = display;
@@ -215,8 +159,7 @@ impl Effects for EffectRunner {
             }
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
-            Effect::Pause(true) => self.session.pause(),
-            Effect::Pause(false) => self.session.resume(),
+            Effect::Pause(paused) => self.rest(paused),
             Effect::Threads(threads) => {
                 self.threads = threads;
                 self.set_threads();
@@ -256,7 +199,10 @@ impl Effects for EffectRunner {
                     ResizedExport::start(request, self.exporter.clone(), self.results.clone());
                 match started {
                     Ok(resized) => self.resized = Some(resized),
-                    Err(error) => self.refuse(&error),
+                    Err(error) => {
+                        let why = format!("cannot start a rendering thread: {error}");
+                        let _ = self.results.send(Message::Exported(Err(why)));
+                    }
                 }
             }
             Effect::CancelExport => {
@@ -267,7 +213,7 @@ impl Effects for EffectRunner {
             Effect::Autosave(scene) => self.files.autosave(scene),
             Effect::Recover => self.files.give_autosave(AutosaveJob::Recover),
             Effect::Discard => self.files.give_autosave(AutosaveJob::Discard),
-            effect => return run_on_terminal(effect, frames, terminal, &self.results),
+            effect => return run_on_terminal(effect, frames, &self.results),
         }
         Outcome::Done
     }
@@ -276,12 +222,8 @@ impl Effects for EffectRunner {
         self.files.flush(patience);
     }
 
-    fn finish(
-        mut self: Box<Self>,
-        deadline: Option<Instant>,
-    ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
-        let resized = self.resized.take();
-        let Self { session, mut files, results, done, .. } = *self;
+    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
+        let Self { session, mut files, resized, .. } = *self;
         let kept = files.finish();
         let end = move || {
             if let Some(resized) = resized {
@@ -290,7 +232,6 @@ impl Effects for EffectRunner {
             // The renderer's thread runs tasks in the order of their submission. When this empty
             // task runs, all exports that were requested before it have been written.
             session.with(|_, _| ());
-            drop((session, results));
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
@@ -299,24 +240,21 @@ impl Effects for EffectRunner {
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }
-        (done.try_iter().collect(), kept)
+        kept
     }
 }
 
 /// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
-/// quit. Other effects are ignored. `frames` is the output to the terminal, and `terminal` its
-/// capabilities. A separate thread reads and encodes an image file and sends the result to
-/// `results`.
+/// quit. Other effects are ignored. `frames` is the output to the terminal. A separate thread reads
+/// and encodes an image file and sends the result to `results`.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,
-    terminal: &Capabilities,
     results: &Sender<Message>,
 ) -> Outcome {
     match effect {
         Effect::ViewImage { path, display, screen } => {
-            let line_rate = frames.flow.reading().map(|link| link.rate);
-            let viewport = image_viewer::viewport(terminal, screen, line_rate);
+            let viewport = image_viewer::viewport(frames, screen);
             image_viewer::prepare(path, display, viewport, results.clone());
         }
         Effect::Copy(path) => frames.copy(&export_paths::full(&path)),

@@ -9,14 +9,13 @@ use std::path::{Path, PathBuf};
 /// time of the search for an unused name.
 const MOST: u32 = 100_000;
 
-/// Creates a file in `folder` by calling `write` with the first unused path of `STEM-1.EXTENSION`,
+/// Creates a file by calling `write` with the first unused path of `STEM-1.EXTENSION`,
 /// `STEM-2.EXTENSION` and so on. Returns this path. `write` must create the file atomically and
 /// fail if the path exists; no name ever refers to an incomplete file then.
 ///
 /// # Errors
 /// Fails with the error of `write`, or with a message if no name is unused.
 pub fn numbered<E: Display>(
-    folder: &Path,
     stem: &str,
     extension: &str,
     write: impl Fn(&Path) -> Result<(), E>,
@@ -25,7 +24,7 @@ pub fn numbered<E: Display>(
     // exist.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
-        let path = folder.join(format!("{stem}-{number}.{extension}"));
+        let path = PathBuf::from(format!("{stem}-{number}.{extension}"));
         if is_taken(&path) {
             continue;
         }
@@ -96,14 +95,15 @@ mod tests {
     fn exports_overwrite_nothing() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("room-2.png"), "old").unwrap();
+        let room = folder.path().join("room").display().to_string();
         let write = |path: &Path| fs::File::create_new(path).map(drop);
         let names: Vec<_> = (0..3)
-            .map(|_| numbered(folder.path(), "room", "png", write).unwrap())
+            .map(|_| numbered(&room, "png", write).unwrap())
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
         assert_eq!(names, ["room-1.png", "room-3.png", "room-4.png"]);
         assert_eq!(fs::read(folder.path().join("room-2.png")).unwrap(), b"old");
-        assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).is_err());
+        assert!(numbered(&format!("{room}/nowhere/room"), "png", write).is_err());
         // A name is skipped if another program creates a file of that name first.
         let late = |path: &Path| {
             let number = fs::read_dir(folder.path()).unwrap().count();
@@ -112,7 +112,7 @@ mod tests {
             }
             write(path)
         };
-        let path = numbered(folder.path(), "room", "png", late).unwrap();
+        let path = numbered(&room, "png", late).unwrap();
         assert!(path.ends_with("room-7.png"), "{path:?}");
     }
 

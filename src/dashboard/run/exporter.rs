@@ -1,8 +1,9 @@
 //! Exports of image files: the current picture, or a separate render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::export_paths;
+use crate::dashboard::run::export_paths::{numbered, scp};
 use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::worker::Worker;
 use crate::disk::Existing;
 use crate::film::{Depth, Film, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
@@ -16,7 +17,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 /// Interval at which the progress of a render at another size is polled.
@@ -28,10 +28,8 @@ const LOOK: Duration = Duration::from_millis(200);
 pub struct Exporter {
     /// Scene file, whose text is written to the metadata of exported images.
     pub file: SharedFile,
-    /// Folder to which image files are written.
-    pub folder: PathBuf,
-    /// Beginning of the names of image files, such as `room` in `room-2.png`.
-    pub stem: String,
+    /// Path of a scene file that was unreadable at the start; `None` if it was readable.
+    pub unreadable_path: Option<PathBuf>,
     /// Kind of random numbers with which the picture is rendered, for the metadata of the image.
     pub sampler: SamplerKind,
     /// `true` if noisy pixels get more samples than others (adaptive sample allocation), for the
@@ -53,7 +51,7 @@ impl Exporter {
             let target = ImageOutput::from_path(path)?.create_new();
             rendering.write(report, &provenance, display, Depth::Eight, &target)
         };
-        let path = export_paths::numbered(&self.folder, &self.stem, format.extension(), write)?;
+        let path = numbered(&self.stem(), format.extension(), write)?;
         Ok(exported(path, &rendering.film, report))
     }
 
@@ -75,29 +73,37 @@ impl Exporter {
         checkpoint: Option<EncodedCheckpoint>,
     ) -> Result<PathBuf, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
-        export_paths::numbered(&self.folder, &self.stem, "zk", |path| {
-            checkpoint.write(path, Existing::Refuse)
-        })
+        numbered(&self.stem(), "zk", |path| checkpoint.write(path, Existing::Refuse))
+    }
+
+    /// Returns the beginning of the names of exported files: the name of the scene file as last
+    /// read or written.
+    fn stem(&self) -> String {
+        match self.file.get() {
+            Some(file) => stem(file.path(), file.document().name()),
+            None => stem(self.unreadable_path.as_deref(), ""),
+        }
     }
 
     /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
     /// to it.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.file.get() {
+        let document = match self.file.get() {
             Some(file) => {
                 let mut document = file.document().clone();
                 document.apply(scene);
-                (document.name().to_string(), document.text().to_string())
+                document
             }
-            None => (self.stem.clone(), Document::new(scene, &self.stem).text().to_string()),
-        }
+            None => Document::new(scene, &self.stem()),
+        };
+        (document.name().to_string(), document.text().to_string())
     }
 }
 
 /// Export that renders at another size in a separate thread.
 pub struct ResizedExport {
     cancelled: Arc<AtomicBool>,
-    thread: JoinHandle<()>,
+    worker: Worker,
 }
 
 /// Request for an export at another size.
@@ -126,7 +132,7 @@ impl ResizedExport {
     ) -> io::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let cancel_flag = Arc::clone(&cancelled);
-        let thread = thread::Builder::new().name("export".into()).spawn(move || {
+        let worker = Worker::spawn("export", move || {
             // Sending fails only at the end of the program, when the receiver is gone.
             let result = render(request, &exporter, &cancel_flag, &|progress| {
                 let _ = results.send(Message::ExportProgress(progress));
@@ -135,7 +141,7 @@ impl ResizedExport {
                 let _ = results.send(Message::Exported(result));
             }
         })?;
-        Ok(Self { cancelled, thread })
+        Ok(Self { cancelled, worker })
     }
 
     /// Cancels the render of the export. A file that is already being written is completed.
@@ -146,9 +152,7 @@ impl ResizedExport {
     /// Cancels the render of the export and waits until its thread has ended.
     pub fn end(self) {
         self.cancel();
-        if let Err(panic) = self.thread.join() {
-            std::panic::resume_unwind(panic);
-        }
+        self.worker.join_within(Duration::MAX);
     }
 }
 
@@ -188,7 +192,7 @@ fn render(
 /// film.
 pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
     Exported {
-        scp: export_paths::scp(&path),
+        scp: scp(&path),
         path,
         size: [film.width(), film.height()],
         spp: report.spp.mean,

@@ -78,7 +78,7 @@ impl Files {
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
-        let shared = SharedFile::new(autosave.elsewhere());
+        let shared = SharedFile::new(autosave.recovery.elsewhere());
         file.iter().for_each(|file| shared.put(file));
         let autosave_worker = AutosaveWorker {
             autosave,
@@ -285,7 +285,7 @@ impl FileWorker {
         self.seen = stamp(&path);
         let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
         self.shared.set_elsewhere(recovery.elsewhere());
-        self.publish();
+        self.shared.put(file);
         let _ = self.autosaves.send(AutosaveJob::Saved(Arc::clone(scene), path.clone()));
         self.path = Some(path.clone());
         Ok(path)
@@ -305,14 +305,8 @@ impl FileWorker {
             (None, None) => return Ok(Arc::default()),
         };
         let scene = Arc::new(file.document().scene().clone());
-        self.publish();
+        self.shared.put(file);
         Ok(scene)
-    }
-
-    fn publish(&self) {
-        if let Some(file) = &self.file {
-            self.shared.put(file);
-        }
     }
 }
 

@@ -4,7 +4,7 @@
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::image_upload::ImageUpload;
-use crate::dashboard::run::writer::{Writer, Written};
+use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
 use crate::terminal::diff::{FrameDiff, TargetFrame};
 use crate::terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
@@ -13,7 +13,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Sequences that start and end a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
@@ -25,46 +25,37 @@ const ACK_REQUEST_BYTES: usize = 16;
 /// Pipeline of frames to the terminal: drawing, difference, flow control, output.
 pub struct FramePipeline {
     view: View,
-    diff: FrameDiff,
+    /// Difference between the contents of the terminal and the model.
+    pub diff: FrameDiff,
     /// Flow control of the connection to the terminal.
     pub flow: FlowControl,
     /// Send queue of the SSH connection in the kernel; `None` if it cannot be read.
     queue: Option<TcpSendQueue>,
-    /// `true` if the terminal supports synchronised updates, which it displays as a whole.
-    synchronised: bool,
-    /// Writer that writes frames to the terminal. The caller must pass its results to
-    /// [`FramePipeline::written_at`].
+    /// Known capabilities of the terminal. Late replies of the terminal add to them.
+    pub terminal: Capabilities,
+    /// Thread that writes frames to the terminal. The caller must report each of its results to
+    /// [`FramePipeline::record_written`].
     pub writer: Writer,
-    /// Time at which the frame that is being written was passed to the writer; `None` if no frame
-    /// is being written.
-    writing_since: Option<Duration>,
+    /// Time at which the frame that is being written was passed to the writing thread; `None` if no
+    /// frame is being written, so that another one can be sent.
+    pub writing_since: Option<Duration>,
     /// Number of bytes of all frames sent so far.
-    sent: u64,
+    pub sent: u64,
     /// Last frame that was drawn. Some of its cells may not have been sent yet.
     target: Buffer,
     /// Position of the text cursor; `None` if it is invisible.
     cursor: Option<Position>,
-    meta: FrameMeta,
     /// Escape sequence that sets the terminal's clipboard, to be sent with the next frame. Empty if
     /// there is nothing to copy.
     clipboard: String,
     tty: Arc<Tty>,
     /// Upload of the image in the image viewer; `None` if there is no such image.
-    upload: Option<ImageUpload>,
+    pub upload: Option<ImageUpload>,
     /// Escape sequence that removes the previously viewed image from the screen, to be sent before
     /// the next frame. Empty if there is nothing to remove.
     removal: Vec<u8>,
     /// `true` if the frame that is being written removes an image.
     removing: bool,
-}
-
-/// State of the model when the last frame was drawn: the version of the picture, the picture's mean
-/// number of samples per pixel, and `true` if the picture changes rarely or only by user input.
-#[derive(Clone, Copy, Debug, Default)]
-struct FrameMeta {
-    version: u64,
-    samples: f64,
-    settled: bool,
 }
 
 /// Outcome of an attempt to draw and send a frame.
@@ -88,20 +79,19 @@ pub enum DrawOutcome {
 impl FramePipeline {
     /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second;
     /// `None` adapts the rate to the connection.
-    pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
+    pub fn new(tty: Arc<Tty>, terminal: Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
             diff: FrameDiff::default(),
-            flow: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
+            flow: FlowControl::new(InitialLink::of(&terminal, queue.is_some(), bandwidth)),
             queue,
-            synchronised: terminal.synchronised,
-            writer: Writer::new(Arc::clone(&tty))?,
+            terminal,
+            writer: writer::start(Arc::clone(&tty))?,
             writing_since: None,
             sent: 0,
             target: Buffer::empty(Rect::ZERO),
             cursor: None,
-            meta: FrameMeta::default(),
             clipboard: String::new(),
             tty,
             upload: None,
@@ -123,12 +113,6 @@ impl FramePipeline {
         self.give_up();
     }
 
-    /// Returns the share of the viewed image that was sent to the terminal, 0..=1. Returns `None`
-    /// if no image is viewed.
-    pub fn uploaded(&self) -> Option<f64> {
-        self.upload.as_ref().map(ImageUpload::share)
-    }
-
     /// Starts to send the image that the image viewer of `model` shows, unless this image is being
     /// sent already. Stops sending an image that the viewer no longer shows.
     pub fn follow(&mut self, model: &Model) {
@@ -136,7 +120,8 @@ impl FramePipeline {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
             _ => None,
         };
-        let same = |upload: &ImageUpload| image.is_some_and(|image| upload.is_of(image));
+        let same =
+            |upload: &ImageUpload| image.is_some_and(|image| Arc::ptr_eq(&upload.image, image));
         if !self.upload.as_ref().is_some_and(same) {
             self.give_up();
             self.upload = image.map(|image| ImageUpload::new(Arc::clone(image)));
@@ -165,10 +150,10 @@ impl FramePipeline {
             self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
-        let mut bytes = self.writer.buffer();
+        let mut bytes = Vec::new();
         upload.next(budget.bytes.saturating_sub(ACK_REQUEST_BYTES), &mut bytes);
         self.diff.moved();
-        if upload.is_open() {
+        if upload.open {
             self.flow.sent_unasked(now, bytes.len());
         } else {
             if let Some(through) = self.flow.ack_request() {
@@ -176,20 +161,16 @@ impl FramePipeline {
             }
             self.flow.sent(now, bytes.len(), true, 0);
         }
-        self.writer.send(bytes);
-        self.writing_since = Some(now);
+        self.send(bytes, now);
         DrawOutcome::Slice
     }
 
-    /// Returns `true` if the last frame has been written, so that another one can be sent.
-    pub fn ready(&self) -> bool {
-        self.writer.ready()
-    }
-
-    /// Returns two values: `true` if visible differences of the picture remain to be sent to the
-    /// terminal, and the number of bytes of all frames sent so far.
-    pub fn load(&self) -> (bool, u64) {
-        (self.diff.pending().visible, self.sent)
+    /// Passes a frame to the writing thread, which must not be writing another one.
+    fn send(&mut self, frame: Vec<u8>, now: Duration) {
+        debug_assert!(self.writing_since.is_none(), "one frame at a time");
+        // Sending fails only after a panic of the thread.
+        let _ = self.writer.frames.send(frame);
+        self.writing_since = Some(now);
     }
 
     /// Updates flow control at time `now`: stops waiting for overdue acknowledgements of the
@@ -202,23 +183,6 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which the connection to the terminal counts as silent, unless input
-    /// arrives before. Returns `None` if the connection cannot become silent, because no sent bytes
-    /// are known to be waiting for transmission.
-    pub fn silent_at(&self) -> Option<Duration> {
-        self.flow.silent_at(self.writing_since)
-    }
-
-    /// Returns the earliest time, `now` or later, at which a frame with new content can be sent. A
-    /// frame that responds to user input may be sent sooner than others; `answers` is `true` for
-    /// such a frame.
-    pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
-        match self.flow.allowance(now, answers) {
-            Some(_) => now,
-            None => self.flow.wakes_at(now, true),
-        }
-    }
-
     /// Returns the time at which [`FramePipeline::draw`] must be called next. Returns `None` if
     /// there is nothing to send until the next event. `changed` is `true` if the model has changed
     /// since the last frame. `answers` is `true` if the frame would respond to user input.
@@ -227,7 +191,7 @@ impl FramePipeline {
         let text = changed || pending.text || !self.removal.is_empty();
         let may = || self.flow.allowance(now, false).is_some_and(|budget| budget.picture);
         if let Some(upload) = &self.upload
-            && (upload.is_open() || !text && upload.follows(pending.visible))
+            && (upload.open || !text && upload.follows(pending.visible))
         {
             let slice = || if may() { now } else { self.flow.wakes_at(now, false) };
             return upload.is_unfinished().then(slice);
@@ -245,8 +209,7 @@ impl FramePipeline {
     /// Draws the model if `changed` is `true`, and sends as many of the changed cells as the
     /// connection has room for. `answers` is `true` if the frame responds to user input.
     /// `image_epoch` is a counter that increases when another picture replaces the present one;
-    /// refinement does not increase it. Must be called only if [`FramePipeline::ready`] returns
-    /// `true`.
+    /// refinement does not increase it. Must be called only if no frame is being written.
     pub fn draw(
         &mut self,
         model: &Model,
@@ -258,7 +221,7 @@ impl FramePipeline {
         let Some(whole) = self.flow.allowance(now, answers) else { return DrawOutcome::Nothing };
         let mut budget = whole;
         if let Some(upload) = &self.upload {
-            if upload.is_open() {
+            if upload.open {
                 return self.slice(now, whole);
             }
             // Cells of the picture are not sent if the viewed image covers them or is about to
@@ -268,21 +231,18 @@ impl FramePipeline {
         if changed {
             self.redraw(model);
         }
-        let (picture, uncovered) = self.view.place();
-        let FrameMeta { version, samples, settled } = self.meta;
         let target = TargetFrame {
             cells: &self.target,
             cursor: self.cursor,
-            picture,
-            uncovered,
+            picture: self.view.place,
+            uncovered: &self.view.uncovered,
             subject: image_epoch,
-            version,
-            samples,
-            settled,
+            version: model.picture_version,
+            samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
+            settled: is_settled(model),
         };
-        let mut bytes = self.writer.buffer();
-        bytes.extend(&self.removal);
-        if self.synchronised {
+        let mut bytes = self.removal.clone();
+        if self.terminal.synchronised {
             bytes.extend(SYNCHRONISED[0]);
         }
         let empty = bytes.len();
@@ -291,21 +251,15 @@ impl FramePipeline {
             upload.seen |= frame.picture;
         }
         if bytes.len() == empty && self.clipboard.is_empty() && self.removal.is_empty() {
-            bytes.clear();
-            self.writer.keep(bytes);
             let pending = self.diff.pending();
             let follows =
                 |upload: &ImageUpload| upload.is_unfinished() && upload.follows(pending.visible);
             if !pending.text && self.upload.as_ref().is_some_and(follows) {
                 return self.slice(now, whole);
             }
-            return if self.diff.pending().visible {
-                DrawOutcome::Deferred
-            } else {
-                DrawOutcome::Same
-            };
+            return if pending.visible { DrawOutcome::Deferred } else { DrawOutcome::Same };
         }
-        if self.synchronised {
+        if self.terminal.synchronised {
             bytes.extend(SYNCHRONISED[1]);
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
@@ -315,22 +269,16 @@ impl FramePipeline {
         }
         self.sent += bytes.len() as u64;
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
-        self.writer.send(bytes);
-        self.writing_since = Some(now);
+        self.send(bytes, now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
-    /// Records that a frame was written to the terminal. `frame` is the result of the writer.
-    /// Returns the time at which the write was completed.
-    ///
-    /// # Errors
-    /// Fails if the write failed.
-    pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
+    /// Records that a frame was written to the terminal.
+    pub fn record_written(&mut self) {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);
         }
         self.writing_since = None;
-        self.writer.done(frame)
     }
 
     fn redraw(&mut self, model: &Model) {
@@ -338,10 +286,5 @@ impl FramePipeline {
         self.target.resize(Rect { x: 0, y: 0, width, height });
         self.target.reset();
         self.cursor = self.view.draw(model, &mut self.target);
-        self.meta = FrameMeta {
-            version: model.picture_version,
-            samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),
-            settled: is_settled(model),
-        };
     }
 }

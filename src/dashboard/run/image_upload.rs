@@ -12,12 +12,13 @@ const END: &[u8] = b"\x1b\\";
 /// Image for the viewer, and the progress of its upload to the terminal.
 #[derive(Debug)]
 pub struct ImageUpload {
-    image: Arc<ViewerImage>,
+    /// Image that is uploaded.
+    pub image: Arc<ViewerImage>,
     /// Number of bytes of the image sent so far.
     sent: usize,
     /// `true` if the bytes sent so far end inside of an escape sequence. The remainder of the
-    /// sequence must be sent next.
-    open: bool,
+    /// sequence must be sent next, before any other output.
+    pub open: bool,
     /// `true` if the coarse preview of the image (half blocks in terminal cells) is already
     /// visible.
     pub seen: bool,
@@ -27,17 +28,6 @@ impl ImageUpload {
     /// Creates the upload of `image`, of which nothing has been sent.
     pub fn new(image: Arc<ViewerImage>) -> Self {
         Self { image, sent: 0, open: false, seen: false }
-    }
-
-    /// Returns `true` if `image` is the image of this upload.
-    pub fn is_of(&self, image: &Arc<ViewerImage>) -> bool {
-        Arc::ptr_eq(&self.image, image)
-    }
-
-    /// Returns `true` if the bytes sent so far end inside of an escape sequence, so that no other
-    /// output may follow.
-    pub fn is_open(&self) -> bool {
-        self.open
     }
 
     /// Returns `true` if the upload of the image has begun. From then on, the coarse preview under

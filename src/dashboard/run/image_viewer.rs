@@ -2,6 +2,8 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::run::frames::FramePipeline;
+use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
 use crate::film::Display;
 use crate::terminal::image::{ImageViewport, Protocol, ViewerImage};
@@ -17,18 +19,16 @@ use std::time::Duration;
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
 /// Returns the viewport of the image viewer: the image protocol, the size of the screen, and the
-/// largest number of bytes of an image. `screen` is the number of columns and rows of the terminal.
-/// `line_rate` is the rate of the connection in bytes per second; it is `None` for a local
-/// terminal.
-pub fn viewport(
-    terminal: &Capabilities,
-    screen: [u16; 2],
-    line_rate: Option<f64>,
-) -> ImageViewport {
+/// largest number of bytes of an image. `screen` is the number of columns and rows of the terminal,
+/// to which `frames` are sent.
+pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
+    let terminal = &frames.terminal;
     // The user may have changed the font size, and thereby the cell size, since the start.
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
-    let max_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
+    // A local terminal has no limit.
+    let rate = frames.flow.reading().map(|link| link.rate);
+    let max_bytes = rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
     ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
 }
 
@@ -51,7 +51,7 @@ impl Dashboard {
     /// Reports the progress of an image transfer to the model, at most once per
     /// [`STATUS_INTERVAL`]. The end of the transfer is reported at once.
     pub(super) fn report_upload(&mut self, now: Duration) {
-        let Some(sent) = self.frames.uploaded() else { return };
+        let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
         let known = match &self.model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.sent,
             _ => return,

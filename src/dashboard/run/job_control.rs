@@ -2,7 +2,7 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
-use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, StopTarget, stop};
+use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, stop_process};
 use crate::terminal::{TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
@@ -20,6 +20,7 @@ const SECURED_WITHIN: Duration = Duration::from_secs(2);
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Terminal, and the receivers of its events.
+#[derive(Clone)]
 pub(super) struct TerminalIo {
     /// Terminal, for output.
     pub tty: Arc<Tty>,
@@ -54,42 +55,38 @@ impl ResizeDebounce {
 
 impl Dashboard {
     /// Handles a signal. Returns the exit status if the program is to end, otherwise `None`.
-    pub(super) fn handle_signal(
-        &mut self,
-        event: SignalEvent,
-        terminal_io: &TerminalIo,
-    ) -> Option<u8> {
+    pub(super) fn handle_signal(&mut self, event: SignalEvent) -> Option<u8> {
         match event {
             SignalEvent::End(status) => Some(status),
             SignalEvent::Resized => {
                 self.resizing.note(self.began.elapsed());
                 None
             }
-            SignalEvent::Stop => self.suspend(StopTarget::Itself, terminal_io),
+            SignalEvent::Stop => self.suspend(stop_process),
             // The process may have been stopped by SIGSTOP, which it cannot handle. The terminal is
             // therefore set up again.
-            SignalEvent::Continue => self.resume(terminal_io),
+            SignalEvent::Continue => self.resume(),
         }
     }
 
-    /// Restores the terminal and stops the processes of `target`. Sets up the terminal again when
-    /// the shell continues them. Returns the exit status if the program is to end instead,
-    /// otherwise `None`.
-    pub(super) fn suspend(&mut self, target: StopTarget, terminal_io: &TerminalIo) -> Option<u8> {
+    /// Restores the terminal and stops the process by `stop`. Sets up the terminal again when the
+    /// shell continues it. Returns the exit status if the program is to end instead, otherwise
+    /// `None`.
+    pub(super) fn suspend(&mut self, stop: fn() -> rustix::io::Result<()>) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
-        self.await_answers(&terminal_io.input);
-        terminal_io.tty.suspend();
-        let mut stopped = stop(target).is_ok();
+        self.await_answers();
+        self.terminal_io.tty.suspend();
+        let mut stopped = stop().is_ok();
         while stopped {
-            match terminal_io.signals.recv_timeout(STOPS_WITHIN) {
+            match self.terminal_io.signals.recv_timeout(STOPS_WITHIN) {
                 Ok(SignalEvent::End(status)) => return Some(status),
                 Ok(SignalEvent::Continue) => break,
                 Ok(SignalEvent::Resized | SignalEvent::Stop) => {}
                 Err(_) => stopped = false,
             }
         }
-        let end = self.resume(terminal_io);
+        let end = self.resume();
         if !stopped {
             self.dispatch(Message::Warning("there is no shell to go back to".to_string()));
         }
@@ -98,8 +95,8 @@ impl Dashboard {
 
     /// Sets up the terminal again after a suspension and redraws the whole screen. Returns the exit
     /// status [`HUNG_UP`] if the terminal is gone, otherwise `None`.
-    fn resume(&mut self, terminal_io: &TerminalIo) -> Option<u8> {
-        if terminal_io.tty.resume().is_err() {
+    fn resume(&mut self) -> Option<u8> {
+        if self.terminal_io.tty.resume().is_err() {
             return Some(HUNG_UP);
         }
         self.resize();

@@ -30,16 +30,15 @@ use crate::render::{Checkpoint, Options};
 use crate::scene::{SceneErrors, SceneFile};
 use crate::terminal::flow::LinkStatus;
 use crate::terminal::{
-    Capabilities, Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities,
-    size,
+    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
 };
-use crossbeam_channel::{Receiver, after, never, select};
+use crossbeam_channel::{Receiver, after, never, select, unbounded};
 use effects::{EffectRunner, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
 use latency::LatencyRecorder;
-use signals::{HUNG_UP, StopTarget};
+use signals::{HUNG_UP, stop_group};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -117,32 +116,39 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut effects = EffectRunner::new(file, state, threads, options, settings)?;
+    let (results, done) = unbounded();
+    let mut effects = EffectRunner::new(file, state, threads, options, settings, results)?;
     if let Ok(scene) = &scene {
         // Rendering starts while the terminal replies to the capability queries.
         match checkpoint {
-            Some(checkpoint) => effects.resume(Arc::clone(scene), checkpoint),
-            None => drop(effects.show(Arc::clone(scene))),
-        }
+            Some(checkpoint) => effects.session.continue_from(Arc::clone(scene), checkpoint),
+            None => effects.session.set_scene(Arc::clone(scene)),
+        };
     }
     let mut model = Model::new(path, &name, scene, settings.stop, threads);
     model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);
-    run_on_terminal(Box::new(effects), model, terminal, trace)
+    run_on_terminal(Box::new(effects), done, model, terminal, trace)
 }
 
 /// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
 /// is the number of threads that compute noise estimates and pictures. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
-    let effects = WatchRunner::new(films, threads)?;
-    run_on_terminal(Box::new(effects), model, terminal, None)
+    let (results, done) = unbounded();
+    let effects = WatchRunner::new(films, threads, results.clone())?;
+    // This waits for the first report, so that the first frame shows the table of films.
+    if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
+        let _ = results.send(report);
+    }
+    run_on_terminal(Box::new(effects), done, model, terminal, None)
 }
 
-/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. The screen
-/// size and the colours in `model` are replaced by those of the terminal. `trace` is the path of
-/// the file for input latencies.
+/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. `done` receives
+/// the results of effects. The screen size and the colours in `model` are replaced by those of the
+/// terminal. `trace` is the path of the file for input latencies.
 fn run_on_terminal(
     effects: Box<dyn Effects>,
+    done: Receiver<Message>,
     mut model: Model,
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
@@ -160,11 +166,15 @@ fn run_on_terminal(
     };
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
+    let input = input::read(input)?;
+    let terminal_io =
+        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
     let mut dashboard = Dashboard {
         model,
         effects,
-        frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
-        terminal,
+        done,
+        terminal_io,
+        frames: FramePipeline::new(screen.tty(), terminal, bandwidth)?,
         latency: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
@@ -176,16 +186,13 @@ fn run_on_terminal(
         suspend: false,
         quit: false,
     };
-    while let Ok(message) = dashboard.effects.done().try_recv() {
-        dashboard.take_done(message);
+    while let Ok(message) = dashboard.done.try_recv() {
+        dashboard.dispatch(message);
     }
     // This message also informs the renderer of the size of the picture in half cells (upper and
     // lower halves of terminal cells).
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
-    let input = input::read(input)?;
-    let terminal_io =
-        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
-    let result = dashboard.watch(&terminal_io);
+    let result = dashboard.watch();
     // If the user quits, the program waits without limit for pictures that are being written. If a
     // signal or the loss of the terminal ends it, the wait is limited.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
@@ -193,13 +200,13 @@ fn run_on_terminal(
     // timeout of 0, the call does not wait for the write.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
-        dashboard.await_answers(&terminal_io.input);
+        dashboard.await_answers();
     }
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
-    let (finished, kept) = dashboard.effects.finish(deadline);
+    let kept = dashboard.effects.finish(deadline);
     let mut ended = Ended::new(result?, kept);
-    for message in finished {
+    for message in dashboard.done.try_iter() {
         match message {
             Message::Exported(result) => ended.exported.push(result),
             Message::CheckpointWritten(result) => ended.checkpoints.push(result),
@@ -216,9 +223,10 @@ fn run_on_terminal(
 struct Dashboard {
     model: Model,
     effects: Box<dyn Effects>,
+    /// Receiver of the results of effects.
+    done: Receiver<Message>,
+    terminal_io: TerminalIo,
     frames: FramePipeline,
-    /// Known capabilities of the terminal. Late replies of the terminal add to them.
-    terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
     /// Generation of the visible picture: the version number of the scene that it shows.
@@ -243,15 +251,16 @@ struct Dashboard {
 impl Dashboard {
     /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
     /// loss of the terminal ends the program, and `None` if the user quits.
-    fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
+    fn watch(&mut self) -> io::Result<Option<u8>> {
+        let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
         let wakeup = self.effects.wakeup().clone();
-        let done = self.effects.done().clone();
+        let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();
         let mut waiting = Vec::new();
         // Signals that arrived during the capability query are handled before the first frame.
-        while let Ok(event) = terminal_io.signals.try_recv() {
-            if let Some(status) = self.handle_signal(event, terminal_io) {
+        while let Ok(event) = signals.try_recv() {
+            if let Some(status) = self.handle_signal(event) {
                 return Ok(Some(status));
             }
         }
@@ -268,7 +277,7 @@ impl Dashboard {
                 None => never(),
             };
             select! {
-                recv(terminal_io.input) -> event => match event {
+                recv(input) -> event => match event {
                     Ok(Ok(event)) => self.enqueue(event, &mut waiting),
                     // The terminal is gone.
                     Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
@@ -278,24 +287,27 @@ impl Dashboard {
                     // The renderer's panic has been reported already.
                     Err(_) => return Err(io::Error::other("the renderer has ended")),
                 },
-                recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
+                recv(done) -> message => if let Ok(message) = message {
+                    self.dispatch(message);
+                },
                 recv(written) -> frame => {
-                    if let Ok(frame) = frame {
-                        match self.frames.written_at(frame) {
+                    if let Ok(written) = frame {
+                        self.frames.record_written();
+                        match written {
                             Ok(at) => self.latency.written(at),
                             Err(_) => return Ok(Some(HUNG_UP)),
                         }
                     }
                 }
-                recv(terminal_io.signals) -> event => {
-                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event, terminal_io)) {
+                recv(signals) -> event => {
+                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
                         return Ok(Some(status));
                     }
                 }
-                recv(terminal_io.left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(Ok(event)) = terminal_io.input.try_recv() {
+            while let Ok(Ok(event)) = input.try_recv() {
                 self.enqueue(event, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
@@ -304,10 +316,10 @@ impl Dashboard {
                 self.latency.event(at, scene);
             }
             while let Ok(message) = done.try_recv() {
-                self.take_done(message);
+                self.dispatch(message);
             }
             if std::mem::take(&mut self.suspend)
-                && let Some(status) = self.suspend(StopTarget::Group, terminal_io)
+                && let Some(status) = self.suspend(stop_group)
             {
                 return Ok(Some(status));
             }
@@ -328,7 +340,7 @@ impl Dashboard {
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
                 // A terminal behind a multiplexer may reply only after the capability query has
                 // ended.
-                self.terminal.learn(&reply);
+                self.frames.terminal.learn(&reply);
                 return;
             }
             Event::Reply(_) => return,
@@ -338,10 +350,10 @@ impl Dashboard {
 
     /// Waits for outstanding replies of the terminal, before the terminal is restored. Otherwise
     /// the shell would read the replies as input.
-    fn await_answers(&mut self, input: &Receiver<io::Result<TimedEvent>>) {
+    fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
-            match input.recv_timeout(left) {
+            match self.terminal_io.input.recv_timeout(left) {
                 Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
                 _ => break,
             }
@@ -363,7 +375,7 @@ impl Dashboard {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
             };
-            match self.effects.run(effect, &mut self.frames, &self.terminal) {
+            match self.effects.run(effect, &mut self.frames) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
                     // A change of lights alone needs no newly rendered picture: the current
@@ -387,11 +399,6 @@ impl Dashboard {
         awaited
     }
 
-    fn take_done(&mut self, message: Message) {
-        self.effects.observe(&message);
-        self.dispatch(message);
-    }
-
     fn take_snapshot(&mut self) {
         if let Some(snapshot) = self.effects.take_snapshot() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
@@ -410,8 +417,10 @@ impl Dashboard {
     /// the last frame is still being written.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let due = self.frames.snapshot_due(now, self.latency.replies(u64::MAX));
-        self.frames.ready().then(|| due.saturating_sub(now))
+        let flow = &self.frames.flow;
+        let may_send = flow.allowance(now, self.latency.replies(u64::MAX)).is_some();
+        let due = if may_send { now } else { flow.wakes_at(now, true) };
+        self.frames.writing_since.is_none().then(|| due.saturating_sub(now))
     }
 
     /// Sends [`Message::Tick`] to the model if the time of its next timeout has come.
@@ -443,14 +452,13 @@ impl Dashboard {
         self.report_upload(now);
         self.frames.follow(&self.model);
         let mut due = None;
-        if self.frames.ready() && !self.quit {
+        if self.frames.writing_since.is_none() && !self.quit {
             let answers = self.latency.replies(self.shown);
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
                 let drawn =
                     self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
-                let (waits, sent) = self.frames.load();
-                self.latency.line(now, waits, sent);
+                self.latency.line(now, self.frames.diff.pending().visible, self.frames.sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
@@ -465,10 +473,9 @@ impl Dashboard {
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
                 let answers = self.latency.replies(self.shown);
-                due = if self.frames.ready() {
-                    self.frames.due(now, self.changed, answers)
-                } else {
-                    None
+                due = match self.frames.writing_since {
+                    None => self.frames.due(now, self.changed, answers),
+                    Some(_) => None,
                 };
             }
         }
@@ -482,7 +489,7 @@ impl Dashboard {
     /// Returns the time at which rendering will be paused unless a reply arrives before. Returns
     /// `None` if rendering is paused for this reason already, or if no reply is expected.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
-        let silent_at = self.frames.silent_at();
+        let silent_at = self.frames.flow.silent_at(self.frames.writing_since);
         let is_silent = silent_at.is_some_and(|at| at <= now);
         if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
             self.effects.rest(is_silent);
@@ -490,6 +497,9 @@ impl Dashboard {
         silent_at.filter(|_| !is_silent)
     }
 }
+
+/// Longest time that `zerkalo watch` waits, when it starts, for the first report on the files.
+const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
 /// Shortest interval between two updates of the displayed connection status, and between two
 /// updates of the displayed upload progress.

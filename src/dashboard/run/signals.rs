@@ -55,15 +55,6 @@ impl Signals {
     }
 }
 
-/// Processes to suspend.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum StopTarget {
-    /// This process alone.
-    Itself,
-    /// All processes in the group of this process. Ctrl-Z in a shell suspends such a group.
-    Group,
-}
-
 /// Registers signal handlers, which queue signals until [`watch`] handles them. Must be called
 /// before the terminal enters raw mode, because the default handlers would end the program and
 /// leave the terminal in raw mode.
@@ -102,13 +93,15 @@ pub(super) fn watch(
     Ok(Signals { events, ending })
 }
 
-/// Stops the processes of `target`, which may still run for a moment after this function returns.
-/// The signal is SIGTTIN, because SIGTSTP has a handler in this program. Nothing happens if no
-/// shell could continue the processes: the kernel ignores SIGTTIN in orphaned process groups.
-pub(super) fn stop(target: StopTarget) -> io::Result<()> {
-    match target {
-        StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,
-        StopTarget::Group => kill_current_process_group(Signal::TTIN)?,
-    }
-    Ok(())
+/// Stops this process, which may still run for a moment after this function returns. The signal is
+/// SIGTTIN, because SIGTSTP has a handler in this program. Nothing happens if no shell could
+/// continue the process: the kernel ignores SIGTTIN in orphaned process groups.
+pub(super) fn stop_process() -> rustix::io::Result<()> {
+    kill_process(getpid(), Signal::TTIN)
+}
+
+/// Stops all processes in the group of this process as [`stop_process`] does. Ctrl-Z in a shell
+/// suspends such a group.
+pub(super) fn stop_group() -> rustix::io::Result<()> {
+    kill_current_process_group(Signal::TTIN)
 }

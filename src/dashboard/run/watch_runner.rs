@@ -3,52 +3,46 @@
 
 use crate::dashboard::message::{Effect, Exported, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
-use crate::dashboard::run::export_paths;
+use crate::dashboard::run::export_paths::numbered;
 use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::film::file::FilmFileHeader;
 use crate::film::{Depth, Film, ImageOutput, LinearImage};
 use crate::render::plan::WatchedFilms;
 use crate::render::session::{Report, Snapshot, WatchSession};
-use crate::terminal::Capabilities;
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Longest time that the program waits, when it starts, for the first report on the watched files.
-const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
+use std::time::Instant;
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
     session: WatchSession,
-    /// Number of exported images that have not been written yet.
-    exporting: usize,
+    /// Receiver that is disconnected as soon as the last requested export has ended; `None` before
+    /// the first export.
+    exported: Option<Receiver<()>>,
     results: Sender<Message>,
-    done: Receiver<Message>,
 }
 
 impl WatchRunner {
-    /// Starts the thread that reads the watched film files.
-    pub fn new(films: WatchedFilms, threads: usize) -> io::Result<Self> {
-        let (results, done) = unbounded();
+    /// Starts the thread that reads the watched film files. It sends its reports to `results`, as
+    /// do effects.
+    pub fn new(films: WatchedFilms, threads: usize, results: Sender<Message>) -> io::Result<Self> {
         let reports = results.clone();
         let session = WatchSession::new(films, threads, move |report| {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
-        // This waits for the first report, so that the first frame shows the table of films.
-        if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
-            let _ = results.send(report);
-        }
-        Ok(Self { session, exporting: 0, results, done })
+        Ok(Self { session, exported: None, results })
     }
 
     fn export(&mut self, format: Format) {
-        self.exporting += 1;
         let results = self.results.clone();
+        let (exporting, exported) = bounded(0);
+        self.exported = Some(exported);
         self.session.submit(move |picture| {
+            let _exporting = exporting;
             let written = match picture {
                 Some((film, header, report)) => write(film, header, report, format),
                 None => Err("there is no picture to write".to_string()),
@@ -71,7 +65,7 @@ fn write(
         let output = ImageOutput::from_path(path)?.create_new();
         header.write_picture(film, Depth::Eight, &output)
     };
-    let path = export_paths::numbered(Path::new(""), &stem, format.extension(), create)?;
+    let path = numbered(&stem, format.extension(), create)?;
     Ok(exported(path, film, report))
 }
 
@@ -84,24 +78,7 @@ impl Effects for WatchRunner {
         self.session.take()
     }
 
-    fn rest(&self, _: bool) {}
-
-    fn done(&self) -> &Receiver<Message> {
-        &self.done
-    }
-
-    fn observe(&mut self, message: &Message) {
-        if let Message::Exported(_) = message {
-            self.exporting = self.exporting.saturating_sub(1);
-        }
-    }
-
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome {
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
             Effect::View(view) => self.session.set_view(view),
             Effect::Display(display) => self.session.set_display(display),
@@ -115,30 +92,19 @@ impl Effects for WatchRunner {
                 });
             }
             Effect::Export(format) => self.export(format),
-            effect => return run_on_terminal(effect, frames, terminal, &self.results),
+            effect => return run_on_terminal(effect, frames, &self.results),
         }
         Outcome::Done
     }
 
-    fn flush(&self, _: Duration) {}
-
-    fn finish(
-        mut self: Box<Self>,
-        deadline: Option<Instant>,
-    ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
-        let mut finished = Vec::new();
-        // Other messages may arrive before those of the exports. `done` is never disconnected,
-        // because this runner holds a sender; a panic of the watch session is therefore detected by
-        // `has_ended`.
-        while self.exporting > 0
-            && deadline.is_none_or(|deadline| Instant::now() < deadline)
-            && !self.session.has_ended()
-        {
-            if let Ok(message) = self.done.recv_timeout(Duration::from_millis(50)) {
-                self.observe(&message);
-                finished.push(message);
-            }
+    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
+        // The session runs exports in the order of their requests. If its thread panics, it drops
+        // the sender as at the end of an export.
+        match (self.exported, deadline) {
+            (Some(exported), Some(deadline)) => drop(exported.recv_deadline(deadline)),
+            (Some(exported), None) => drop(exported.recv()),
+            (None, _) => {}
         }
-        (finished, Ok(None))
+        Ok(None)
     }
 }

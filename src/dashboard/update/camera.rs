@@ -23,18 +23,6 @@ const DOLLY_FINE: f64 = 0.99;
 /// Factor by which one step of zooming in multiplies the width of the camera's view.
 const ZOOM: f64 = 0.95;
 
-/// Returns two components of `direction` on the screen: to the right, and upwards. Each component
-/// is -1, 0 or 1. For a `direction` along the view direction, both components are 0.
-fn right_up(direction: Direction) -> [f64; 2] {
-    match direction {
-        Direction::Left => [-1.0, 0.0],
-        Direction::Right => [1.0, 0.0],
-        Direction::Up => [0.0, 1.0],
-        Direction::Down => [0.0, -1.0],
-        Direction::In | Direction::Out => [0.0, 0.0],
-    }
-}
-
 impl UpdateContext<'_> {
     /// Replaces the camera by the result of `f`. The arguments of `f` are the camera and the
     /// distance from the eye to the pivot, the point that the camera orbits. `coalesce` decides if
@@ -54,12 +42,12 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn orbit(&mut self, direction: Direction) {
-        let [right, up] = right_up(direction).map(|x| x * ORBIT_DEGREES);
+        let [right, up, _] = direction.unit().map(|x| x * ORBIT_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.orbit(right, up, distance));
     }
 
     pub(super) fn pan(&mut self, direction: Direction) {
-        let [right, up] = right_up(direction).map(|x| x * PAN_SHARE);
+        let [right, up, _] = direction.unit().map(|x| x * PAN_SHARE);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.pan(right, up, distance));
     }
 
@@ -80,23 +68,18 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn look(&mut self, direction: Direction) {
-        let [right, up] = right_up(direction).map(|x| x * LOOK_DEGREES);
+        let [right, up, _] = direction.unit().map(|x| x * LOOK_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, _| camera.look(right, up));
     }
 
     pub(super) fn fly(&mut self, direction: Direction) {
         let step = 2.0 * step_length(self.scene());
-        let [right, up] = right_up(direction).map(|x| x * step);
-        let ahead = match direction {
-            Direction::In => step,
-            Direction::Out => -step,
-            _ => 0.0,
-        };
-        self.set_camera(Coalesce::Repeat, |camera, _| camera.fly([right, up, ahead]));
+        let movement = direction.unit().map(|x| x * step);
+        self.set_camera(Coalesce::Repeat, |camera, _| camera.fly(movement));
     }
 
     pub(super) fn roll(&mut self, direction: Direction) {
-        let degrees = right_up(direction)[0] * ORBIT_DEGREES;
+        let degrees = direction.unit()[0] * ORBIT_DEGREES;
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 

@@ -10,33 +10,7 @@ use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
 use crate::dashboard::update::UpdateContext;
 use crate::terminal::event::Key;
-use std::collections::HashMap;
-use std::sync::OnceLock;
-use {Chapter as C, HintLine as H};
-
-/// Chapter of the help, which groups commands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Chapter {
-    /// Commands on the camera and on stored cameras.
-    Camera,
-    /// Commands on lights.
-    Light,
-    /// Commands on the mirror. This is a reflecting material of the selection if there
-    /// is one, otherwise a reflecting material elsewhere in the scene.
-    Mirror,
-    /// Commands on objects.
-    Objects,
-    /// Commands on panels, on properties and on the selection.
-    Panels,
-    /// Commands on undo, files and quitting.
-    File,
-    /// Commands on display, export and comparison of the picture.
-    Picture,
-    /// Commands on progress and resources of rendering.
-    Render,
-    /// Commands that open the help.
-    Help,
-}
+use HintLine as H;
 
 /// State of the dashboard that selects the hints in the hint line, the last row of the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -74,8 +48,9 @@ pub struct Hint {
 /// Command of the dashboard: a row of the command table.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Chapter of the help that lists the command.
-    pub chapter: Chapter,
+    /// Heading of the chapter of the help that lists the command. The commands of a chapter follow
+    /// each other in the table.
+    pub chapter: &'static str,
     /// Description in a few words, for help, command palette and docs/keys.md. Each command has a
     /// different description.
     pub label: &'static str,
@@ -100,7 +75,7 @@ pub struct Command {
 }
 
 const fn command(
-    chapter: Chapter,
+    chapter: &'static str,
     label: &'static str,
     keys: &'static [(KeyContext, &'static str)],
     run: fn(&mut UpdateContext<'_>),
@@ -146,100 +121,100 @@ fn always(_: &Model) -> bool {
 /// All commands of the dashboard, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command(C::Camera, "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
-    command(C::Camera, "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
-    command(C::Camera, "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
-    command(C::Camera, "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),
-    command(C::Camera, "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
-    command(C::Camera, "dolly out", &[(Picture, "PageDown")], |c| c.dolly(Out, Coarse)),
-    command(C::Camera, "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(In, Fine)),
-    command(C::Camera, "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(Out, Fine)),
-    command(C::Camera, "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
-    command(C::Camera, "pan right", &[(Picture, "Shift-Right")], |c| c.pan(Right)),
-    command(C::Camera, "pan up", &[(Picture, "Shift-Up")], |c| c.pan(Up)),
-    command(C::Camera, "pan down", &[(Picture, "Shift-Down")], |c| c.pan(Down)),
-    command(C::Camera, "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::In(Flying)], 4, "arrows", "look")]),
-    command(C::Camera, "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(Right)),
-    command(C::Camera, "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(Up)),
-    command(C::Camera, "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(Down)),
-    command(C::Camera, "roll left", &[(Picture, "Alt-Left")], |c| c.roll(Left)),
-    command(C::Camera, "roll right", &[(Picture, "Alt-Right")], |c| c.roll(Right)),
-    command(C::Camera, "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
-    command(C::Camera, "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
-    command(C::Camera, "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
-    command(C::Camera, "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
-    command(C::Camera, "fly back", &[(Flying, "s")], |c| c.fly(Out)),
-    command(C::Camera, "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::In(Flying)], 2, "a d", "left, right")]),
-    command(C::Camera, "fly right", &[(Flying, "d")], |c| c.fly(Right)),
-    command(C::Camera, "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::In(Flying)], 3, "r f", "up, down")]),
-    command(C::Camera, "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
-    command(C::Camera, "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
-    command(C::Camera, "reset the camera to the file", &[(Picture, "Home")], |c| c.reset_camera()),
-    command(C::Camera, "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
-    command(C::Camera, "close the aperture", &[(Anywhere, "/")], |c| c.aperture(-1.0)),
-    command(C::Camera, "focus on the probe or the selection", &[(Anywhere, "F")], |c| c.focus()),
-    command(C::Camera, "store this viewpoint", &[(Anywhere, "n")], |c| c.ask_view_name()),
-    command(C::Camera, "go to viewpoint 1", &[(Anywhere, "1")], |c| c.recall_view(1)),
-    command(C::Camera, "go to viewpoint 2", &[(Anywhere, "2")], |c| c.recall_view(2)),
-    command(C::Camera, "go to viewpoint 3", &[(Anywhere, "3")], |c| c.recall_view(3)),
-    command(C::Camera, "go to viewpoint 4", &[(Anywhere, "4")], |c| c.recall_view(4)),
-    command(C::Camera, "go to viewpoint 5", &[(Anywhere, "5")], |c| c.recall_view(5)),
-    command(C::Camera, "go to viewpoint 6", &[(Anywhere, "6")], |c| c.recall_view(6)),
-    command(C::Camera, "go to viewpoint 7", &[(Anywhere, "7")], |c| c.recall_view(7)),
-    command(C::Camera, "go to viewpoint 8", &[(Anywhere, "8")], |c| c.recall_view(8)),
-    command(C::Camera, "go to viewpoint 9", &[(Anywhere, "9")], |c| c.recall_view(9)),
+    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
+    command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
+    command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
+    command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),
+    command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
+    command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(Out, Coarse)),
+    command("camera", "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(In, Fine)),
+    command("camera", "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(Out, Fine)),
+    command("camera", "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
+    command("camera", "pan right", &[(Picture, "Shift-Right")], |c| c.pan(Right)),
+    command("camera", "pan up", &[(Picture, "Shift-Up")], |c| c.pan(Up)),
+    command("camera", "pan down", &[(Picture, "Shift-Down")], |c| c.pan(Down)),
+    command("camera", "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::In(Flying)], 4, "arrows", "look")]),
+    command("camera", "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(Right)),
+    command("camera", "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(Up)),
+    command("camera", "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(Down)),
+    command("camera", "roll left", &[(Picture, "Alt-Left")], |c| c.roll(Left)),
+    command("camera", "roll right", &[(Picture, "Alt-Right")], |c| c.roll(Right)),
+    command("camera", "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
+    command("camera", "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
+    command("camera", "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
+    command("camera", "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
+    command("camera", "fly back", &[(Flying, "s")], |c| c.fly(Out)),
+    command("camera", "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::In(Flying)], 2, "a d", "left, right")]),
+    command("camera", "fly right", &[(Flying, "d")], |c| c.fly(Right)),
+    command("camera", "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::In(Flying)], 3, "r f", "up, down")]),
+    command("camera", "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
+    command("camera", "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
+    command("camera", "reset the camera to the file", &[(Picture, "Home")], |c| c.reset_camera()),
+    command("camera", "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
+    command("camera", "close the aperture", &[(Anywhere, "/")], |c| c.aperture(-1.0)),
+    command("camera", "focus on the probe or the selection", &[(Anywhere, "F")], |c| c.focus()),
+    command("camera", "store this viewpoint", &[(Anywhere, "n")], |c| c.ask_view_name()),
+    command("camera", "go to viewpoint 1", &[(Anywhere, "1")], |c| c.recall_view(1)),
+    command("camera", "go to viewpoint 2", &[(Anywhere, "2")], |c| c.recall_view(2)),
+    command("camera", "go to viewpoint 3", &[(Anywhere, "3")], |c| c.recall_view(3)),
+    command("camera", "go to viewpoint 4", &[(Anywhere, "4")], |c| c.recall_view(4)),
+    command("camera", "go to viewpoint 5", &[(Anywhere, "5")], |c| c.recall_view(5)),
+    command("camera", "go to viewpoint 6", &[(Anywhere, "6")], |c| c.recall_view(6)),
+    command("camera", "go to viewpoint 7", &[(Anywhere, "7")], |c| c.recall_view(7)),
+    command("camera", "go to viewpoint 8", &[(Anywhere, "8")], |c| c.recall_view(8)),
+    command("camera", "go to viewpoint 9", &[(Anywhere, "9")], |c| c.recall_view(9)),
 
-    command(C::Light, "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::In(Picture)], 5, "l ; '", "light")]),
-    command(C::Light, "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)),
-    command(C::Light, "light darker", &[(Anywhere, ";")], |c| c.intensity(-1.0)),
-    command(C::Light, "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
-    command(C::Light, "light darker, fine", &[(Anywhere, "Alt-;")], |c| c.intensity(-0.1)),
-    command(C::Light, "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
-    command(C::Light, "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
+    command("light", "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::In(Picture)], 5, "l ; '", "light")]),
+    command("light", "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)),
+    command("light", "light darker", &[(Anywhere, ";")], |c| c.intensity(-1.0)),
+    command("light", "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
+    command("light", "light darker, fine", &[(Anywhere, "Alt-;")], |c| c.intensity(-0.1)),
+    command("light", "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
+    command("light", "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
 
-    command(C::Mirror, "mirror rougher", &[(Anywhere, "] .")], |c| c.roughness(1.0)).hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),
-    command(C::Mirror, "mirror smoother", &[(Anywhere, "[ ,")], |c| c.roughness(-1.0)),
-    command(C::Mirror, "mirror rougher, fine", &[(Anywhere, "} >")], |c| c.roughness(0.1)),
-    command(C::Mirror, "mirror smoother, fine", &[(Anywhere, "{ <")], |c| c.roughness(-0.1)),
-    command(C::Mirror, "mirror reflects more", &[(Anywhere, ")")], |c| c.reflection(1.0)),
-    command(C::Mirror, "mirror reflects less", &[(Anywhere, "(")], |c| c.reflection(-1.0)),
-    command(C::Mirror, "next lobe of the mirror", &[(Anywhere, "b \\")], |c| c.next_lobe()),
+    command("mirror", "mirror rougher", &[(Anywhere, "] .")], |c| c.roughness(1.0)).hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),
+    command("mirror", "mirror smoother", &[(Anywhere, "[ ,")], |c| c.roughness(-1.0)),
+    command("mirror", "mirror rougher, fine", &[(Anywhere, "} >")], |c| c.roughness(0.1)),
+    command("mirror", "mirror smoother, fine", &[(Anywhere, "{ <")], |c| c.roughness(-0.1)),
+    command("mirror", "mirror reflects more", &[(Anywhere, ")")], |c| c.reflection(1.0)),
+    command("mirror", "mirror reflects less", &[(Anywhere, "(")], |c| c.reflection(-1.0)),
+    command("mirror", "next lobe of the mirror", &[(Anywhere, "b \\")], |c| c.next_lobe()),
 
-    command(C::Objects, "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::In(Picture)], 6, "a", "add")]),
-    command(C::Objects, "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::In(Outline)], 4, "D", "duplicate")]),
-    command(C::Objects, "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 5, "x", "delete")]),
-    command(C::Objects, "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
-    command(C::Objects, "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::In(Picture), H::In(Outline)], 7, "m", "move")]),
-    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
-    command(C::Objects, "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
-    command(C::Objects, "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
-    command(C::Objects, "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
-    command(C::Objects, "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::In(Moving)], 2, "PgUp PgDn", "height")]),
-    command(C::Objects, "lower", &[(Moving, "PageDown")], |c| c.move_selection(Down, Coarse)),
-    command(C::Objects, "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::In(Moving)], 3, "Shift", "fine")]),
-    command(C::Objects, "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(Right, Fine)),
-    command(C::Objects, "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(In, Fine)),
-    command(C::Objects, "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
-    command(C::Objects, "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
-    command(C::Objects, "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
-    command(C::Objects, "turn the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
-    command(C::Objects, "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::In(Turning)], 1, "Left Right", "turn 15°")]),
-    command(C::Objects, "turn right", &[(Turning, "Right")], |c| c.turn_selection(Right, Coarse)),
-    command(C::Objects, "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::In(Turning)], 2, "Shift", "1°")]),
-    command(C::Objects, "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
-    command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
-    command(C::Objects, "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
+    command("objects", "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::In(Picture)], 6, "a", "add")]),
+    command("objects", "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::In(Outline)], 4, "D", "duplicate")]),
+    command("objects", "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 5, "x", "delete")]),
+    command("objects", "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
+    command("objects", "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::In(Picture), H::In(Outline)], 7, "m", "move")]),
+    command("objects", "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
+    command("objects", "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
+    command("objects", "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
+    command("objects", "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
+    command("objects", "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::In(Moving)], 2, "PgUp PgDn", "height")]),
+    command("objects", "lower", &[(Moving, "PageDown")], |c| c.move_selection(Down, Coarse)),
+    command("objects", "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::In(Moving)], 3, "Shift", "fine")]),
+    command("objects", "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(Right, Fine)),
+    command("objects", "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(In, Fine)),
+    command("objects", "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
+    command("objects", "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
+    command("objects", "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
+    command("objects", "turn the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
+    command("objects", "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::In(Turning)], 1, "Left Right", "turn 15°")]),
+    command("objects", "turn right", &[(Turning, "Right")], |c| c.turn_selection(Right, Coarse)),
+    command("objects", "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::In(Turning)], 2, "Shift", "1°")]),
+    command("objects", "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
+    command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
+    command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
 
-    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
-    command(C::Panels, "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
-    command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
+    command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
+    command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
+    command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
         hint(&[H::In(Moving), H::In(Turning), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
         hint(&[H::Reading], 9, "Esc", "close"),
     ]),
-    command(C::Panels, "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).while_watching().available(with_scene_or_choice).while_typing().hints(&[
+    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).while_watching().available(with_scene_or_choice).while_typing().hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
@@ -247,98 +222,73 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::Form], 4, "Enter", "add"),
         hint(&[H::Typing], 1, "Enter", "apply"),
     ]),
-    command(C::Panels, "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).while_watching().available(always).hints(&[
+    command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).while_watching().available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::List], 1, "Up Down", "choose"),
         hint(&[H::Reading], 1, "Up Down", "scroll"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
-    command(C::Panels, "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).while_watching().available(always),
-    command(C::Panels, "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).while_watching().available(always),
-    command(C::Panels, "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).while_watching().available(always),
-    command(C::Panels, "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).while_watching().available(always),
-    command(C::Panels, "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).while_watching().available(always),
-    command(C::Panels, "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::In(Inspector), H::Form], 2, "Left Right", "step")]),
-    command(C::Panels, "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
-    command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
-    command(C::Panels, "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
-    command(C::Panels, "reset the field to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
-    command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
+    command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).while_watching().available(always),
+    command("panels", "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).while_watching().available(always),
+    command("panels", "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).while_watching().available(always),
+    command("panels", "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).while_watching().available(always),
+    command("panels", "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).while_watching().available(always),
+    command("panels", "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::In(Inspector), H::Form], 2, "Left Right", "step")]),
+    command("panels", "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
+    command("panels", "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
+    command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
+    command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
+    command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
 
-    command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
-    command(C::File, "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
-    command(C::File, "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
-    command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
-    command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
-    command(C::File, "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
-    command(C::File, "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
-    command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
-    command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
+    command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
+    command("file", "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
+    command("file", "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
+    command("file", "save as", &[(Anywhere, "W")], |c| c.ask_path()),
+    command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
+    command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
+    command("file", "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
+    command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
+    command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
-    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
-    command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
-    command(C::Picture, "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
-    command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
-    command(C::Picture, "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
-    command(C::Picture, "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
-    command(C::Picture, "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).while_watching(),
-    command(C::Picture, "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).while_watching(),
-    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).while_watching(),
-    command(C::Picture, "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).while_watching(),
-    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
-    command(C::Picture, "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).while_watching(),
-    command(C::Picture, "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).while_watching().hints(&[hint(&[H::Watching], 4, "i", "probe")]),
-    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
-    command(C::Picture, "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).while_watching(),
-    command(C::Picture, "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).while_watching(),
-    command(C::Picture, "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).while_watching(),
-    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
-    command(C::Picture, "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).while_watching(),
-    command(C::Picture, "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).while_watching(),
-    command(C::Picture, "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).while_watching(),
-    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
-    command(C::Picture, "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).while_watching(),
-    command(C::Picture, "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).while_watching(),
+    command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
+    command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
+    command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
+    command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
+    command("picture", "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
+    command("picture", "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
+    command("picture", "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).while_watching(),
+    command("picture", "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).while_watching(),
+    command("picture", "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).while_watching(),
+    command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).while_watching(),
+    command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
+    command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).while_watching(),
+    command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).while_watching().hints(&[hint(&[H::Watching], 4, "i", "probe")]),
+    command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
+    command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).while_watching(),
+    command("picture", "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).while_watching(),
+    command("picture", "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).while_watching(),
+    command("picture", "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
+    command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).while_watching(),
+    command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).while_watching(),
+    command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).while_watching(),
+    command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
+    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).while_watching(),
+    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).while_watching(),
 
-    command(C::Render, "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
-    command(C::Render, "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
-    command(C::Render, "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()),
-    command(C::Render, "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
-    command(C::Render, "more threads", &[], |c| c.threads(1)),
-    command(C::Render, "fewer threads", &[], |c| c.threads(-1)),
-    command(C::Render, "low or normal priority", &[], |c| c.priority()),
-    command(C::Render, "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).while_watching().available(always),
+    command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
+    command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
+    command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()),
+    command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
+    command("rendering", "more threads", &[], |c| c.threads(1)),
+    command("rendering", "fewer threads", &[], |c| c.threads(-1)),
+    command("rendering", "low or normal priority", &[], |c| c.priority()),
+    command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).while_watching().available(always),
 
-    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
-    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
-    command(C::Help, "inventory of the scene", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
+    command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
+    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
+    command("help", "inventory of the scene", &[], |c| c.model.overlay = Some(Overlay::Inventory { scroll: 0 })),
 ];
-
-impl Chapter {
-    /// All chapters of the help with their headings, in order.
-    pub const ALL: [(Self, &'static str); 9] = [
-        (Self::Camera, "camera"),
-        (Self::Light, "light"),
-        (Self::Mirror, "mirror"),
-        (Self::Objects, "objects"),
-        (Self::Panels, "panels"),
-        (Self::File, "file"),
-        (Self::Picture, "picture"),
-        (Self::Render, "rendering"),
-        (Self::Help, "help"),
-    ];
-
-    /// Returns the heading of the chapter in the help.
-    pub fn title(self) -> &'static str {
-        Self::ALL[self as usize].1
-    }
-
-    /// Returns the commands of the chapter, in the order of the table.
-    pub fn commands(self) -> impl Iterator<Item = &'static Command> {
-        COMMANDS.iter().filter(move |command| command.chapter == self)
-    }
-}
 
 impl Command {
     const fn available(self, available: fn(&Model) -> bool) -> Self {
@@ -396,17 +346,12 @@ impl Command {
 /// Returns the command that `key` runs in `context`. Returns `None` if the key has no command
 /// there.
 pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
-    static KEYMAP: OnceLock<HashMap<(KeyContext, Key), &'static Command>> = OnceLock::new();
-    let keymap = KEYMAP.get_or_init(|| {
-        let mut keymap = HashMap::new();
-        for command in COMMANDS {
-            for (context, names) in command.keys {
-                // Invalid names of keys are skipped here; a test of the table rejects them.
-                let keys = names.split(' ').filter_map(|name| name.parse().ok());
-                keymap.extend(keys.map(|key| ((*context, key), command)));
-            }
-        }
-        keymap
-    });
-    context.chain().iter().find_map(|context| keymap.get(&(*context, key)).copied())
+    let name = key.to_string();
+    let has_key = |(context, names): &(KeyContext, &str), wanted| {
+        *context == wanted && names.split(' ').any(|known| known == name)
+    };
+    let command_in = |context| {
+        COMMANDS.iter().find(|command| command.keys.iter().any(|keys| has_key(keys, context)))
+    };
+    context.chain().find_map(command_in)
 }

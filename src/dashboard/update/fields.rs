@@ -2,7 +2,7 @@
 //! values.
 
 use crate::dashboard::editor::Editor;
-use crate::dashboard::overlay::{Overlay, PickFor};
+use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{FieldLine, walk_fields};
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Widget};
@@ -24,7 +24,8 @@ impl UpdateContext<'_> {
     /// Returns the line under the cursor of the open form, or of the inspector if no form is open.
     /// Returns `None` if the line shows no property, such as a heading.
     pub(super) fn field(&self) -> Option<FieldLine> {
-        self.model.field_lines().get(self.model.field_list().cursor)?.field().cloned()
+        let lines = self.model.field_lines();
+        Some(*lines.get(self.model.field_list().cursor)?.entry()?.clone())
     }
 
     /// Starts the input of a value for the property under the cursor. `typed` is the character that
@@ -40,8 +41,9 @@ impl UpdateContext<'_> {
             None if field.property.entry == Widget::Switch => self.step_field(1.0),
             None if chosen && !self.in_form() => {
                 let cursor = words.iter().position(|word| word.name == field.value);
-                let purpose = PickFor::Word(field.subject, field.property.key);
-                self.open_pick(purpose, field.label, words, cursor.unwrap_or(0));
+                self.open_pick(field.label, words, cursor.unwrap_or(0), |c, word| {
+                    c.fill_field(word)
+                });
             }
             Some(' ') if chosen || field.property.entry == Widget::Switch => self.step_field(1.0),
             Some(' ') => {}
@@ -111,16 +113,11 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn clear_field(&mut self) {
+    /// Sets the property under the cursor to `value`; an empty text stands for the default.
+    pub(super) fn fill_field(&mut self, value: &str) {
         if let Some(field) = self.field() {
-            let edit = edit::set(self.scene(), &field.subject, &field.property.key, "");
+            let edit = edit::set(self.scene(), &field.subject, &field.property.key, value);
             self.commit(edit, Coalesce::Single);
         }
-    }
-
-    /// Sets the property `key` of `subject` to the value `word`, which was chosen from a list.
-    pub(super) fn set_word(&mut self, subject: &edit::Target, key: &str, word: &str) {
-        let edit = edit::set(self.scene(), subject, key, word);
-        self.commit(edit, Coalesce::Single);
     }
 }

@@ -2,10 +2,10 @@
 //! exports.
 
 use crate::dashboard::message::{Effect, Exported};
-use crate::dashboard::model::{Tone, short_name};
+use crate::dashboard::model::{Tone, first_line, short_name};
 use crate::dashboard::overlay::Answer;
 use crate::dashboard::update::UpdateContext;
-use crate::scene::edit::Target;
+use crate::scene::edit::{Target, outline};
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::value::sanitized;
 use std::path::PathBuf;
@@ -14,6 +14,7 @@ use std::sync::Arc;
 const KEEP_FILE: (char, &str, Answer) = ('k', "keep the file on disk", Answer::Nothing);
 const KEEP_EDITS: (char, &str, Answer) = ('k', "keep my edits", Answer::Nothing);
 const OVERWRITE: (char, &str, Answer) = ('o', "overwrite it", Answer::Overwrite(None));
+const STAY: (char, &str, Answer) = ('c', "stay", Answer::Nothing);
 const SAVE_AS: (char, &str, Answer) = ('s', "save under another name", Answer::SaveAs);
 
 impl UpdateContext<'_> {
@@ -132,18 +133,15 @@ impl UpdateContext<'_> {
                 self.model.file.broken = None;
                 self.model.file.unreadable = false;
                 self.model.history.restart(scene);
-                let outline = crate::scene::edit::outline(self.scene());
-                let same = |(_, subject): &(_, Target)| subject.title(self.scene()) == title;
-                let found = outline.iter().find(|entry| same(entry));
-                let found = found.map_or(Target::Camera, |(_, subject)| subject.clone());
+                let mut subjects = outline(self.scene()).into_iter().map(|(_, subject)| subject);
+                let found = subjects.find(|subject| subject.title(self.scene()) == title);
                 self.model.inspector.editor = None;
-                self.select(found);
+                self.select(found.unwrap_or(Target::Camera));
                 self.show();
                 self.say(format!("read {}", self.model.file.name));
             }
             Err(errors) => {
-                let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
-                let text = first.lines().map(str::trim).collect::<Vec<_>>().join(" ");
+                let text = first_line(&errors);
                 self.model.file.broken = Some(errors);
                 if !self.model.file.unreadable {
                     self.notify(Tone::Bad, text, None);
@@ -155,19 +153,11 @@ impl UpdateContext<'_> {
     pub(super) fn quit(&mut self) {
         if self.model.is_unsaved() && !self.model.file.unreadable {
             let text = format!("{} has unsaved edits.", self.model.file.name);
-            self.ask(
-                text,
-                &[
-                    ('s', "save and quit", Answer::SaveAndQuit),
-                    ('d', "discard them and quit", Answer::Quit),
-                    ('c', "stay", Answer::Nothing),
-                ],
-            );
+            let discard = ('d', "discard them and quit", Answer::Quit);
+            self.ask(text, &[('s', "save and quit", Answer::SaveAndQuit), discard, STAY]);
         } else if self.model.export.is_some() {
-            self.ask(
-                "A picture is still being rendered.".to_string(),
-                &[('c', "stay", Answer::Nothing), ('q', "quit without it", Answer::Quit)],
-            );
+            let text = "A picture is still being rendered.".to_string();
+            self.ask(text, &[STAY, ('q', "quit without it", Answer::Quit)]);
         } else {
             self.emit(Effect::Quit);
         }
@@ -177,10 +167,7 @@ impl UpdateContext<'_> {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
                 // If the image has the size of the export in the background, this export has ended.
-                if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
-                {
-                    self.model.export = None;
-                }
+                self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
                 let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
                     "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",

@@ -2,33 +2,35 @@
 //! picture previews the new object or light.
 
 use crate::dashboard::model::FieldList;
-use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
+use crate::dashboard::overlay::{Form, Overlay, Pick};
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Word};
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
-        let kinds = edit::object_kinds();
-        self.open_pick(PickFor::Object, "add an object".to_string(), kinds, 0);
+        self.open_pick("add an object".to_string(), edit::object_kinds(), 0, |c, kind| {
+            c.open_form(kind, edit::add_object(c.scene(), kind, None));
+        });
     }
 
     pub(super) fn pick_light(&mut self) {
-        self.open_pick(PickFor::Light, "add a light".to_string(), edit::light_kinds(), 0);
+        self.open_pick("add a light".to_string(), edit::light_kinds(), 0, |c, kind| {
+            c.open_form(&format!("{kind} light"), edit::add_light(c.scene(), kind));
+        });
     }
 
-    /// Opens a list of `words`, which are names with descriptions. The user picks one for
-    /// `purpose`. The cursor starts on the word with index `cursor`.
+    /// Opens a list of `words`, which are names with descriptions. The user picks one, which is
+    /// passed to `take`. The cursor starts on the word with index `cursor`.
     pub(super) fn open_pick(
         &mut self,
-        purpose: PickFor,
         title: String,
         words: Vec<Word>,
         cursor: usize,
+        take: fn(&mut UpdateContext<'_>, &str),
     ) {
         let entries = words.into_iter().map(|word| (word.name, word.doc.to_string())).collect();
-        self.model.overlay =
-            Some(Overlay::Pick(Pick { purpose, title, entries, cursor, scroll: 0 }));
+        self.model.overlay = Some(Overlay::Pick(Pick { title, entries, cursor, scroll: 0, take }));
     }
 
     /// Opens the form for a new object or light of the kind `what`. `edit` is the edit that adds it

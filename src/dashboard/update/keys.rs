@@ -42,9 +42,7 @@ impl Model {
 impl UpdateContext<'_> {
     pub(super) fn key(&mut self, key: Key) {
         self.model.first_time = false;
-        if self.model.notice.as_ref().is_some_and(|notice| notice.until.is_none()) {
-            self.model.notice = None;
-        }
+        self.model.notice.take_if(|notice| notice.until.is_none());
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
             match lookup(KeyContext::Overlay, key).filter(|command| command.over_image) {
                 Some(command) => self.run(command),

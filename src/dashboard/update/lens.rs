@@ -3,7 +3,7 @@
 use crate::camera::{Aperture, Camera};
 use crate::dashboard::update::mouse::first_hit;
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, EditError, bounds};
+use crate::scene::edit::{self, bounds};
 use crate::value::{number, round_significant};
 
 impl UpdateContext<'_> {
@@ -31,19 +31,12 @@ impl UpdateContext<'_> {
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
         match first_hit(self.scene(), pixel) {
             Some((_, point)) => self.focus_on(point.to_array()),
-            None => self.commit_lens(Err(EditError {
-                found: "There is no object to focus on here".to_string(),
-                help: String::new(),
-            })),
+            None => self.refuse("There is no object to focus on here."),
         }
     }
 
     fn focus_on(&mut self, point: [f64; 3]) {
         let edit = edit::focus_on(self.scene(), point);
-        self.commit_lens(edit);
-    }
-
-    fn commit_lens(&mut self, edit: Result<edit::Edit, EditError>) {
         let is_ok = edit.is_ok();
         self.commit(edit, Coalesce::Single);
         if is_ok {

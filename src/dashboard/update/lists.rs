@@ -4,13 +4,13 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, PickFor, Question};
+use crate::dashboard::message::Effect;
+use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
-use crate::scene::edit;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
@@ -71,10 +71,10 @@ impl UpdateContext<'_> {
     fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let position = lines[..before].iter().filter_map(OutlineLine::subject).count();
-        let subjects: Vec<_> = lines.iter().filter_map(OutlineLine::subject).collect();
-        if let Some(subject) = subjects.get(moved(position, steps, subjects.len())) {
-            self.select((*subject).clone());
+        let position = lines[..before].iter().filter_map(OutlineLine::entry).count();
+        let entries: Vec<_> = lines.iter().filter_map(OutlineLine::entry).collect();
+        if let Some(entry) = entries.get(moved(position, steps, entries.len())) {
+            self.select(entry.subject.clone());
         }
     }
 
@@ -96,18 +96,9 @@ impl UpdateContext<'_> {
             }
             Some(Overlay::Pick(pick)) => {
                 let Some((name, _)) = pick.entries.get(pick.cursor).cloned() else { return };
-                let purpose = pick.purpose.clone();
+                let take = pick.take;
                 self.model.overlay = None;
-                match purpose {
-                    PickFor::Object => {
-                        self.open_form(&name, edit::add_object(self.scene(), &name, None));
-                    }
-                    PickFor::Light => {
-                        let added = edit::add_light(self.scene(), &name);
-                        self.open_form(&format!("{name} light"), added);
-                    }
-                    PickFor::Word(subject, key) => self.set_word(&subject, &key, &name),
-                }
+                take(self, &name);
             }
             Some(Overlay::Form(form)) => {
                 if form.fields.editor.is_none() {
@@ -143,10 +134,6 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn open_overlay(&mut self, overlay: Overlay) {
-        self.model.overlay = Some(overlay);
-    }
-
     pub(super) fn open_command_palette(&mut self) {
         self.model.overlay = Some(Overlay::CommandPalette(CommandPalette {
             editor: Editor::default(),
@@ -173,7 +160,7 @@ impl UpdateContext<'_> {
         let mut buffer = Vec::new();
         let mut found: Vec<(u32, usize)> = offered
             .filter_map(|(i, row)| {
-                let line = format!("{} {}", row.label, row.chapter.title());
+                let line = format!("{} {}", row.label, row.chapter);
                 let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;
                 Some((score, i))
             })
@@ -217,8 +204,8 @@ impl UpdateContext<'_> {
                 self.model.quit_when_saved = true;
                 self.save();
             }
-            Answer::Quit => self.emit(crate::dashboard::update::Effect::Quit),
-            Answer::Load => self.emit(crate::dashboard::update::Effect::Load),
+            Answer::Quit => self.emit(Effect::Quit),
+            Answer::Load => self.emit(Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
             Answer::Recover => self.recover(),

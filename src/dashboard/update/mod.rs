@@ -42,14 +42,14 @@ const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 /// fixed origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext { model, now, effects: Vec::new(), follow: true, typed: None };
-    context.expire_notice();
+    context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
     context.handle(message);
     context.normalize();
     context.effects
 }
 
 /// Context of one call of [`update`]: the model, the time, and the effects so far.
-struct UpdateContext<'a> {
+pub(super) struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
@@ -71,6 +71,20 @@ enum Direction {
     In,
     /// Direction backwards, towards the eye.
     Out,
+}
+
+impl Direction {
+    /// Returns the direction as a unit vector: to the right, upwards, forwards.
+    fn unit(self) -> [f64; 3] {
+        match self {
+            Self::Left => [-1.0, 0.0, 0.0],
+            Self::Right => [1.0, 0.0, 0.0],
+            Self::Down => [0.0, -1.0, 0.0],
+            Self::Up => [0.0, 1.0, 0.0],
+            Self::Out => [0.0, 0.0, -1.0],
+            Self::In => [0.0, 0.0, 1.0],
+        }
+    }
 }
 
 /// Size of the step by which a command changes a value.
@@ -273,14 +287,6 @@ impl UpdateContext<'_> {
             form.problem = Some(sanitized(text));
         } else {
             self.notify(Tone::Bad, text, Some(5.0));
-        }
-    }
-
-    /// Removes the notice if its time has passed.
-    fn expire_notice(&mut self) {
-        let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
-        if self.model.notice.as_ref().is_some_and(over) {
-            self.model.notice = None;
         }
     }
 

@@ -2,7 +2,7 @@
 //! or scrolls.
 
 use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Drag, Mode};
+use crate::dashboard::model::{Drag, FieldList, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
@@ -67,7 +67,9 @@ impl UpdateContext<'_> {
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
-            self.press_in_inspector(rows, mouse);
+            let focused = self.model.focus == Focus::Inspector;
+            self.set_focus(Focus::Inspector);
+            self.press_in_fields(rows, focused, mouse);
         } else if let Some(rows) = self.model.outline_rows()
             && is_in(mouse, layout.outline)
         {
@@ -80,7 +82,7 @@ impl UpdateContext<'_> {
         // change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
-        let subject = line.and_then(OutlineLine::subject).cloned();
+        let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
         let again =
             self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
@@ -91,17 +93,18 @@ impl UpdateContext<'_> {
         }
     }
 
-    fn press_in_inspector(&mut self, rows: Rect, mouse: Mouse) {
+    /// Opens the clicked property of the inspector or form if the cursor is on it already, otherwise
+    /// moves the cursor there. `rows` is the area of the list. `focused` is `true` if the list had
+    /// the focus before the click.
+    fn press_in_fields(&mut self, rows: Rect, focused: bool, mouse: Mouse) {
+        let FieldList { cursor, scroll, editor } = self.model.field_list();
+        let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
+        let opens = focused && editor.is_none();
         let lines = self.model.field_lines();
-        let line = line_at(rows, self.model.inspector.scroll, mouse);
-        let line = line.filter(|line| lines.get(*line).and_then(PanelLine::field).is_some());
-        let again =
-            self.model.focus == Focus::Inspector && line == Some(self.model.inspector.cursor);
-        self.set_focus(Focus::Inspector);
-        match line {
-            Some(_) if again => self.open_field(None),
-            Some(line) => self.model.inspector.cursor = line,
-            None => {}
+        match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
+            Some(line) if opens && line == cursor => self.open_field(None),
+            Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
+            _ => {}
         }
     }
 
@@ -110,17 +113,7 @@ impl UpdateContext<'_> {
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.overlay_layout() else { return };
         match &self.model.overlay {
-            Some(Overlay::Form(form)) => {
-                let (cursor, typing) = (form.fields.cursor, form.fields.editor.is_some());
-                let line = line_at(layout.list, form.fields.scroll, mouse);
-                let lines = self.model.field_lines();
-                match line.filter(|i| lines.get(*i).and_then(PanelLine::field).is_some()) {
-                    Some(line) if line == cursor && !typing => self.open_field(None),
-                    Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
-                    _ => {}
-                }
-                return;
-            }
+            Some(Overlay::Form(_)) => return self.press_in_fields(layout.list, true, mouse),
             Some(Overlay::ViewerImage(_)) => return self.close_viewer(),
             _ => {}
         }
@@ -210,39 +203,33 @@ impl UpdateContext<'_> {
     }
 
     fn scrolled(&mut self, ticks: i32, mouse: Mouse) {
-        let lines = -(ticks.clamp(-100, 100) * WHEEL_LINES) as isize;
-        if self.model.overlay.is_some() {
-            let over_list = matches!(
-                self.model.overlay,
-                Some(Overlay::Help { .. } | Overlay::Inventory { .. })
-            );
-            self.move_cursor(if over_list { lines } else { -(ticks.clamp(-100, 100) as isize) });
+        let ticks = ticks.clamp(-100, 100);
+        let lines = -(ticks * WHEEL_LINES) as isize;
+        if let Some(overlay) = &self.model.overlay {
+            let is_text = matches!(overlay, Overlay::Help { .. } | Overlay::Inventory { .. });
+            self.move_cursor(if is_text { lines } else { -ticks as isize });
             return;
         }
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {
             return;
         };
-        if is_in(mouse, layout.picture) {
-            self.dolly_by_wheel(ticks);
-        } else if is_in(mouse, layout.inspector) {
+        let scroll = if is_in(mouse, layout.inspector) {
             let rows = self.model.inspector_rows().map(|(rows, _)| rows).unwrap_or_default();
-            let under = line_at(rows, self.model.inspector.scroll, mouse);
-            let typing = self.model.inspector.editor.is_some();
-            if self.model.focus == Focus::Inspector
-                && under == Some(self.model.inspector.cursor)
-                && !typing
-            {
-                self.step_field(f64::from(ticks.clamp(-100, 100)));
-            } else {
-                let scroll = &mut self.model.inspector.scroll;
-                *scroll = scroll.saturating_add_signed(lines);
-                self.follow = false;
+            let FieldList { cursor, scroll, editor } = &mut self.model.inspector;
+            let is_chosen = line_at(rows, *scroll, mouse) == Some(*cursor) && editor.is_none();
+            if self.model.focus == Focus::Inspector && is_chosen {
+                return self.step_field(f64::from(ticks));
             }
+            scroll
         } else if is_in(mouse, layout.outline) {
-            let scroll = &mut self.model.outline_scroll;
-            *scroll = scroll.saturating_add_signed(lines);
-            self.follow = false;
-        }
+            &mut self.model.outline_scroll
+        } else if is_in(mouse, layout.picture) {
+            return self.dolly_by_wheel(ticks);
+        } else {
+            return;
+        };
+        *scroll = scroll.saturating_add_signed(lines);
+        self.follow = false;
     }
 }
 

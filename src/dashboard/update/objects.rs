@@ -34,17 +34,9 @@ impl UpdateContext<'_> {
     pub(super) fn move_selection(&mut self, direction: Direction, step_size: StepSize) {
         let coarse = step_length(self.scene());
         let step = if step_size == StepSize::Fine { 0.1 * coarse } else { coarse };
+        let [x, y, z] = direction.unit();
         let [right, away] = self.ground_axes();
-        let by = step
-            * match direction {
-                Direction::Left => -right,
-                Direction::Right => right,
-                Direction::In => away,
-                Direction::Out => -away,
-                Direction::Up => DVec3::Y,
-                Direction::Down => DVec3::NEG_Y,
-            };
-        self.move_by(by);
+        self.move_by(step * (x * right + y * DVec3::Y + z * away));
     }
 
     fn move_by(&mut self, by: DVec3) {

@@ -3,7 +3,7 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
-use crate::dashboard::overlay::{Overlay, Prompt, PromptFor};
+use crate::dashboard::overlay::{Overlay, Prompt};
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::render::schedule::Stop;
 use crate::scene::edit::{self, Target};
@@ -12,10 +12,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
-    fn prompt(&mut self, purpose: PromptFor, title: &str, help: &str, text: impl Into<String>) {
+    /// Opens a prompt with `text`, which the user edits and which is then passed to `apply`.
+    fn prompt(
+        &mut self,
+        title: &str,
+        help: &str,
+        text: impl Into<String>,
+        apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
+    ) {
         let (title, help) = (title.to_string(), help.to_string());
         let editor = Editor::new(text);
-        self.model.overlay = Some(Overlay::Prompt(Prompt { purpose, title, help, editor }));
+        self.model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply }));
     }
 
     pub(super) fn ask_path(&mut self) {
@@ -23,18 +30,14 @@ impl UpdateContext<'_> {
             Some(path) => path.display().to_string(),
             None => self.model.file.name.clone(),
         };
-        self.prompt(
-            PromptFor::SaveAs,
-            "save as",
-            "A path. An existing file is overwritten only after confirmation.",
-            path,
-        );
+        let help = "A path. An existing file is overwritten only after confirmation.";
+        self.prompt("save as", help, path, |c, path| c.save_to(path));
     }
 
     pub(super) fn ask_name(&mut self) {
-        let subject = self.model.selection.clone();
-        let scene = self.scene();
-        let name = match &subject {
+        let (scene, subject) = (self.scene(), &self.model.selection);
+        let label = subject.label(scene);
+        let name = match subject {
             Target::Light(i) => scene.lights.get(*i).map(|light| light.name.clone()),
             Target::Object(i) => scene.objects.get(*i).map(|object| object.name.clone()),
             Target::Material(name) | Target::View(name) => Some(name.clone()),
@@ -42,14 +45,10 @@ impl UpdateContext<'_> {
         };
         match name {
             Some(name) => {
-                let title = format!("rename {}", subject.label(self.scene()));
                 let help = "A name that is unique among its kind.";
-                self.prompt(PromptFor::Rename(subject), &title, help, name);
+                self.prompt(&format!("rename {label}"), help, name, |c, name| c.rename(name));
             }
-            None => {
-                let label = subject.label(self.scene());
-                self.refuse(&format!("{label} has no name to change"));
-            }
+            None => self.refuse(&format!("{label} has no name to change")),
         }
     }
 
@@ -58,14 +57,15 @@ impl UpdateContext<'_> {
         let free = (count + 1..).map(|n| format!("view {n}"));
         let name = free.into_iter().find(|name| !self.scene().cameras.contains_key(name));
         let help = "A name for this viewpoint; keys 1 to 9 recall it.";
-        self.prompt(PromptFor::StoreView, "store this viewpoint", help, name.unwrap_or_default());
+        let name = name.unwrap_or_default();
+        self.prompt("store this viewpoint", help, name, |c, name| c.store_view(name));
     }
 
     pub(super) fn ask_stop(&mut self) {
         let help = "noise 0.5 (8-bit levels), rmse 0.001 (linear), spp 1000, time 60 (seconds): one or \
                     more, whichever comes first; or none";
         let now = stop_text(&self.model.stop);
-        self.prompt(PromptFor::StopAt, "stop at", help, now);
+        self.prompt("stop at", help, now, |c, text| parse_stop(text).map(|stop| c.set_stop(stop)));
     }
 
     pub(super) fn ask_export_size(&mut self) {
@@ -77,22 +77,15 @@ impl UpdateContext<'_> {
         let [width, height] = self.scene().film.size;
         let text = format!("{}x{} png", 2 * width, 2 * height);
         let help = "Width x height in pixels, then png or exr. Rendered to the same target.";
-        self.prompt(PromptFor::ExportSized, "render at another size", help, text);
+        self.prompt("render at another size", help, text, |c, text| c.export_sized(text));
     }
 
     /// Applies the text of the open prompt and closes it. If the text is not valid, the prompt
     /// stays open and shows the reason.
     pub(super) fn answer_prompt(&mut self) {
         let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
-        let (purpose, text) = (prompt.purpose.clone(), prompt.editor.text().trim().to_string());
-        let answered = match purpose {
-            PromptFor::SaveAs => self.save_to(&text),
-            PromptFor::Rename(subject) => self.rename(&subject, &text),
-            PromptFor::StoreView => self.store_view(&text),
-            PromptFor::StopAt => parse_stop(&text).map(|stop| self.set_stop(stop)),
-            PromptFor::ExportSized => self.export_sized(&text),
-        };
-        match (answered, &mut self.model.overlay) {
+        let (apply, text) = (prompt.apply, prompt.editor.text().trim().to_string());
+        match (apply(self, &text), &mut self.model.overlay) {
             (Err(problem), Some(Overlay::Prompt(prompt))) => prompt.editor.problem = Some(problem),
             // The prompt is closed only if the answer has not replaced it by another overlay.
             (Ok(()), overlay @ Some(Overlay::Prompt(_))) => *overlay = None,
@@ -115,7 +108,8 @@ impl UpdateContext<'_> {
         Ok(())
     }
 
-    fn rename(&mut self, subject: &Target, text: &str) -> Result<(), String> {
+    fn rename(&mut self, text: &str) -> Result<(), String> {
+        let subject = &self.model.selection;
         let edit = edit::rename(self.scene(), subject, text).map_err(|e| e.to_string())?;
         self.commit_and_select(Ok(edit));
         Ok(())
@@ -145,7 +139,7 @@ impl UpdateContext<'_> {
         let film = edit::set(self.scene(), &Target::Film, "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
-        self.model.export = Some(RunningExport { size, format, progress: 0.0 });
+        self.model.export = Some(RunningExport { size, progress: 0.0 });
         let (display, stop) = (self.model.display, self.model.stop);
         self.emit(Effect::ExportSized { scene: Arc::new(scene), format, display, stop });
         self.say(format!("rendering {}x{} beside this picture · Ctrl-x cancels", size[0], size[1]));

@@ -60,7 +60,7 @@ impl Fields<'_> {
     /// cursor is hidden.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let label = |line: &PanelLine| {
-            line.field().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
+            line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
         };
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
@@ -70,7 +70,7 @@ impl Fields<'_> {
             let to = Row::new(buffer, self.list, row);
             match &self.lines[i] {
                 PanelLine::Heading(title) => heading(to, title, theme),
-                PanelLine::Field(field) => {
+                PanelLine::Entry(field) => {
                     let position = self.field(field, i == self.state.cursor, labels, to, theme);
                     typing = typing.or(position);
                 }
@@ -130,7 +130,7 @@ impl Fields<'_> {
     /// help is the reason. Otherwise it is the property's description and a description of its
     /// valid values.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
-        let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::field) else {
+        let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::entry) else {
             return;
         };
         let problem =
@@ -158,7 +158,8 @@ fn expected(property: &Property) -> String {
     }
 }
 
-fn heading(mut to: Row, title: &str, theme: &Theme) {
+/// Draws the heading `title` with a line up to the last column but one of the row `to`.
+pub fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
     let left = to.left().saturating_sub(1);
     to.put(&"─".repeat(left), theme.border(false));
@@ -171,14 +172,14 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     if width == 0 {
         return None;
     }
-    let hidden = editor.scroll_columns(width);
+    let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
         Some(_) => theme.bad(),
         None => theme.accent(),
     });
-    let (x, y) = (to.x(), to.y());
+    let (x, y) = (to.x, to.y);
     to.put_wide(skip(editor.text(), hidden), width, style);
-    let column = editor.cursor_columns().saturating_sub(hidden).min(width) as u16;
+    let column = editor.input.visual_cursor().saturating_sub(hidden).min(width) as u16;
     Some(Position { x: x + column, y })
 }
 

@@ -35,12 +35,9 @@ pub fn draw(
     row.put(more, theme.dim());
     let place = image.place;
     if viewed.sent >= 1.0 && image.placeholder(0).is_some() {
-        for y in 0..place.height {
-            let Some((symbol, color)) = image.placeholder(y) else { continue };
-            for x in 0..place.width {
-                if let Some(cell) = buffer.cell_mut((place.x + x, place.y + y)) {
-                    cell.set_symbol(&symbol).set_style(Style::new().fg(Color::Indexed(color)));
-                }
+        for at in place.intersection(buffer.area).positions() {
+            if let Some((symbol, color)) = image.placeholder(at.y - place.y) {
+                buffer[at].set_symbol(&symbol).set_style(Style::new().fg(Color::Indexed(color)));
             }
         }
         return None;

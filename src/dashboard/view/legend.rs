@@ -57,7 +57,7 @@ impl Legend {
         };
         line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
         line.put(" ", theme.text());
-        let bar = Rect { x: line.x(), y: area.y + row, width: BAR as u16, height: 1 };
+        let bar = Rect { x: line.x, y: area.y + row, width: BAR as u16, height: 1 };
         line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
         if with_words {
             line.put(" ", Style::new()).put(&self.unit, theme.dim());

@@ -9,19 +9,14 @@ use crate::render::session::State;
 use crate::scene::Diagnostic;
 use crate::value::sanitized;
 use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
+use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
 
 /// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {
     let inner = layout.picture.inner(BORDER);
     let (x, y) = if inner.width > 50 && inner.height > 12 { (3, 1) } else { (1, 0) };
-    Rect {
-        x: inner.x + x,
-        y: inner.y + y,
-        width: inner.width.saturating_sub(2 * x),
-        height: inner.height.saturating_sub(2 * y),
-    }
+    inner.inner(Margin::new(x, y))
 }
 
 /// Draws the errors of a scene file that has never been readable since the start of the dashboard.

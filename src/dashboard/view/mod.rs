@@ -39,9 +39,9 @@ pub struct View {
     made_for: Option<Version>,
     picture: PictureCells,
     /// Rectangle of the screen in which the picture was last drawn.
-    place: Rect,
+    pub place: Rect,
     /// Row-major mask of the cells of `place`: `true` if no overlay or mark covers the cell.
-    uncovered: Vec<bool>,
+    pub uncovered: Vec<bool>,
 }
 
 /// Inputs of the picture's cells: the model's counter of changes of the picture, the columns and
@@ -63,16 +63,10 @@ impl View {
         &self.picture
     }
 
-    /// Returns two values: the rectangle of the screen in which the picture was last drawn, and the
-    /// row-major mask of its cells. The mask is `true` for a cell that nothing covers.
-    pub fn place(&self) -> (Rect, &[bool]) {
-        (self.place, &self.uncovered)
-    }
-
     /// Draws `model` into `buffer`, which must be empty and have the size of the model's screen.
     /// Returns the position of the text cursor, or `None` if the cursor is hidden.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
-        let theme = Theme::new(model.colors);
+        let theme = Theme { colors: model.colors };
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
             let cells = image_viewer::draw(model, viewed, &theme, buffer);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
@@ -99,8 +93,8 @@ impl View {
         status::hints_line(model, layout.hints, &theme, buffer);
         // An open form replaces the panels: outline, inspector and plot are not drawn then.
         let mut cursor = None;
-        if let Some(table) = &model.watch {
-            watch::draw(model, table, &layout, &theme, buffer);
+        if model.watch.is_some() {
+            watch::draw(model, &layout, &theme, buffer);
             plot::draw(model, &layout, &theme, buffer);
         } else if !matches!(model.overlay, Some(Overlay::Form(_))) {
             outline::draw(model, &layout, &theme, buffer);

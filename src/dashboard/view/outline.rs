@@ -3,7 +3,7 @@
 use crate::dashboard::layout::{BORDER, Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
-use crate::dashboard::panel_lines::{OutlineLine, outline};
+use crate::dashboard::panel_lines::{OutlineEntry, OutlineLine, outline};
 use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns};
@@ -29,7 +29,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             OutlineLine::Heading(title) => {
                 to.put(" ", theme.heading()).put(title, theme.heading());
             }
-            OutlineLine::Entry { subject, label, note } => {
+            OutlineLine::Entry(OutlineEntry { subject, label, note }) => {
                 let selected = *subject == model.selection;
                 let (name, noted) = match selected {
                     true => (theme.selected(active), theme.selected(active)),

@@ -2,14 +2,15 @@
 
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::model::Model;
-use crate::dashboard::noise_targets::{ABOUT, Cost};
+use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
 use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::update::commands::COMMANDS;
-use crate::dashboard::view::fields::{Fields, typed};
+use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
+use crate::render::session::QUALITIES;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
@@ -79,11 +80,7 @@ impl Painter<'_> {
         for (row, i) in self.window(scroll, lines.len()) {
             let mut to = Row::new(self.buffer, self.place.list, row);
             match &lines[i] {
-                HelpLine::Heading(title) => {
-                    to.put(&format!(" {title} "), theme.heading());
-                    let left = to.left().saturating_sub(1);
-                    to.put(&"─".repeat(left), theme.border(false));
-                }
+                HelpLine::Heading(title) => heading(to, title, theme),
                 HelpLine::Keys(keys, label) => {
                     // A long list of keys is truncated so that it does not shorten the label.
                     let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
@@ -106,19 +103,21 @@ impl Painter<'_> {
     fn noise_targets(&mut self, model: &Model, cursor: usize) {
         self.frame("noise targets in 8-bit levels");
         let good = self.theme.good();
-        for (row, noise_target) in (0..self.place.list.height).zip(model.noise_targets()) {
-            let (mut to, [name, remainder, _]) = self.choice(row, usize::from(row) == cursor);
-            let cost = match noise_target.cost {
+        let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
+        let cost_of = |i| report.map_or(Cost::Unknown, |r| cost(r, &model.convergence, i));
+        for (row, (i, noise_codes)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
+            let (mut to, [name, remainder, _]) = self.choice(row, i == cursor);
+            let cost = match cost_of(i) {
                 Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
                 Cost::Reached(None) => "reached".to_string(),
                 Cost::Left(from, to) => format!("{} more", durations(from, to)),
                 Cost::Unknown => "not known yet".to_string(),
             };
-            let mark = if noise_target.is_target { "→ " } else { "  " };
+            let mark = if model.stop.noise_codes == Some(noise_codes) { "→ " } else { "  " };
             to.put_right("  ", 0, remainder).put_right(&cost, 8, name);
             to.put_right("  ", 0, remainder).put(mark, good);
-            to.put_wide(&noise_target.noise_codes.to_string(), 5, name);
-            to.skip(2).put(noise_target.looks, remainder);
+            to.put_wide(&noise_codes.to_string(), 5, name);
+            to.skip(2).put(LOOKS[i], remainder);
         }
         self.say(ABOUT, self.theme.dim());
     }
@@ -138,7 +137,7 @@ impl Painter<'_> {
             let keys = command.all_keys(str::to_string);
             to.put_right(" ", 0, key).put_right(&keys, columns(command.label) + 2, key);
             to.put(command.label, name);
-            to.put_right("  ", 1, remainder).put_right(command.chapter.title(), 1, remainder);
+            to.put_right("  ", 1, remainder).put_right(command.chapter, 1, remainder);
         }
         cursor
     }

@@ -223,13 +223,9 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
 
 /// Draws `cells` into `area` from its upper left corner. Cells outside of `area` are omitted.
 pub fn paint(cells: &PictureCells, area: Rect, buffer: &mut Buffer) {
-    for row in 0..area.height.min(cells.rows) {
-        for column in 0..area.width.min(cells.columns) {
-            let Some(cell) = cells.cell(column, row) else { continue };
-            if let Some(to) = buffer.cell_mut((area.x + column, area.y + row)) {
-                to.set_char(cell.glyph);
-                to.set_style(Style::new().fg(cell.fg).bg(cell.bg));
-            }
+    for at in area.intersection(buffer.area).positions() {
+        if let Some(cell) = cells.cell(at.x - area.x, at.y - area.y) {
+            buffer[at].set_char(cell.glyph).set_style(Style::new().fg(cell.fg).bg(cell.bg));
         }
     }
 }

@@ -111,22 +111,20 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         .x_bounds([0.0, 1.0])
         .y_bounds([0.0, 1.0])
         .paint(|canvas| {
-            if let Some(target) = target {
-                let height = y.part(target);
-                for i in 0..DASHES {
-                    let from = i as f64 / DASHES as f64;
-                    let to = from + 0.5 / DASHES as f64;
-                    canvas.draw(&line((from, height), (to, height), theme.good()));
-                }
-            }
-            if let Some((seconds, noise)) = reached {
-                let (from, to) = (place(last.seconds, last.noise_codes), place(seconds, noise));
+            let mut dashed = |from: (f64, f64), to: (f64, f64), dash: f64, style| {
                 let at =
                     |part: f64| (from.0 + (to.0 - from.0) * part, from.1 + (to.1 - from.1) * part);
                 for i in 0..DASHES {
                     let part = i as f64 / DASHES as f64;
-                    canvas.draw(&line(at(part), at(part + 0.4 / DASHES as f64), theme.dim()));
+                    canvas.draw(&line(at(part), at(part + dash / DASHES as f64), style));
                 }
+            };
+            if let Some(target) = target {
+                dashed((0.0, y.part(target)), (1.0, y.part(target)), 0.5, theme.good());
+            }
+            if let Some((seconds, noise)) = reached {
+                let from = place(last.seconds, last.noise_codes);
+                dashed(from, place(seconds, noise), 0.4, theme.dim());
             }
             canvas.layer();
             for pair in points.windows(2) {

@@ -49,10 +49,11 @@ pub fn skip(text: &str, skipped: usize) -> &str {
 pub struct Row<'a> {
     buffer: &'a mut Buffer,
     /// Column of the screen at which the next text begins.
-    x: u16,
+    pub x: u16,
     /// Column of the screen that follows the last free column of the row.
     end: u16,
-    y: u16,
+    /// Position of the row on the screen, counted from 0.
+    pub y: u16,
 }
 
 impl<'a> Row<'a> {
@@ -69,16 +70,6 @@ impl<'a> Row<'a> {
     /// Returns the number of free columns of the row.
     pub fn left(&self) -> usize {
         usize::from(self.end.saturating_sub(self.x))
-    }
-
-    /// Returns the column of the screen at which the next text begins.
-    pub fn x(&self) -> u16 {
-        self.x
-    }
-
-    /// Returns the row's position on the screen, counted from 0.
-    pub fn y(&self) -> u16 {
-        self.y
     }
 
     /// Draws `text` in the free columns of the row, truncated if necessary.

@@ -29,11 +29,6 @@ const SELECTED_GROUND: Tone = ([40, 62, 98], 24, Color::Reset);
 const SELECTED_TEXT: Tone = ([242, 245, 250], 255, Color::Reset);
 
 impl Theme {
-    /// Creates the theme for a set of terminal colours.
-    pub fn new(colors: Colors) -> Self {
-        Self { colors }
-    }
-
     fn color(&self, (rgb, indexed, ansi): Tone) -> Option<Color> {
         match self.colors {
             Colors::True => Some(Color::Rgb(rgb[0], rgb[1], rgb[2])),

@@ -2,11 +2,11 @@
 //! the status line.
 
 use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{Model, WatchTable, short_name};
+use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::text::{Row, cut};
+use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
 use crate::render::session::{WatchReport, WatchedShards, WatchedState};
 use crate::value::sanitized;
@@ -23,14 +23,9 @@ const SHARE: usize = 5;
 const SAMPLES: usize = 12;
 
 /// Draws the table of watched files. Draws nothing if the panel is folded.
-pub fn draw(
-    model: &Model,
-    table: &WatchTable,
-    layout: &Layout,
-    theme: &Theme,
-    buffer: &mut Buffer,
-) {
-    let (Some(area), Some((rows, details))) = (layout.outline, model.watch_rows()) else { return };
+pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+    let (Some(table), Some(area)) = (&model.watch, layout.outline) else { return };
+    let Some((rows, details)) = model.watch_rows() else { return };
     let active = is_active(model, Focus::Outline);
     panel(area, &title(&table.report), active, theme, buffer);
     let head = Rect { y: rows.y - 1, height: 1, ..rows };
@@ -65,8 +60,7 @@ pub fn draw(
                 right(&mut to, [(&samples(shard), SAMPLES)], dim);
             }
         }
-        let label = label(shard);
-        to.put(&cut(&label, to.left()), plain);
+        to.put(&label(shard), plain);
     }
     if let Some(selected) = shards.get(table.cursor) {
         explain(selected, details, theme, buffer);

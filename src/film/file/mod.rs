@@ -87,7 +87,7 @@ impl FilmFileHeader {
         self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
     }
 
-    /// Writes the picture of `film` to `output`. This is the header of the film. `depth` is the
+    /// Writes the picture of `film` to `output`. `self` is the header of the film. `depth` is the
     /// number of bits per channel of a PNG.
     ///
     /// # Errors

@@ -22,9 +22,9 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
 /// Number of rays that one round of adaptive sampling allocates, as a share of the rays traced so
-/// far. A round is one decision on the next samples of all tiles. It is small enough that later
-/// noise estimates can correct a round, and large enough that threads rarely wait for each other
-/// between rounds.
+/// far. A round is one decision on the next samples of all tiles. The share is small enough that
+/// later noise estimates can correct a round, and large enough that threads rarely wait for each
+/// other between rounds.
 const ROUND_SHARE: f64 = 0.1;
 /// Share of the rays of an allocation round that goes to the tiles with the fewest samples,
 /// whatever their noise estimates are. No estimate contains a feature that no sample has hit; this
@@ -178,7 +178,8 @@ impl<'a> Allocation<'a> {
     /// Returns the length of the next block of `tile`: its number of samples per pixel in each of
     /// the two replicates (halves of the samples). A block is a run of samples that is allocated as
     /// a whole. Returns 0 if the tile has reached its largest sample count ([`Schedule::cap`]), or
-    /// if the picture has reached its requested mean sample count.
+    /// if one more sample per pixel of the tile would exceed the requested mean sample count of the
+    /// picture.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =

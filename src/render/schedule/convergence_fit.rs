@@ -4,8 +4,8 @@
 use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
 /// Largest number of points of the convergence fit. A point is a number of rays and the picture's
-/// RMSE after them. From one point to the next the rays grow by a factor of sqrt(2), so that seven
-/// points span three doublings.
+/// RMSE after them. From one point to the next, except to the latest one, the rays grow by a factor
+/// of at least sqrt(2). Seven points span three doublings if all factors are sqrt(2).
 const POINTS: usize = 7;
 
 /// Relative uncertainty of the extrapolated number of rays left until an error target, even if the
@@ -15,8 +15,8 @@ const POINTS: usize = 7;
 /// rays than the extrapolation predicts.
 const SPREAD: f64 = 0.15;
 
-/// Convergence fit: RMSE of the picture as a function of rays, over the latest three doublings of
-/// the rays.
+/// Convergence fit: RMSE of the picture as a function of the number of rays, at up to seven numbers
+/// of rays. They span about three doublings of the rays, or more if the rays grew in large steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
     /// Recorded points, oldest first, each as `(number of rays, RMSE of the picture)`.
@@ -44,9 +44,10 @@ impl ConvergenceFit {
 
     /// Returns a lower and an upper estimate of the total number of rays at which the picture's
     /// RMSE falls to `target`. The RMSE is extrapolated with the steepest and with the flattest of
-    /// three slopes: those over the latest one, two and three doublings of the rays. Before the
-    /// first doubling, the largest and the smallest plausible slope are used instead. Returns
-    /// `None` if nothing has been recorded.
+    /// three slopes: those over the latest two, four and six steps between recorded points, that
+    /// is, over about one, two and three doublings of the rays. Before the first two steps, the
+    /// largest and the smallest plausible slope are used instead. Returns `None` if nothing has
+    /// been recorded.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -64,9 +65,9 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Returns the slope p of the fit RMSE ~ rays^-p through the first and the last recorded point,
-    /// which are at most three doublings of the rays apart. If there are fewer than two points, p
-    /// is 0.5, the slope of independent samples.
+    /// Returns the slope p of the fit RMSE ~ rays^-p through the first and the last of the (up to
+    /// seven) latest points. If there are fewer than two points, p is 0.5, the slope of independent
+    /// samples.
     pub fn slope(&self) -> f64 {
         self.fitted_slope().unwrap_or(0.5)
     }

@@ -68,7 +68,8 @@ pub enum Step {
     Finished(StoppedBy),
 }
 
-/// Numbers of samples per pixel in the picture, over both replicates (halves of the samples).
+/// Numbers of samples per pixel in the picture, summed over both replicates (halves of the
+/// samples).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spp {
     /// Smallest number of samples in any pixel.
@@ -164,8 +165,8 @@ impl Schedule {
         })
     }
 
-    /// Records the report of a wave (a set of jobs that run concurrently). It is the wave that
-    /// [`Schedule::next`] returned, or the part that [`Wave::cut`] left of it. Jobs that were cut
+    /// Records the report of a wave (a set of jobs that run concurrently). `wave` is the one that
+    /// [`Schedule::next`] returned, or the part of it that [`Wave::cut`] left. Jobs that were cut
     /// off or cancelled are part of a later wave.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
@@ -341,8 +342,9 @@ impl Schedule {
         self.jobs(samples)
     }
 
-    /// Returns the number of samples that each pixel gets next in each of the two replicates. Every
-    /// pixel has `done` samples in each replicate. With an error target the number is half of the
+    /// Returns the number of samples, not yet rounded to [`SAMPLE_ALIGNMENT`], that each pixel gets
+    /// next in each of the two replicates (halves of the samples). `done` is the number of samples
+    /// of a pixel in each replicate so far. With an error target the result is half of the
     /// estimated remaining samples, at most `done`. Without an error target it is an eighth of
     /// `done`. With a time limit it is at most an eighth of `done`, because a larger step could
     /// exceed the limit by much.

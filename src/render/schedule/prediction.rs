@@ -20,8 +20,8 @@ const AIM: f64 = 0.95;
 pub struct Prediction {
     /// Present and predicted sample counts of the tiles, in row order.
     pub tiles: Vec<TilePrediction>,
-    /// Expected RMSE of the whole picture, in the unit of the error target (8-bit levels or
-    /// radiance).
+    /// Expected RMSE of the whole picture after the predicted samples. Its unit is that of the
+    /// error target: 8-bit levels or radiance.
     pub rmse: f64,
     /// Slopes of the error, RMSE ~ n^-slope for n samples: `[tiles without glossy lobes, tiles with
     /// them]`.

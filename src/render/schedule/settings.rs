@@ -47,7 +47,7 @@ pub struct Stop {
 /// Reason for which a render has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedBy {
-    /// The mean number of samples per pixel was reached.
+    /// The mean number of samples per pixel reached its target.
     Spp,
     /// The RMSE of the displayed picture fell to its target.
     Noise,
@@ -59,7 +59,7 @@ pub enum StoppedBy {
     /// ([`Settings::rays_per_pixel`]). The tiles that may still get samples together meet the error
     /// target, or there are no such tiles.
     RaysPerPixel,
-    /// All tiles of the film hold the largest number of samples.
+    /// All tiles hold the largest number of samples that a tile of the film can hold.
     Full,
 }
 

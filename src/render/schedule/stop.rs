@@ -111,7 +111,7 @@ impl Schedule {
     }
 
     /// Returns `true` if every tile has the minimum number of samples, or its cap if that is lower.
-    /// The error over all tiles is then reliable.
+    /// Only then may the estimated error of the picture end the render.
     fn min_samples_reached(&self) -> bool {
         let min_samples = self.min_samples();
         self.tiles.iter().all(|t| t.done >= min_samples.min(self.cap(t)))

@@ -90,8 +90,8 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     }
     let [top, bottom] = [upper, lower].map(nearest);
     let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
-    let halves_error = error([top, bottom].map(|index| BARE.color(index.into())));
-    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.color(shade); 2]) {
+    let halves_error = error([top, bottom].map(|index| BARE.colors[usize::from(index)]));
+    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.colors[shade]; 2]) {
         return PictureCell { glyph: '▀', fg: Color::Indexed(top), bg: Color::Indexed(bottom) };
     }
     CELLS[shade]

@@ -65,10 +65,6 @@ impl Raster {
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
-
-    fn at(&self, x: usize, y: usize) -> Option<[u8; 3]> {
-        (x < self.width && y < self.height).then(|| self.pixels[y * self.width + x])
-    }
 }
 
 /// Terminal cell of the picture: its glyph and its colours.
@@ -145,30 +141,29 @@ impl PictureCells {
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.
     pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
-        let cell = |upper: Option<[u8; 3]>, lower: Option<[u8; 3]>| match (upper, lower) {
-            (Some(upper), Some(lower)) => pair(upper, lower, colors),
-            (Some(upper), None) => half('▀', upper, colors),
-            (None, Some(lower)) => half('▄', lower, colors),
-            (None, None) => PictureCell::default(),
-        };
         let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
-        let rows = raster.height.div_ceil(2);
-        let mut cells = Vec::with_capacity(raster.width * rows);
-        for y in 0..rows {
-            for x in 0..raster.width {
-                let (upper, lower) = (raster.at(x, 2 * y), raster.at(x, 2 * y + 1));
-                cells.push(match &dithered {
-                    None => cell(upper, lower),
-                    Some(indices) => {
-                        let index = |y: usize| indices[y * raster.width + x];
-                        two_halves(
-                            Color::Indexed(index(2 * y)),
-                            lower.map(|_| Color::Indexed(index(2 * y + 1))),
-                        )
-                    }
-                });
+        let rgb = |pixel: usize| raster.pixels[pixel];
+        let color = |pixel: usize| match &dithered {
+            Some(indices) => Color::Indexed(indices[pixel]),
+            None if colors == Colors::True => Color::from(rgb(pixel)),
+            None => Color::Indexed(nearest_xterm(rgb(pixel))),
+        };
+        let cell = |index: usize| {
+            let upper = index / raster.width * 2 * raster.width + index % raster.width;
+            let lower = Some(upper + raster.width).filter(|pixel| *pixel < raster.pixels.len());
+            match (colors, lower) {
+                (Colors::True | Colors::Indexed, _) => two_halves(color(upper), lower.map(color)),
+                (Colors::Sixteen, Some(lower)) => glyph_shading::pair(rgb(upper), rgb(lower)),
+                (Colors::Sixteen, None) => {
+                    two_halves(Color::Indexed(glyph_shading::nearest(rgb(upper))), None)
+                }
+                (Colors::Mono, Some(lower)) => glyph_shading::pair_mono(rgb(upper), rgb(lower)),
+                (Colors::Mono, None) if Oklab::of(rgb(upper)).l < 0.5 => PictureCell::default(),
+                (Colors::Mono, None) => two_halves(Color::Reset, None),
             }
-        }
+        };
+        let rows = raster.height.div_ceil(2);
+        let cells = (0..raster.width * rows).map(cell).collect();
         Self { columns: raster.width as u16, rows: rows as u16, cells }
     }
 
@@ -189,29 +184,6 @@ fn two_halves(upper: Color, lower: Option<Color>) -> PictureCell {
         Some(lower) => PictureCell { glyph: '▀', fg: upper, bg: lower },
         None => PictureCell { glyph: '▀', fg: upper, bg: Color::Reset },
     }
-}
-
-fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
-    match colors {
-        Colors::True => two_halves(Color::from(upper), Some(Color::from(lower))),
-        Colors::Indexed => {
-            let index = |rgb| Color::Indexed(nearest_xterm(rgb));
-            two_halves(index(upper), Some(index(lower)))
-        }
-        Colors::Sixteen => glyph_shading::pair(upper, lower),
-        Colors::Mono => glyph_shading::pair_mono(upper, lower),
-    }
-}
-
-fn half(glyph: char, rgb: [u8; 3], colors: Colors) -> PictureCell {
-    let fg = match colors {
-        Colors::True => Color::from(rgb),
-        Colors::Indexed => Color::Indexed(nearest_xterm(rgb)),
-        Colors::Sixteen => Color::Indexed(glyph_shading::nearest(rgb)),
-        Colors::Mono if Oklab::of(rgb).l < 0.5 => return PictureCell::default(),
-        Colors::Mono => Color::Reset,
-    };
-    PictureCell { glyph, fg, bg: Color::Reset }
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ const BITS: usize = 6;
 /// Palette of colours with a search for the nearest one in OKLab. A cache stores the result for
 /// each sRGB colour, rounded to 6 bits per channel.
 pub struct QuantisedPalette {
-    colors: Vec<Oklab>,
+    /// Colours of the palette.
+    pub colors: Vec<Oklab>,
     /// Index plus 1 of the nearest palette colour, for each of the 2^18 rounded sRGB colours. A 0
     /// means that the nearest palette colour has not been searched yet.
     known: Vec<AtomicU16>,
@@ -23,11 +24,6 @@ impl QuantisedPalette {
     /// Creates a palette of `colors`, 1 to 65,535 of them.
     pub fn new(colors: Vec<Oklab>) -> Self {
         Self { colors, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
-    }
-
-    /// Returns the colour with the number `index` in the palette.
-    pub fn color(&self, index: usize) -> Oklab {
-        self.colors[index]
     }
 
     /// Returns the index of the palette colour nearest to the 8-bit sRGB colour `rgb`, which is
@@ -112,7 +108,7 @@ pub fn nearest_xterm(rgb: [u8; 3]) -> u8 {
 
 /// Returns the OKLab lightness, 0..=1, of colour `index` (16 to 255) of xterm's 256 colours.
 pub fn xterm_lightness(index: u8) -> f32 {
-    XTERM.color(usize::from(index.saturating_sub(FIRST))).l
+    XTERM.colors[usize::from(index.saturating_sub(FIRST))].l
 }
 
 #[cfg(test)]

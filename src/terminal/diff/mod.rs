@@ -251,7 +251,7 @@ impl FrameDiff {
             }
             frame.picture = !part.cells.is_empty();
             self.send(target, part, out);
-            self.pending.visible = self.picture_diff.has_visible();
+            self.pending.visible = !self.picture_diff.visible().is_empty();
         } else if visible.is_empty()
             && allowance.picture
             && idle_at <= now
@@ -264,7 +264,8 @@ impl FrameDiff {
             frame = Frame { picture: !part.cells.is_empty(), flushed: part.bytes.len() };
             self.send(target, part, out);
         }
-        self.pending.hidden = self.picture_diff.has_hidden().then_some(idle_at);
+        let has_hidden = !self.picture_diff.hidden().is_empty();
+        self.pending.hidden = has_hidden.then_some(idle_at);
         frame
     }
 

@@ -121,18 +121,6 @@ impl PerceptualDiff {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Returns `true` if some cell of the picture on the terminal differs visibly from the target
-    /// frame.
-    pub fn has_visible(&self) -> bool {
-        self.cells.iter().any(|cell_colors| cell_colors.visible)
-    }
-
-    /// Returns `true` if some cell of the picture on the terminal differs from the target frame by
-    /// an invisible amount.
-    pub fn has_hidden(&self) -> bool {
-        self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
-    }
-
     /// Creates a mosaic of the target: blocks of `side` x `side` half cells, each block of one
     /// colour. A half cell is the upper or lower half of a cell. Returns `(cells, improved)`.
     /// `cells` has all cells of the picture. A cell with a visible difference shows the mosaic;

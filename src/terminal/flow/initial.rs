@@ -29,17 +29,15 @@ impl InitialLink {
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;
-        let (mode, round_trip) = match (rate, &terminal.environment.ssh) {
-            (Some(_), _) => (PacingMode::FixedRate, None),
-            (None, None) => (PacingMode::Unlimited, None),
-            (None, Some(_)) => match (multiplexer, terminal.passthrough, terminal.round_trip) {
-                (Some(_), Some(round_trip), _) => {
-                    (PacingMode::AckClocked(multiplexer), Some(round_trip))
-                }
-                (Some(_), None, _) | (None, _, None) => (fallback, None),
-                (None, _, Some(round_trip)) if round_trip < TOO_SOON => (fallback, None),
-                (None, _, round_trip) => (PacingMode::AckClocked(None), round_trip),
-            },
+        let replied = match multiplexer {
+            Some(_) => terminal.passthrough,
+            None => terminal.round_trip.filter(|time| *time >= TOO_SOON),
+        };
+        let (mode, round_trip) = match (rate, &terminal.environment.ssh, replied) {
+            (Some(_), ..) => (PacingMode::FixedRate, None),
+            (None, None, _) => (PacingMode::Unlimited, None),
+            (None, Some(_), None) => (fallback, None),
+            (None, Some(_), Some(_)) => (PacingMode::AckClocked(multiplexer), replied),
         };
         Self { mode, round_trip, queue, fixed_rate: rate.unwrap_or(DEFAULT_RATE) }
     }

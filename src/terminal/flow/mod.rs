@@ -11,7 +11,6 @@
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
-mod in_flight;
 mod initial;
 mod send_queue_estimate;
 mod tcp_send_queue;
@@ -19,9 +18,9 @@ mod tcp_send_queue;
 mod tests;
 
 use crate::terminal::Multiplexer;
-use in_flight::FramesInFlight;
 pub use initial::InitialLink;
 use send_queue_estimate::SendQueueEstimate;
+use std::collections::VecDeque;
 use std::time::Duration;
 pub use tcp_send_queue::TcpSendQueue;
 
@@ -129,7 +128,11 @@ pub struct FlowControl {
     /// the round trip. A longer round trip may have lowered the rate: the limit of the send queue
     /// is then too low, because it is derived from the old round trip.
     doubtful_rate: f64,
-    in_flight: FramesInFlight,
+    /// Frames that the terminal has not acknowledged yet, oldest first.
+    in_flight: VecDeque<InFlight>,
+    /// `[time of sending, time of acknowledgement]` of the last acknowledged frame. `None` before
+    /// the first acknowledgement.
+    last_acked: Option<[Duration; 2]>,
     losses: u32,
     /// Time at which the last period of user activity began. The user counts as active for
     /// [`ACTIVE_TIME`] after each input.
@@ -150,6 +153,17 @@ pub struct FlowControl {
     send_queue: SendQueueEstimate,
     /// Last measurement of the connection's rate by acknowledgements; `None` before the first one.
     ack_sample: Option<AckSample>,
+}
+
+/// Frame in flight: a frame that the terminal has not acknowledged yet.
+#[derive(Clone, Copy, Debug)]
+struct InFlight {
+    sent: Duration,
+    bytes: usize,
+    /// `true` if the frame contains cells of the picture.
+    picture: bool,
+    /// `true` if no other frame was in flight when this one was sent.
+    alone: bool,
 }
 
 /// Measurement of the connection's rate by acknowledgements. It holds a number of bytes, the time
@@ -262,7 +276,8 @@ impl FlowControl {
             let refinement = if self.refine_at <= now { bytes / 2 } else { 0 };
             return Some(FrameBudget { bytes, picture: true, refinement });
         }
-        let text_bytes = MAX_TEXT.saturating_sub(self.in_flight.text_bytes());
+        let texts = self.in_flight.iter().filter(|frame| !frame.picture);
+        let text_bytes = MAX_TEXT.saturating_sub(texts.map(|frame| frame.bytes).sum());
         let may_send_text =
             self.mode != PacingMode::FixedRate || self.free_at <= now + 2 * FRAME_SPAN;
         let due = due(TEXT_INTERVAL) && may_send_text && text_bytes >= MAX_TEXT / 4;
@@ -306,7 +321,8 @@ impl FlowControl {
             PacingMode::Unlimited => {}
             PacingMode::AckClocked(_) => {
                 self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
-                self.in_flight.add(now, bytes, picture);
+                let alone = self.in_flight.is_empty();
+                self.in_flight.push_back(InFlight { sent: now, bytes, picture, alone });
             }
             PacingMode::SendQueue => self.send_queue.sent(now, bytes, self.max_queue()),
             PacingMode::FixedRate => {
@@ -336,11 +352,12 @@ impl FlowControl {
             // data in a tunnel.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
-            self.in_flight = FramesInFlight::default();
+            self.forget_frames();
             self.losses = 0;
             return true;
         }
-        let Some((frame, last_acked)) = self.in_flight.on_ack(at) else { return false };
+        let Some(frame) = self.in_flight.pop_front() else { return false };
+        let last_acked = self.last_acked.replace([frame.sent, at]);
         self.losses = 0;
         if self.in_flight.is_empty() {
             self.clear_at = self.clear_at.min(at);
@@ -431,7 +448,7 @@ impl FlowControl {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
         }
-        self.in_flight = FramesInFlight::default();
+        self.forget_frames();
         self.rate = (self.rate / 2.0).max(BUDGET[0] / FRAME_SPAN.as_secs_f64());
         self.losses += 1;
         if self.losses >= MAX_LOSSES {
@@ -463,6 +480,12 @@ impl FlowControl {
     }
 
     fn has_room(&self, now: Duration, answers: bool) -> bool {
+        let is_active = now < self.active_until;
+        // The first frame that shows the effect of input does not wait for frames sent before the
+        // input. `last` is the time at which the last of these was sent.
+        let is_first = |last: Option<Duration>| {
+            is_active && answers && last.is_some_and(|at| at < self.active_since)
+        };
         match self.mode {
             PacingMode::Unlimited => true,
             PacingMode::AckClocked(_) if self.free_at > now => false,
@@ -470,7 +493,6 @@ impl FlowControl {
                 if self.needs_round_trip(now) {
                     return self.in_flight.is_empty();
                 }
-                let is_active = now < self.active_until;
                 // While the user is active and the connection is busy, at most one frame is in
                 // flight, or two if the second shows the effect of input. The effect of an input
                 // then waits for at most one frame, the one in transmission.
@@ -478,24 +500,15 @@ impl FlowControl {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
                 };
-                // The first frame that shows the effect of input does not wait for frames sent
-                // before the input.
-                let newest_sent = self.in_flight.newest();
-                let is_first =
-                    is_active && answers && newest_sent.is_some_and(|at| at < self.active_since);
-                is_first || self.in_flight.pictures() < limit
+                let pictures = self.in_flight.iter().filter(|frame| frame.picture).count();
+                is_first(self.in_flight.back().map(|frame| frame.sent)) || pictures < limit
             }
             PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
-                // The first frame that shows the effect of input does not wait for frames sent
-                // before the input.
-                let is_first = now < self.active_until
-                    && answers
-                    && self.last_frame.is_some_and(|at| at < self.active_since);
-                let extra = if is_first { self.budget() as f64 } else { 0.0 };
+                let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
                 // While the user is active, the limit is lower by half of a frame, so that the
                 // effect of an input waits for fewer bytes.
-                let spare = if now < self.active_until { self.budget() as f64 / 2.0 } else { 0.0 };
+                let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 self.send_queue.bytes < self.max_queue() + extra - spare
             }
             PacingMode::FixedRate => {
@@ -533,7 +546,13 @@ impl FlowControl {
     }
 
     fn lost_at(&self) -> Option<Duration> {
-        self.in_flight.oldest().map(|sent| sent + LOST_AFTER)
+        self.in_flight.front().map(|frame| frame.sent + LOST_AFTER)
+    }
+
+    /// Removes all frames in flight, whose acknowledgements are lost.
+    fn forget_frames(&mut self) {
+        self.in_flight.clear();
+        self.last_acked = None;
     }
 
     fn stop_requests(&mut self, mode: PacingMode, now: Duration) {

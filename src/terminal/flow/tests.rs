@@ -89,7 +89,7 @@ fn input_waits_for_one_frame_only() {
     assert!(waited < ms(160) && busy > 0.8, "{waited:?}, busy {busy:.2}");
     let now = ms(20_000);
     flow.record_input(now);
-    flow.in_flight = FramesInFlight::default();
+    flow.forget_frames();
     flow.sent(now, 9000, true, 0);
     // While that frame of 9000 bytes is in flight, a frame with the effect of one key may be sent,
     // but not one with the effect of the next key.
@@ -287,7 +287,7 @@ fn rate_stays_true_after_convergence() {
     let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
     saturate(&mut flow, &mut wire, 40, false);
-    flow.in_flight = FramesInFlight::default();
+    flow.forget_frames();
     for i in 41..60 {
         let now = ms(1000 * i);
         flow.sent(now, 900, false, 0);
@@ -309,7 +309,7 @@ fn late_replies_prove_no_rate() {
         let mut flow = FlowControl::new(link);
         let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
         saturate(&mut flow, &mut wire, 25, false);
-        flow.in_flight = FramesInFlight::default();
+        flow.forget_frames();
         let is_true = |flow: &FlowControl| {
             let found = flow.reading().unwrap().rate;
             assert!((0.7..1.3).contains(&(found / rate)), "{found:.0} of {rate}");

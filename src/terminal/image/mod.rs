@@ -116,7 +116,7 @@ impl ImageViewport {
             _ => self.cell_px.unwrap_or(CELL_PX).map(|px| usize::from(px.max(1))),
         };
         let rows = match self.protocol {
-            Protocol::KittyThroughTmux => (self.screen[1] - 1).min(kitty::max_rows()),
+            Protocol::KittyThroughTmux => (self.screen[1] - 1).min(kitty::MAX_ROWS),
             _ => self.screen[1] - 1,
         };
         let mut largest = [usize::from(self.screen[0]) * cell[0], usize::from(rows) * cell[1]];

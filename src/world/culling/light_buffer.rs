@@ -30,8 +30,8 @@ pub(crate) struct LightBuffer<S> {
     /// Cells (ranges of directions from the light) of all faces of the light's projection, face by
     /// face and row by row.
     cells: Vec<Cell<S>>,
-    /// Possible occluders of all cells, cell after cell. The entries of a cell are sorted by their
-    /// distance from the light, nearest first.
+    /// Possible occluders of all cells, cell after cell. The entries of a cell are sorted by depth
+    /// (see [`Entry::near`]), nearest to the light first.
     entries: Vec<Entry<S>>,
 }
 
@@ -43,8 +43,8 @@ struct Cell<S> {
     /// Position after the last occluder of the cell (a range of directions from the light) in the
     /// light buffer's list of entries.
     end: u32,
-    /// Distance from the light up to which the cell's list of possible occluders is complete.
-    /// Shadow rays from greater distances traverse the BVH.
+    /// Depth (see [`Entry::near`]) up to which the cell's list of possible occluders is complete.
+    /// Shadow rays from greater depths traverse the BVH.
     complete_to: S,
 }
 
@@ -73,9 +73,10 @@ struct Entry<S> {
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the light buffer of a light. Returns `None` if, for at least half of the occluders,
-    /// most of the cells that the occluder overlaps are already full. Such a buffer would be too
-    /// incomplete to be useful.
+    /// Creates the light buffer of a light. A cell holds the [`MAX_PER_CELL`] occluders closest to
+    /// the light among those that overlap it, and leaves out the others. Returns `None` if at least
+    /// half of `occluders` are left out of most cells that they overlap. Too many shadow rays would
+    /// then traverse the BVH.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -150,8 +151,8 @@ impl<S: Float> LightBuffer<S> {
     /// occluders. The rays start on the primitives with the ids `start_item`. In the lanes
     /// `starts_outside` they start on the outside of these primitives.
     ///
-    /// The rays are passed by reference, because a copy of them makes the scene `reflecting-tracks`
-    /// 7 % slower.
+    /// The rays are passed by reference, because with a copy of them the render of the scene
+    /// `reflecting-tracks` takes 7 % longer.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,

@@ -8,8 +8,9 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-/// Largest tangent of the angle between a direction and the view direction of a light's perspective
-/// projection. Wider views use a cube map.
+/// Largest magnitude of the coordinates of projected spheres in a light's perspective projection,
+/// on the plane at unit distance from the light. If a projected sphere reaches farther out, the
+/// light has a cube map instead.
 const MAX_TANGENT: f64 = 3.0;
 
 /// Projection of points, as seen from a light, onto one or more faces. A projected point has two
@@ -164,7 +165,7 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
 
 /// Projects spheres by a perspective projection from the light. Returns two values: the projection,
 /// and the bounding rectangle of each sphere. Returns `None` if the spheres are not on one side of
-/// the light, or if the view would be wider than [`MAX_TANGENT`].
+/// the light, or if a coordinate of a projected sphere would exceed [`MAX_TANGENT`].
 fn perspective<S: Float>(
     balls: &[BoundingSphere],
 ) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {

@@ -13,13 +13,13 @@ pub(crate) struct ScreenBounds {
     high: [f64; 2],
 }
 
-/// Margin of projected bounds for rounding errors of raster positions in single precision
-/// \[pixels\].
+/// Margin \[pixels\] of projected bounds. It covers the rounding of raster positions to single
+/// precision.
 const MARGIN_PX: f64 = 0.25;
 
-/// Largest relative error of the point at which a ray crosses the plane at unit distance from the
-/// eye. The error is relative to the distance of this point from the centre of the plane. The value
-/// is eight rounding errors in single precision.
+/// Largest error of the point at which a ray crosses the plane at unit distance from the eye,
+/// divided by the distance of this point from the eye. The value is eight rounding errors in single
+/// precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
@@ -89,7 +89,7 @@ const CELL_PX: usize = 16;
 const MAX_PER_CELL: usize = 16;
 
 /// Screen grid: for each cell of the picture (a square of 16 x 16 pixels), the list of the
-/// primitives that camera rays can hit.
+/// primitives that camera rays through the cell can hit.
 pub(crate) struct ScreenGrid {
     columns: usize,
     rows: usize,

@@ -1,6 +1,6 @@
 //! Candidate lists per tile: the primitives that camera rays through the tile can hit, and the
-//! primitives that can occlude each light from their hit points. Most tiles have one or two visible
-//! primitives and no occluder.
+//! primitives that can occlude each light from the hit points of these rays. Most tiles have one or
+//! two visible primitives and no occluder.
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::SimdFloat;
@@ -48,9 +48,9 @@ pub(crate) enum CullingMode {
 
 impl CullingMode {
     /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
-    /// those that can occlude shadow rays from their hit points to `lights` light sources. The
-    /// rectangle has the corner `origin` and the size `extent` \[pixels\]. Returns `None` if rays
-    /// must be tested against all primitives.
+    /// those that can occlude shadow rays from the hit points of these camera rays. `lights` is the
+    /// number of light sources. The rectangle has the corner `origin` and the size `extent`
+    /// \[pixels\]. Returns `None` if rays must be tested against all primitives.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -115,8 +115,8 @@ pub(crate) struct FrustumCuller {
     self_shadowing: Vec<bool>,
     /// Position or direction of each light without a size.
     lights: Vec<LightTarget>,
-    /// Bounding sphere of each light with a size, each emissive object, and each stratum (spatial
-    /// group) of the lights among which paths choose.
+    /// Bounding sphere of each light with a size, each emissive object from which light is sampled,
+    /// and each stratum (spatial group) of the lights among which paths choose.
     emitters: Vec<BoundingSphere>,
 }
 
@@ -124,9 +124,8 @@ impl FrustumCuller {
     /// Creates the culler of the primitives `forms`. `outside_only` is `true` for each convex solid
     /// that rays hit only from outside. `lights` are the positions or directions of the lights
     /// without a size. `max_end_offset` is the largest distance between such a light and the end
-    /// point of its shadow rays. `emitters` are the bounding spheres of the lights with a size, of
-    /// the emissive objects, and of the strata (spatial groups) of the lights among which paths
-    /// choose.
+    /// point of its shadow rays. `emitters` are the bounding spheres of the other light sources
+    /// (see [`FrustumCuller::emitters`]).
     pub fn new(
         forms: Vec<&Form>,
         outside_only: &[bool],
@@ -143,9 +142,9 @@ impl FrustumCuller {
         Self { lights, emitters, self_shadowing, bounds }
     }
 
-    /// Creates the light buffer of each light without a size, over the primitives in the BVH of
-    /// `geometry`. An entry is `None` if the list of occluders would be too incomplete to be
-    /// useful; see [`LightBuffer::new`].
+    /// Creates the light buffer of each light without a size. Its occluders are the primitives in
+    /// the BVH of `geometry`. An entry is `None` if the cells of the buffer would leave out too
+    /// many occluders; see [`LightBuffer::new`].
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,

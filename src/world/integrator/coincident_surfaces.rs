@@ -78,10 +78,10 @@ impl<S: Float> Contact<S> {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Returns the lanes whose point may be on the touching primitive: its distance from the
-    /// bounding box is at most twice the distance within which surfaces count as coincident. Half
-    /// of this distance is the range of the search for coincident surfaces. The other half is a
-    /// margin for the rounding error of the search.
+    /// Returns the lanes whose point may be on the touching primitive: the distance of the point
+    /// from the primitive's bounding box is at most two tie distances (see [`Contact::tie`]). One
+    /// tie distance is the range of the search for coincident surfaces. The other is a margin for
+    /// the rounding error of the search. `rounding` is the parameter of [`Contact::tie`].
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -300,8 +300,8 @@ impl<S: Float> Contacts<S> {
 
     /// Searches the surfaces that coincide with the start points of the rays in `coincident`. A
     /// *layer* is the position of a surface in the fixed order in which a ray crosses coincident
-    /// surfaces. In each lane `out` holds the best candidate so far. It is replaced by every
-    /// surface found whose layer is above that of `coincident` and below that of `out`. At the end
+    /// surfaces. In each lane `out` holds the best candidate so far. A surface whose layer is above
+    /// that of `coincident` and below that of the candidate replaces the candidate. At the end
     /// `out` therefore holds the surface that the ray crosses next.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(

@@ -1,4 +1,4 @@
-//! Direct lighting: ambient light and shadow rays to all lights.
+//! Direct lighting by ambient light, and by shadow rays to lights without a size.
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -10,10 +10,10 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds reflected ambient light and reflected light of all sources to the radiance in `out`.
-/// Ambient light approximates indirect light. Lanes in `bouncing` get none, because their diffuse
-/// bounces compute the indirect light. `media` are the media of the paths; `None` in worlds without
-/// transmission.
+/// Adds to the radiance in `out` the ambient light and the light of `world.sources` (lights without
+/// a size) that surfaces reflect. Ambient light approximates indirect light. Lanes in `bouncing`
+/// get no ambient light, because their diffuse bounces compute the indirect light. `media` are the
+/// media of the paths; `None` in worlds without transmission.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -34,8 +34,9 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
 }
 
 /// Adds to `out` the radiance of the visible lights with a size that the rays of `lanes` reach
-/// before the distance `t_max`. `media` are the media of the paths; `None` in worlds without
-/// transmission.
+/// before the distance `t_max`. If `t_max` is the largest finite number, the ray hits no surface,
+/// and the radiance of the visible environments is added, too. `media` are the media of the paths;
+/// `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
@@ -101,9 +102,9 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
     pub share: L,
 }
 
-/// Adds the light of all emitters (lights with a size, emissive objects) that surfaces reflect.
-/// `bounce` is the number of earlier surfaces of the path. `media` are the media of the paths;
-/// `None` in worlds without transmission.
+/// Adds the light of all emitters (lights with a size, emissive objects, environments) that
+/// surfaces reflect. `bounce` is the number of earlier surfaces of the path. `media` are the media
+/// of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,

@@ -1,10 +1,10 @@
 //! Light of environments, by multiple importance sampling.
 //!
-//! Three strategies find the light of an environment. The first samples a direction in proportion
-//! to the luminance. The second is the reflected ray of a glossy lobe. The third samples a
-//! cosine-weighted direction at a matt surface. Glossy lobes combine the first and the second by
-//! the power heuristic, matt surfaces the first and the third. Highlights of lights use only the
-//! first. Mirrors and the camera use only the light at the end of their ray.
+//! Three strategies find the light of an environment. The first samples a direction with a density
+//! in proportion to the luminance of the environment. The second is the reflected ray of a glossy
+//! lobe. The third samples a cosine-weighted direction at a matt surface. Glossy lobes combine the
+//! first and the second by the power heuristic, matt surfaces the first and the third. Highlights
+//! of lights use only the first. Mirrors and the camera use only the light at the end of their ray.
 //!
 //! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
 //! the start of the ray already includes all environments.
@@ -19,9 +19,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
-/// Salt of the random numbers for the first environment. A salt is a number that scrambles random
-/// numbers. Each environment and each emitter has a salt of its own, so that their random numbers
-/// are independent. The salts of emitters are smaller than this one.
+/// First salt of the random numbers for environments. A salt is a number that scrambles random
+/// numbers. Each emitter has a salt of its own and each environment has two, so that their random
+/// numbers are independent. The salts of emitters are smaller than this one.
 pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments to `out`, in `lanes`, whose rays hit no surface.

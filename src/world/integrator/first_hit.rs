@@ -113,8 +113,9 @@ mod tests {
         hits
     }
 
-    /// Checks object, distance and normal of first hits. Ten pixels cover one unit of the picture
-    /// plane; the rectangles are 5 units from the eye.
+    /// Checks object, distance and normal of first hits on a sphere and two rectangles. Ten pixels
+    /// cover one unit of the picture plane at unit distance from the eye. The depth of the
+    /// rectangles is 5; the nearest point of the sphere is 4 units from the eye.
     #[test]
     fn first_hits_have_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];

@@ -23,7 +23,7 @@ pub struct Counts {
     pub glossy: bool,
 }
 
-/// Packet of paths at their current vertex.
+/// Packet of paths, each at its current vertex (the camera or a surface).
 #[derive(Clone, Copy)]
 pub struct Path<L> {
     /// Rays from the current vertices of the paths.

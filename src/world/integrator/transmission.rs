@@ -22,8 +22,9 @@ use crate::world::integrator::opaque::sample_reflection;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Number of interfaces, counted from the eye, at which a path splits into reflection and
-/// refraction. At later interfaces one of the two is chosen at random.
+/// Number of surfaces, counted from the eye or from the latest diffuse bounce, at which a path
+/// splits into reflection and refraction if the surface is an interface. At later interfaces one of
+/// the two is chosen at random.
 const SPLIT_DEPTH: usize = 2;
 
 /// One branch of a packet of paths, which split into reflection and transmission at interfaces. All
@@ -90,8 +91,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     ) -> Counts {
         let mut counts = Counts::default();
         // Reflected branches that are traced after the transmitted branches of the same interface.
-        // Entry i starts at interface i + 1. Branches are large, so they are traced where they are
-        // stored, and the array literal leaves the bytes of unused entries uninitialised.
+        // Entry i starts at the path's surface number i + 1, counted from 1. Branches are large, so
+        // they are traced where they are stored, and the array literal leaves the bytes of unused
+        // entries uninitialised.
         let mut waiting: [Option<Branch<L>>; SPLIT_DEPTH] = [None, None];
         // Number of the entry of `waiting` whose branch is traced, counted from 1; 0 stands for
         // `start`.
@@ -121,8 +123,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
     /// `branch` by the paths that continue, and returns `false` if there are none. A path has at
-    /// most `depth` surfaces after the first. At the first [`SPLIT_DEPTH`] interfaces, the
-    /// reflected branch is pushed to `waiting`.
+    /// most `depth` surfaces after the first. At an interface among the first [`SPLIT_DEPTH`]
+    /// surfaces, the reflected branch is stored in `waiting`.
     fn advance(
         &self,
         branch: &mut Branch<L>,

@@ -2,11 +2,9 @@
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
+use crate::dashboard::message::{DisplayChannel, Message, OrphanedEdits};
 use crate::dashboard::model::{CompareView, FieldList, Mode, Model, Notice, RunningExport, Tone};
-use crate::dashboard::overlay::{
-    Answer, CommandPalette, Form, Overlay, Pick, PickFor, Prompt, PromptFor, Question,
-};
+use crate::dashboard::overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
@@ -91,7 +89,7 @@ fn select_first(model: &mut Model) {
 }
 
 fn field(model: &Model, key: &str) -> usize {
-    let is = |line: &PanelLine| line.field().is_some_and(|field| field.property.key == key);
+    let is = |line: &PanelLine| line.entry().is_some_and(|field| field.property.key == key);
     model.field_lines().iter().position(is).unwrap_or_else(|| panic!("a field {key}"))
 }
 
@@ -137,11 +135,11 @@ fn adding(model: &mut Model, problem: Option<&str>) {
     model.overlay = Some(Overlay::Form(form));
 }
 
-fn prompt(model: &mut Model, purpose: PromptFor, words: [&str; 3], problem: Option<&str>) {
+fn prompt(model: &mut Model, words: [&str; 3], problem: Option<&str>) {
     let [title, help, text] = words.map(str::to_string);
     let mut editor = Editor::new(text);
     editor.problem = problem.map(str::to_string);
-    model.overlay = Some(Overlay::Prompt(Prompt { purpose, title, help, editor }));
+    model.overlay = Some(Overlay::Prompt(Prompt { title, help, editor, apply: |_, _| Ok(()) }));
 }
 
 fn probing(model: &mut Model) {
@@ -236,7 +234,7 @@ pub const STATES: &[Named] = &[
         m.display.tone = crate::film::Tone::Neutral;
         m.low_priority = true;
         let size = [1920, 1080];
-        m.export = Some(RunningExport { size, format: Format::Png, progress: 0.43 });
+        m.export = Some(RunningExport { size, progress: 0.43 });
     }),
     ("outline", |m| {
         m.focus = Focus::Outline;
@@ -339,8 +337,8 @@ pub const STATES: &[Named] = &[
         let kinds = edit::object_kinds();
         let entries = kinds.iter().map(|w| (w.name.to_string(), w.doc.to_string())).collect();
         let title = "add an object".to_string();
-        let purpose = PickFor::Object;
-        m.overlay = Some(Overlay::Pick(Pick { purpose, title, entries, cursor: 1, scroll: 0 }));
+        let pick = Pick { title, entries, cursor: 1, scroll: 0, take: |_, _| () };
+        m.overlay = Some(Overlay::Pick(pick));
     }),
     ("form", |m| adding(m, None)),
     ("form-refused", |m| {
@@ -348,13 +346,13 @@ pub const STATES: &[Named] = &[
     }),
     ("save-as", |m| {
         let words = ["save as", "A file name ending in .toml.", "rooms/mirror-room-2.toml"];
-        prompt(m, PromptFor::SaveAs, words, None);
+        prompt(m, words, None);
     }),
     ("stop-at-refused", |m| {
         let help = "noise 0.5, spp 1000, time 60, or none.";
         let problem =
             "`noise low` is no number of levels. Type noise 0.5, spp 1000, time 60, or none.";
-        prompt(m, PromptFor::StopAt, ["stop at", help, "noise low"], Some(problem));
+        prompt(m, ["stop at", help, "noise low"], Some(problem));
     }),
     ("quit", |m| {
         let text = "There are edits that are not saved.".to_string();

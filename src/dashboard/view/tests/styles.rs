@@ -113,7 +113,7 @@ fn defaults_are_dimmed_and_problems_red() {
     let (list, _) = model.inspector_rows().unwrap();
     let mut looks = [Vec::new(), Vec::new()];
     for (y, line) in (list.y..list.y + list.height).zip(&lines) {
-        let Some(field) = line.field().filter(|f| !f.value.is_empty()) else { continue };
+        let Some(field) = line.entry().filter(|f| !f.value.is_empty()) else { continue };
         if y == list.y + model.inspector.cursor as u16 {
             continue;
         }

@@ -5,8 +5,8 @@ use crate::render::schedule::tests::*;
 
 /// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
 /// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel. It then keeps
-/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. The
-/// schedule returns the rest in later waves.
+/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. Later
+/// waves have the samples that were cut off.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
