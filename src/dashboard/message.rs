@@ -157,9 +157,9 @@ pub enum Effect {
     Display(Display),
     /// Render until these stop criteria are reached.
     Stop(Stop),
-    /// Return snapshots with the data that this view requests: pictures of a given resolution, and
-    /// the values of one film pixel. The resolution is in half cells (upper or lower halves of
-    /// terminal cells).
+    /// Put into all later snapshots the data that the view requests: pictures at the view's
+    /// resolution, and the values of one film pixel. The resolution is in half cells (upper or
+    /// lower halves of terminal cells).
     View(View),
     /// Pause (`true`) or resume (`false`) the render.
     Pause(bool),

@@ -56,7 +56,8 @@ impl Mse {
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
-    fn add(&mut self, weight: f64, other: Self) {
+    /// Adds `weight` times `other`.
+    pub(crate) fn add(&mut self, weight: f64, other: Self) {
         self.linear += weight * other.linear;
         self.codes += weight * other.codes;
     }
@@ -228,6 +229,15 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Returns this estimate with the larger root mean square errors of this one and of `other`.
+    pub(crate) fn larger(self, other: Self) -> Self {
+        Self {
+            rmse_linear: self.rmse_linear.max(other.rmse_linear),
+            rmse_codes: self.rmse_codes.max(other.rmse_codes),
+            ..self
+        }
+    }
+
     /// Combines the estimates of all tiles. If all tiles have equal numbers of samples, the error
     /// is estimated from all pixels. Otherwise tiles were selected by the estimates from one half
     /// of the pixels (the black ones of a checkerboard). The error is then the larger of two

@@ -155,14 +155,14 @@ impl Reference {
         Self { size, pixels, codes, halves: Vec::new(), own, mean_variance, display }
     }
 
-    /// Returns the root mean square error of the reference picture itself over its pixels and
-    /// channels, in 8-bit levels.
+    /// Returns the noise of the reference picture in 8-bit levels: its estimated root mean square
+    /// error against the exact picture, over all pixels and channels.
     pub fn noise_codes(&self) -> f64 {
         self.own.codes.sqrt()
     }
 
-    /// Returns the root mean square error of the reference picture itself over its pixels and
-    /// channels, in linear radiance.
+    /// Returns the noise of the reference picture in linear radiance: its estimated root mean square
+    /// error against the exact picture, over all pixels and channels.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }

@@ -1,4 +1,4 @@
-//! Undo and redo of whole scenes.
+//! Undo and redo of whole scenes, and coalescing of the steps of a gesture.
 
 use crate::camera::Camera;
 use crate::light::Light;
@@ -13,7 +13,7 @@ const MAX_BYTES: usize = 64 << 20;
 const MAX_STEPS: usize = 10_000;
 
 /// Undo history of an editor. Each step has a label. The steps of one gesture (a drag, a held key)
-/// are merged into one.
+/// are coalesced into one.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     /// Scenes to which undo returns, the oldest first: one for each step, as it was before the
@@ -56,7 +56,7 @@ impl History {
     }
 
     /// Makes `scene` the current scene, by a step with the label `label`. `held` is `true` if the
-    /// step belongs to a gesture (a drag, a held key). It is then merged with the previous step, if
+    /// step belongs to a gesture (a drag, a held key). It is then coalesced with the previous step, if
     /// that belongs to the same gesture and has the same label. Returns `false`, and records
     /// nothing, if the scene has not changed.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {

@@ -38,8 +38,8 @@ impl ShapeDesc for Cone {
         vec![&mut self.base, &mut self.apex]
     }
 
-    /// Returns `true` without a change if the cone is upright, because it is then symmetric about
-    /// the vertical. Otherwise returns `false`.
+    /// Returns `true` if the cone can represent a rotation about the vertical. An upright cone can:
+    /// it is symmetric about the vertical and does not change. Any other cone cannot.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.apex)
     }

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
-    /// Generation (version number of the scene) of the oldest picture that is a response to the
-    /// event. Newer pictures are responses, too. If it is 0, any frame is a response.
+    /// Lowest generation (version number of the scene) whose picture responds to the event.
+    /// Pictures of later generations respond, too. 0 means that any frame responds.
     scene: u64,
 }
 

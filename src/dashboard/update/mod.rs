@@ -19,6 +19,7 @@ mod objects;
 mod prompt;
 mod recovery;
 mod render;
+mod undo_coalescing;
 mod watch;
 
 use crate::dashboard::message::{Effect, Message};
@@ -33,10 +34,7 @@ use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Longest time between two edits with the same label that form one undo step, such as those of a
-/// held key. It is longer than the delay after which a held key starts to repeat.
-const REPEAT_WINDOW: Duration = Duration::from_millis(700);
+use undo_coalescing::Coalesce;
 
 /// Updates the model with a message and returns the effects. `now` is the current time since any
 /// fixed origin.
@@ -92,19 +90,6 @@ impl Direction {
 enum StepSize {
     Coarse,
     Fine,
-}
-
-/// Rule that decides if an edit forms one undo step with the previous edit.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Coalesce {
-    /// Rule: the edit is an undo step of its own.
-    Single,
-    /// Rule: the edit is merged with the previous edit if both have the same label and the previous
-    /// edit is at most [`REPEAT_WINDOW`] old.
-    Repeat,
-    /// Rule: the edit is merged with edits of the same label until the gesture (a drag or mode)
-    /// ends.
-    Gesture,
 }
 
 impl UpdateContext<'_> {
@@ -226,13 +211,8 @@ impl UpdateContext<'_> {
             return changed;
         }
         let model = &mut *self.model;
-        let soon = |last: Duration| self.now.saturating_sub(last) <= REPEAT_WINDOW;
-        let joins = match coalesce {
-            Coalesce::Single => false,
-            Coalesce::Repeat => model.last_edit.is_some_and(soon),
-            Coalesce::Gesture => true,
-        };
-        if !joins {
+        let age = model.last_edit.map(|last| self.now.saturating_sub(last));
+        if !coalesce.joins(age) {
             model.history.end_gesture();
         }
         let changed = model.history.record(scene, &edit.label, coalesce != Coalesce::Single);

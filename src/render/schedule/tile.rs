@@ -1,7 +1,7 @@
 //! State of one tile in the schedule: sample counts and noise estimates.
 
-use crate::film::TileNoise;
-use crate::render::schedule::Criterion;
+use crate::film::{Mse, TileNoise};
+use crate::render::schedule::{Criterion, USUAL_SLOPE};
 use crate::render::wave::JobReport;
 
 /// Largest number of doublings of a tile's sample count over which the slope of its error is
@@ -93,6 +93,28 @@ impl Tile {
         all.map(move |e| {
             (f64::from(e.samples), [e.allocation, e.reported].map(|mse| criterion.of(mse)))
         })
+    }
+
+    /// Returns the latest noise estimate of the tile, but with mean squared errors that are means
+    /// over several estimates: the latest one and those from at least an eighth of its samples.
+    /// Earlier estimates are first scaled to the present sample count, as [`USUAL_SLOPE`] predicts.
+    /// Estimates at doubled sample counts are nearly independent of each other, so that the mean is
+    /// less uncertain than the latest estimate. Returns `None` before the first estimate.
+    pub fn pooled_estimate(&self) -> Option<TileNoise> {
+        let latest = self.error?;
+        let (mut pooled, mut weight) = (latest, 1.0);
+        let is_recent = |e: &&TileNoise| e.samples >= latest.samples / 8 && **e != latest;
+        for earlier in self.history.iter().filter(is_recent) {
+            let growth = f64::from(latest.samples) / f64::from(earlier.samples);
+            let factor = growth.powf(-2.0 * USUAL_SLOPE);
+            pooled.reported.add(factor, earlier.reported);
+            pooled.allocation.add(factor, earlier.allocation);
+            weight += 1.0;
+        }
+        for mse in [&mut pooled.reported, &mut pooled.allocation] {
+            *mse = Mse { linear: mse.linear / weight, codes: mse.codes / weight };
+        }
+        Some(pooled)
     }
 
     /// Returns two noise estimates: the one before and the one after the latest doubling of the

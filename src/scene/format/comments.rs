@@ -36,8 +36,8 @@ impl CommentKeeper {
         }
     }
 
-    /// Restores each recorded comment above the first remaining table after the removed one, or at
-    /// the end of the file.
+    /// Restores each recorded comment above the first table that remains after the comment's
+    /// removed table. If none remains, puts the comment at the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         sort_by_number(&mut comments, |(position, _)| -*position as i64);
