@@ -17,7 +17,7 @@ mod validation;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
-pub use description::{Description, FieldValue};
+pub use description::{Description, FieldValue, FromWritten};
 pub(crate) use description::{choices, description, doc_text};
 pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
