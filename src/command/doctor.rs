@@ -1,7 +1,6 @@
 //! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the
 //! dashboard uses them, and how to improve them.
 
-use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};
 use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
@@ -20,7 +19,7 @@ const COLUMNS: usize = 80;
 /// Width of the left part of the report, which holds the names, in columns of the terminal.
 const NAME: usize = 17;
 
-pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
+pub fn run(rate_requested: bool) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let environment = Environment::of(variable);
     let obstacle = if environment.term == "dumb" {
@@ -32,14 +31,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     };
     let diagnosis = match obstacle {
         Some(reason) => Err(reason),
-        None => Ok(diagnose(environment.clone(), args.rate)
+        None => Ok(diagnose(environment.clone(), rate_requested)
             .map_err(|error| format!("the terminal cannot be used: {error}"))?),
     };
     let state = state_folder(|name| env::var_os(name));
     let report = DoctorReport {
         environment,
         diagnosis,
-        rate_requested: args.rate,
+        rate_requested,
         locale: ["LC_ALL", "LC_CTYPE", "LANG"]
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),

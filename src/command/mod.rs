@@ -74,10 +74,10 @@ pub fn main() -> ExitCode {
         Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Watch(args)) => watch::run(args),
         Some(Command::Measure(args)) => measure::run(args),
-        Some(Command::Check(args)) => check::run(args),
+        Some(Command::Check { scene }) => check::run(scene),
         Some(Command::Info(args)) => info::run(args),
-        Some(Command::New(args)) => new::run(args),
-        Some(Command::Doctor(args)) => doctor::run(args),
+        Some(Command::New { file }) => new::run(file),
+        Some(Command::Doctor { rate }) => doctor::run(*rate),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
