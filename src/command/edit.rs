@@ -29,10 +29,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     })?;
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
-    let checkpoint = match args.scene.as_deref().filter(|path| is_film_file(path)) {
-        Some(path) => Some(Checkpoint::read(path)?),
-        None => None,
-    };
+    let film = args.scene.as_deref().filter(|path| is_film_file(path));
+    let checkpoint = film.map(Checkpoint::read).transpose()?;
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, reporter.assets.clone())?),
         (None, Some(path)) => open(path, reporter.assets.clone(), state.as_deref())?,

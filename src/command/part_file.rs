@@ -2,6 +2,7 @@
 //! pictures of complete films.
 
 use crate::command::Failure;
+use crate::command::progress::noise;
 use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::{Depth, Film, ImageOutput};
@@ -77,11 +78,7 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
 /// the mean, smallest and largest number of samples per pixel, and the RMSE.
 pub fn summary(report: &Report) -> String {
     let spp = &report.spp;
-    let noise = match report.noise {
-        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
-        None => "noise unknown".to_string(),
-    };
-    format!("{:.0} spp ({}-{})  {noise}", spp.mean, spp.min, spp.max)
+    format!("{:.0} spp ({}-{})  {}", spp.mean, spp.min, spp.max, noise(report))
 }
 
 /// Writes `film` and `header` to the film file at `path`.

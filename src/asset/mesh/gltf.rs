@@ -201,12 +201,9 @@ impl<'a> Part<'a> {
         if color != [1.0; 3] || builder.has_colors() {
             builder.color(color)?;
         }
-        let indices = match self.primitive.indices() {
-            Some(accessor) => {
-                Some(self.slice(&accessor, Dimensions::Scalar, accessor.data_type())?)
-            }
-            None => None,
-        };
+        let indices = self.primitive.indices();
+        let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar, a.data_type()));
+        let indices = indices.transpose()?;
         let corners = indices.as_ref().map_or(vertices, |s| s.count);
         let faces = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
         builder.reserve(vertices, faces)?;

@@ -30,10 +30,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let display = args.picture.display();
-    let reference = match &args.reference {
-        Some(path) => Some(given_reference(path, scene.film.size, &display)?),
-        None => None,
-    };
+    let reference = args.reference.as_ref();
+    let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
+    let reference = reference.transpose()?;
     let threads = args.compute.threads();
     let experiments = match (&args.only, args.full) {
         (experiments, _) if !experiments.is_empty() => experiments.clone(),
