@@ -194,7 +194,7 @@ impl<'a> Part<'a> {
         let color = [r, g, b];
         if !color.iter().all(|x| (0.0..=1e6).contains(x)) {
             let found = "a base colour is not a colour";
-            return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
+            return Err(self.source.fault(found, "numbers of at least 0"));
         }
         // Triangles without a stored colour are white. White therefore needs to be stored only if
         // the mesh has a stored colour already.
