@@ -60,14 +60,9 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
 }
 
 /// Adds the schema errors (unknown keys, wrong types, missing keys) in `root` to `errors`. `root`
-/// is the parsed `part` of the scene file `file`.
-pub(crate) fn check(
-    file: &str,
-    root: &Spanned<DeTable>,
-    part: &Part,
-    errors: &mut FirstDiagnostics,
-) {
-    let mut walk = SchemaChecker { file, part, root: root.get_ref(), path: Vec::new(), errors };
+/// is the parsed `part` of the scene file.
+pub(crate) fn check(root: &Spanned<DeTable>, part: &Part, errors: &mut FirstDiagnostics) {
+    let mut walk = SchemaChecker { part, root: root.get_ref(), path: Vec::new(), errors };
     walk.table(root.get_ref(), 0..0, FIELDS);
 }
 
@@ -91,7 +86,6 @@ fn phrase(keys: &[String]) -> String {
 }
 
 struct SchemaChecker<'a> {
-    file: &'a str,
     part: &'a Part,
     root: &'a DeTable<'a>,
     path: Vec<String>,
@@ -100,13 +94,11 @@ struct SchemaChecker<'a> {
 
 impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
-        let subject = || subject_in(self.root, &self.path, self.part.first_object);
         self.errors.add(self.part.in_file(span.start), || Diagnostic {
-            file: self.file.to_string(),
-            line_column: None,
-            subject: subject(),
+            subject: subject_in(self.root, &self.path, self.part.first_object),
             found,
             help,
+            ..Diagnostic::default()
         });
     }
 
