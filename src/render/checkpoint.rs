@@ -17,7 +17,7 @@ use crate::render::schedule::{Schedule, Settings};
 use crate::render::session::Report;
 use crate::render::{Options, RenderState};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Document, Scene};
+use crate::scene::Scene;
 use crate::world::{self, AnyWorld};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ impl SampleInputs {
             contents_hash: scene.contents_hash(),
             program: PROGRAM.to_string(),
             sampler: sampler.name().to_string(),
-            scene: Document::new(scene, "").text().to_string(),
+            scene: scene.to_text(),
         }
     }
 
@@ -232,7 +232,7 @@ impl Checkpoint {
     ) -> Result<Resumed, ReadError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
-        let same = Document::new(scene, "").text() == self.inputs.scene;
+        let same = scene.to_text() == self.inputs.scene;
         let compiled = if same {
             Arc::clone(scene)
         } else {

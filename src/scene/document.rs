@@ -36,6 +36,13 @@ pub struct Document {
     scene: Arc<Scene>,
 }
 
+impl Scene {
+    /// Returns the text of a new scene file that describes this scene, which must be valid.
+    pub fn to_text(&self) -> String {
+        new_text(String::new(), &[], &Self::default(), self)
+    }
+}
+
 impl Document {
     /// Reads and validates the scene file at `path`.
     ///
@@ -93,21 +100,6 @@ impl Document {
             text,
             scene,
         })
-    }
-
-    /// Creates a document for `scene`, which must be valid. `name` is the file name in diagnostics.
-    pub fn new(scene: &Scene, name: &str) -> Self {
-        let text = Arc::new(new_text(String::new(), &[], &Scene::default(), scene));
-        let scene = Arc::new(scene.clone());
-        Self {
-            name: name.to_string(),
-            origin: (Arc::clone(&text), Arc::clone(&scene)),
-            former_words: Vec::new(),
-            warnings: Vec::new(),
-            migration_warning: None,
-            text,
-            scene,
-        }
     }
 
     /// Changes the text so that it describes `scene`, which must be valid.

@@ -19,7 +19,7 @@ use zerkalo::render::session::{Session, State};
 use zerkalo::render::{Checkpoint, Options, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::edit::{self, Edit, EditError, Target};
-use zerkalo::scene::{Document, History, Scene};
+use zerkalo::scene::{History, Scene};
 use zerkalo::shape::Shape;
 use zerkalo::world::{self, Precision};
 
@@ -179,7 +179,7 @@ impl Desk {
 
 /// Returns the picture of `scene` after the scene was saved and read again.
 fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
-    let text = Document::new(scene, "room.toml").text().to_string();
+    let text = scene.to_text();
     let read = Scene::parse(&text, "room.toml").unwrap_or_else(|e| panic!("{e}"));
     let mut rendering = begin(&read, 1, Precision::Auto);
     follow(&mut rendering, settings(false, 0, SPP), &pool(2));

@@ -10,7 +10,7 @@ use crate::render::schedule::Settings;
 use crate::render::session::{Report, Session, State};
 use crate::render::{EncodedCheckpoint, Options, RenderState};
 use crate::sampling::SamplerKind;
-use crate::scene::{Document, Scene};
+use crate::scene::Scene;
 use crossbeam_channel::Sender;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ impl Exporter {
                 document.apply(scene);
                 (document.name().to_string(), document.text().to_string())
             }
-            None => (self.stem.clone(), Document::new(scene, &self.stem).text().to_string()),
+            None => (self.stem.clone(), scene.to_text()),
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::subject_in;
-use crate::scene::format::suggest::nearest;
+use crate::scene::format::suggest::{did_you_mean, nearest};
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
 use crate::value::{
     Color, DefaultValue, Description, Field, NumberRange, ValueType, sort_by_number, truncated,
@@ -138,18 +138,15 @@ impl SchemaChecker<'_> {
             return None;
         }
         let names = || fields.iter().map(|f| f.name);
-        let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
-        let intended = nearest(key.get_ref(), names());
-        if let Some(intended) = intended {
-            help += &format!(" Did you mean {intended:?}?");
-        }
+        let known = names().collect::<Vec<_>>().join(", ");
+        let help = format!("Known: {known}.{}", did_you_mean(key.get_ref(), names()));
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
             inner => format!(" in {}", truncated(&inner)),
         };
         let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
         self.add(key.span(), found, help);
-        intended
+        nearest(key.get_ref(), names())
     }
 
     fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
@@ -250,10 +247,8 @@ impl SchemaChecker<'_> {
             }
             (takes, value) if fits(takes, value) => {}
             (ValueType::Choice(choices), DeValue::String(word)) => {
-                let mut help = format!("Expected {}.", field.takes);
-                if let Some(intended) = nearest(word, choices.iter().map(|c| c.name)) {
-                    help += &format!(" Did you mean {intended:?}?");
-                }
+                let intended = did_you_mean(word, choices.iter().map(|c| c.name));
+                let help = format!("Expected {}.{intended}", field.takes);
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
             (ValueType::Tables(_), _) if self.path.len() == 1 => {
