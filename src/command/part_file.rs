@@ -7,7 +7,7 @@ use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::{Depth, Film, ImageOutput};
 use crate::render::RenderState;
-use crate::render::export::{Provenance, metadata};
+use crate::render::export::{Provenance, film_header};
 use crate::render::plan::Part;
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
@@ -62,14 +62,7 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
         sampler: settings.sampler,
         adaptive: true,
     };
-    let mut header = FilmFileHeader {
-        film: state.film.header().clone(),
-        weights: state.mix.clone(),
-        group_names: state.group_names(),
-        display: settings.display,
-        metadata: metadata(state, report, &provenance, &settings.display),
-        chunks: Default::default(),
-    };
+    let mut header = film_header(state, report, &provenance, settings.display);
     part.record(&mut header);
     header
 }

@@ -77,7 +77,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         bar.tick();
     }
     bar.finish_and_clear();
-    let state = pilot.rendering();
+    let state = &pilot.state;
     let settings = PlanSettings {
         source: path.display().to_string(),
         scene_hash: scene_hash(document.text(), document.scene()),
@@ -91,7 +91,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         shards: args.shards,
         base_plan: None,
     };
-    let mut schedule = pilot.schedule().clone();
+    let mut schedule = pilot.schedule.clone();
     schedule.set_stop(stop(args.noise));
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
         .ok_or("the pilot has no estimate of its noise")?;
@@ -107,7 +107,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         base_file.display(),
         part_file::summary(&report),
         schedule.rays(),
-        pilot.seconds()
+        pilot.seconds
     ))?;
     Ok(part.plan)
 }

@@ -262,7 +262,7 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
 /// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
 /// of the checkpoint.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
-    let weights = checkpoint.weights().clone();
+    let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
     if session.with(move |state, _| state.mix != weights) == Some(true) {
         warn(

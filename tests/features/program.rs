@@ -61,7 +61,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
             break reason;
         }
     };
-    let glossy = tiles(&render.rendering().film, &scene).into_iter().filter(|(_, g)| *g);
+    let glossy = tiles(&render.state.film, &scene).into_iter().filter(|(_, g)| *g);
     let samples: Vec<u32> = glossy.map(|(samples, _)| samples).collect();
     let most = samples.iter().copied().max().unwrap_or(0);
     let noise = render.noise_codes().unwrap_or(f64::INFINITY);
@@ -257,7 +257,7 @@ fn a15_user_edits() {
         let settings = settings(false, 0, SPP);
         let mut render = SyncRender::new(scene, &options(), settings, 2).unwrap();
         while render.step().is_none() {}
-        render.schedule().samples()
+        render.schedule.samples()
     };
     assert!(sample_count(&capped) < sample_count(history.scene()));
     // Undoing all edits restores the scene and its picture.
