@@ -65,25 +65,25 @@ struct DoctorReport {
 impl DoctorReport {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
-        let row = |name: &str, value: String| indented(&format!("{name:<NAME$}"), &value);
-        lines.push(row("terminal", self.terminal()));
-        lines.push(row("multiplexer", self.multiplexer()));
-        lines.push(row("colours", self.colors()));
+        let row = |name: &str, value: &str| indented(&format!("{name:<NAME$}"), value);
+        lines.push(row("terminal", &self.terminal()));
+        lines.push(row("multiplexer", &self.multiplexer()));
+        lines.push(row("colours", &self.colors()));
         if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.diagnosis {
-            lines.push(row("background", background(terminal)));
-            lines.push(row("size", size(*cells, *pixels)));
+            lines.push(row("background", &background(terminal)));
+            lines.push(row("size", &size(*cells, *pixels)));
             lines.push(row("whole frames", whole_frames(terminal)));
-            lines.push(row("still pictures", stills(terminal)));
-            lines.push(row("keyboard", "plain key sequences; nothing special is needed".into()));
+            lines.push(row("still pictures", &stills(terminal)));
+            lines.push(row("keyboard", "plain key sequences; nothing special is needed"));
             lines.push(row("acknowledgement", acknowledgement(*mode)));
-            lines.push(row("round trip", round_trip(terminal)));
-            lines.push(row("rate", self.rate(*mode, *rate)));
+            lines.push(row("round trip", &round_trip(terminal)));
+            lines.push(row("rate", &self.rate(*mode, *rate)));
         }
-        lines.push(row("connection", self.connection()));
-        lines.push(row("text", self.text()));
-        lines.push(row("unsaved edits", self.unsaved()));
+        lines.push(row("connection", &self.connection()));
+        lines.push(row("text", &self.text()));
+        lines.push(row("unsaved edits", &self.unsaved()));
         lines.extend(
-            self.unsaved_files.iter().map(|path| row("", format!("file: {}", shown(path)))),
+            self.unsaved_files.iter().map(|path| row("", &format!("file: {}", shown(path)))),
         );
         let hints = self.hints();
         if !hints.is_empty() {
@@ -261,12 +261,11 @@ fn size([columns, rows]: [u16; 2], pixels: Option<[u16; 2]>) -> String {
     format!("{columns} x {rows} cells{pixels}")
 }
 
-fn whole_frames(terminal: &Capabilities) -> String {
-    let update = match terminal.synchronised {
+fn whole_frames(terminal: &Capabilities) -> &'static str {
+    match terminal.synchronised {
         true => "shown at once (mode 2026)",
         false => "shown while they arrive (no mode 2026)",
-    };
-    update.to_string()
+    }
 }
 
 fn stills(terminal: &Capabilities) -> String {
@@ -280,15 +279,14 @@ fn stills(terminal: &Capabilities) -> String {
     format!("in half blocks: {missing}")
 }
 
-fn acknowledgement(mode: PacingMode) -> String {
-    let source = match mode {
+fn acknowledgement(mode: PacingMode) -> &'static str {
+    match mode {
         PacingMode::Unlimited => "none needed (local terminal)",
         PacingMode::AckClocked(None) => "replies of the terminal",
         PacingMode::AckClocked(Some(_)) => "replies of the terminal, through the multiplexer",
         PacingMode::SendQueue => "length of the TCP send queue (/proc/net/tcp)",
         PacingMode::FixedRate => "none: frames are sent at a fixed rate; --bandwidth sets it",
-    };
-    source.to_string()
+    }
 }
 
 fn round_trip(terminal: &Capabilities) -> String {

@@ -148,7 +148,7 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
 
 /// Reads the scene file at `path` and reports the progress of large meshes and images on stderr.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
-    Ok(Document::read_with(path, LoadReporter::new().assets)?)
+    Ok(Document::read(path, LoadReporter::new().assets)?)
 }
 
 /// Reads the scene file at `path` as [`read_scene`] does, and prints its warnings.

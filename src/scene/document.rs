@@ -44,20 +44,12 @@ impl Scene {
 }
 
 impl Document {
-    /// Reads and validates the scene file at `path`.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
-    pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        Self::read_with(path, Arc::default())
-    }
-
     /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
     /// scene refers to.
     ///
     /// # Errors
     /// The errors of [`Scene::read`].
-    pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+    pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 

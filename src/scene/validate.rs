@@ -106,15 +106,15 @@ impl Scene {
     /// Loads the files that the scene refers to, except for those that are loaded already. Files
     /// that cannot be read are errors in the next validation.
     pub fn resolve(&mut self) {
-        let resolver = &self.resolver;
+        let (resolver, assets) = (&self.resolver, self.resolver.assets());
         for object in &mut self.objects {
-            object.shape.resolve(|name| resolver.mesh(name));
+            object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }
         for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
-            environment.resolve(|name| resolver.radiance_map(name));
+            environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
         }
         for material in self.materials.values_mut() {
-            material.resolve(|name| resolver.image(name));
+            material.resolve(|name| assets.image(&resolver.path(name)));
         }
     }
 

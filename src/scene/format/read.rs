@@ -6,7 +6,7 @@ use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{line_column, locate, subject_in};
-use crate::scene::{AssetResolver, Object, Scene};
+use crate::scene::{AssetResolver, Document, Object, Scene};
 use crate::value::{TomlError, TomlValue, sort_by_number};
 use std::fs::File;
 use std::io::{self, Read};
@@ -32,9 +32,7 @@ impl Scene {
     /// unknown keys, wrong types, values out of range, undefined names. Values are validated only
     /// if there are no errors in keys and types.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        let resolver = AssetResolver::new(path, Arc::default());
-        read_text(path, |path| File::open(path))
-            .and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
+        Document::read(path, Arc::default()).map(Document::into_scene)
     }
 
     /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
