@@ -68,10 +68,13 @@ impl Progress {
 
 fn new_bar() -> ProgressBar {
     // The bar has 10 columns, so that the message with the remaining time fits into 80 columns.
-    let style = ProgressStyle::with_template("{bar:10} {percent:>3} %  {wide_msg}")
-        .expect("the template is well-formed");
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-    bar.with_style(style)
+    bar.with_style(style("{bar:10} {percent:>3} %  {wide_msg}"))
+}
+
+/// Returns the style of a progress bar with the parts of `template`, which must be well-formed.
+pub fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).expect("the template is well-formed")
 }
 
 /// Formats the progress of a render, such as
