@@ -66,7 +66,9 @@ pub fn measure(
     let total = 1 + variants.len() * plan.repetitions.max(1);
     let mut keep_going = report(Progress { step: "reference", done: 0, total });
 
-    warm_up(default)?;
+    let mut warm_up = default.start()?;
+    while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
+    drop(warm_up);
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
     let rendered = match reference {
         Some(given) => RenderedReference { reference: given, spp: 0.0, seconds: 0.0 },
@@ -176,12 +178,6 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
-}
-
-fn warm_up(variant: &Variant) -> io::Result<()> {
-    let mut render = variant.start()?;
-    while render.seconds < WARM_UP_SECONDS && render.step().is_none() {}
-    Ok(())
 }
 
 /// Reference picture with the cost of rendering it.

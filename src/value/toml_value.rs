@@ -270,21 +270,6 @@ macro_rules! one_of {
 }
 pub(crate) use one_of;
 
-fn float(value: &Spanned<DeValue>) -> Result<f64, TomlError> {
-    match value.get_ref() {
-        DeValue::Float(digits) => {
-            let digits = digits.as_str();
-            let number = digits.parse().ok();
-            // A number too large for the type is parsed as infinite.
-            number
-                .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
-                .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
-        }
-        DeValue::Integer(_) => integer(value).map(|number| number as f64),
-        _ => Err(wrong(value, "a number")),
-    }
-}
-
 fn integer(value: &Spanned<DeValue>) -> Result<i64, TomlError> {
     let digits = value.get_ref().as_integer().ok_or_else(|| wrong(value, "an integer"))?;
     let number = i64::from_str_radix(digits.as_str(), digits.radix());
@@ -312,7 +297,18 @@ fn exactly<'a>(
 
 impl TomlValue for f64 {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        float(value)
+        match value.get_ref() {
+            DeValue::Float(digits) => {
+                let digits = digits.as_str();
+                let number = digits.parse().ok();
+                // A number too large for the type is parsed as infinite.
+                number
+                    .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
+                    .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
+            }
+            DeValue::Integer(_) => integer(value).map(|number| number as f64),
+            _ => Err(wrong(value, "a number")),
+        }
     }
 
     fn to_toml(&self) -> Value {

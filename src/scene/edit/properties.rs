@@ -7,7 +7,7 @@ use crate::scene::edit::parse_value::{floats, show};
 use crate::scene::edit::toml_view::{exclusive_keys, fields, get, read};
 use crate::scene::edit::{EditError, Target};
 use crate::scene::format::emit::{color, preset};
-use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
+use crate::value::{DefaultValue, Field, NumberRange, ValueType, names, number};
 use toml::{Table, Value};
 
 /// Word that a property accepts as its value.
@@ -260,10 +260,7 @@ fn expected(takes: ValueType) -> String {
         ValueType::Color(NumberRange { high, .. }) => {
             format!("red, green, blue (linear, 0 to {}) or #rrggbb", number(high))
         }
-        ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => {
-            let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            format!("one of {}", names.join(", "))
-        }
+        ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => format!("one of {}", names(kinds)),
         ValueType::Choice(choices) => {
             let names: Vec<_> = choices.iter().map(|c| c.name).collect();
             format!("one of {}", names.join(", "))

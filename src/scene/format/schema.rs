@@ -7,7 +7,8 @@ use crate::scene::format::source_map::subject_in;
 use crate::scene::format::suggest::{did_you_mean, nearest};
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
 use crate::value::{
-    Color, DefaultValue, Description, Field, NumberRange, ValueType, sort_by_number, truncated,
+    Color, DefaultValue, Description, Field, NumberRange, ValueType, names, sort_by_number,
+    truncated,
 };
 use crate::{camera, light, material};
 use std::ops;
@@ -137,16 +138,15 @@ impl SchemaChecker<'_> {
         if self.errors.skips(self.part.in_file(key.span().start)) {
             return None;
         }
-        let names = || fields.iter().map(|f| f.name);
-        let known = names().collect::<Vec<_>>().join(", ");
-        let help = format!("Known: {known}.{}", did_you_mean(key.get_ref(), names()));
+        let known = || fields.iter().map(|f| f.name);
+        let help = format!("Known: {}.{}", names(fields), did_you_mean(key.get_ref(), known()));
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
             inner => format!(" in {}", truncated(&inner)),
         };
         let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
         self.add(key.span(), found, help);
-        nearest(key.get_ref(), names())
+        nearest(key.get_ref(), known())
     }
 
     fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
