@@ -68,8 +68,8 @@ pub(super) struct FirstDiagnostics {
 }
 
 impl FirstDiagnostics {
-    /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and column.
-    /// `make` is not called if there are enough diagnostics at smaller offsets.
+    /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and
+    /// column. `make` is not called if there are enough diagnostics at smaller offsets.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;

@@ -189,8 +189,8 @@ impl Scene {
                     truncated(materials[part]),
                 )
             };
-            let help = "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
-                        another mapping works: \"auto\" takes the one that suits the shape.";
+            let help = "Expected a mesh whose file has them, a rectangle or a platform. On other \
+                        shapes another mapping works: \"auto\" takes the one that suits the shape.";
             let path = ["object", &i.to_string(), "material"];
             problems.report(&path, || (found(), help.to_string()));
         }

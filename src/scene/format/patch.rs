@@ -42,9 +42,9 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Returns the keys whose values are compared between the tables `old` and `new` of the type `takes`,
-/// each with the type of its value: all keys of the type, or the names that occur in either table.
-/// Keys that only `new` has are added to the file in this order.
+/// Returns the keys whose values are compared between the tables `old` and `new` of the type
+/// `takes`, each with the type of its value: all keys of the type, or the names that occur in
+/// either table. Keys that only `new` has are added to the file in this order.
 fn keys(takes: ValueType, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
     match takes {
         ValueType::Table(fields) | ValueType::OneOf(fields) => {
@@ -58,8 +58,9 @@ fn keys(takes: ValueType, old: &toml::Table, new: &toml::Table) -> Vec<(String, 
     }
 }
 
-/// Changes `table`, which describes `old`, to describe `new`. `takes` is the type of the table. Inner
-/// tables may have `[headers]` if `headers` is `true`. The comments of removed tables go to `keeper`.
+/// Changes `table`, which describes `old`, to describe `new`. `takes` is the type of the table.
+/// Inner tables may have `[headers]` if `headers` is `true`. The comments of removed tables go to
+/// `keeper`.
 fn patch_table(
     keeper: &mut CommentKeeper,
     table: &mut dyn TableLike,
@@ -81,8 +82,8 @@ fn patch_table(
             _ => {}
         }
     }
-    // If exactly one key was removed, the first new key takes over its comments. Examples are the key
-    // of a shape that was converted to another kind, and `direction` in place of `target`.
+    // If exactly one key was removed, the first new key takes over its comments. Examples are the
+    // key of a shape that was converted to another kind, and `direction` in place of `target`.
     let successor = added.first().filter(|_| removed.len() == 1);
     for key in removed {
         let decor = table.key(&key).map(|k| k.leaf_decor().clone());

@@ -59,8 +59,8 @@ impl Scene {
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
-    /// First of the `former_words` in the file, with the name of its table in diagnostics. `None` if
-    /// there are no former words.
+    /// First of the `former_words` in the file, with the name of its table in diagnostics. `None`
+    /// if there are no former words.
     first_word: Option<(FormerWord, String)>,
     name: &'a str,
     text: &'a str,

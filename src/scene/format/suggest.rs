@@ -18,8 +18,8 @@ pub(crate) fn nearest<'a>(
     (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
-/// Returns the question ` Did you mean "word"?` with the word of `words` most similar to `given`, or
-/// an empty string if `given` is unlikely to be one of them.
+/// Returns the question ` Did you mean "word"?` with the word of `words` most similar to `given`,
+/// or an empty string if `given` is unlikely to be one of them.
 pub(crate) fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
     let word = nearest(given, words).map(truncated);
     word.map_or(String::new(), |word| format!(" Did you mean \"{word}\"?"))
