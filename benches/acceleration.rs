@@ -162,7 +162,7 @@ fn main() {
     ];
     let file = |name: &str| {
         let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
-        Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone()
+        Document::read(&path, Default::default()).unwrap_or_else(|e| panic!("{e}")).scene().clone()
     };
     let scenes = [
         ("reflecting tracks, 401 spheres", file("reflecting-tracks.toml")),

@@ -131,7 +131,10 @@ fn main() {
     println!("samples");
     for name in ["mirror-room-physical", "transmission", "water-glass", "reflecting-tracks"] {
         let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name).with_extension("toml");
-        let mut scene = Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone();
+        let mut scene = Document::read(&path, Default::default())
+            .unwrap_or_else(|e| panic!("{e}"))
+            .scene()
+            .clone();
         scene.film.size = [160, 120];
         let mut tracers = (
             renderer::<Single>(&scene),

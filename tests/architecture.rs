@@ -128,6 +128,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),
+    ("strsim", &["scene"]),
     // `asset` uses tempfile in tests only.
     ("tempfile", &["film", "disk", "command", "scene", "dashboard", "asset"]),
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),

@@ -61,7 +61,7 @@ fn every_scene_reads_and_has_a_title_comment() {
     let paths = files("scenes");
     assert!(paths.len() >= 30, "only {} scenes", paths.len());
     for path in paths {
-        let document = Document::read(&path).unwrap_or_else(|e| panic!("{e}"));
+        let document = Document::read(&path, Default::default()).unwrap_or_else(|e| panic!("{e}"));
         let text = document.text();
         assert!(text.starts_with("# "), "{} opens without a comment", path.display());
         let file = path.file_name().unwrap().to_str().unwrap();

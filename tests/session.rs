@@ -150,6 +150,6 @@ fn checkpoint_cost() {
             megabytes / written.as_secs_f64(),
             megabytes / seconds
         );
-        assert_eq!(read.header().film.width, 1920);
+        assert_eq!(read.header.film.width, 1920);
     }
 }

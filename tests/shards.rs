@@ -49,14 +49,14 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
         size: scene.film.size,
         seed,
         sampler: SamplerKind::Sobol,
-        precision: pilot.rendering().world.precision().to_string(),
+        precision: pilot.state.world.precision().to_string(),
         display: Display::default(),
         rays_per_pixel: scene.film.rays_per_pixel,
         noise_codes: noise,
         shards,
         base_plan: None,
     };
-    let mut schedule = pilot.schedule().clone();
+    let mut schedule = pilot.schedule.clone();
     schedule.set_stop(until(noise).stop);
     Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings).unwrap()
 }
@@ -75,7 +75,7 @@ fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
 /// process). Also returns the number of rays of each shard.
 fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u64>) {
     let mut state = RenderState::new(scene, &options(plan.settings.seed), None);
-    state.film.add(&pilot.rendering().film).unwrap();
+    state.film.add(&pilot.state.film).unwrap();
     let mut rays = Vec::new();
     for number in 1..=plan.settings.shards {
         let (part, shard_rays) = shard(scene, plan, number);
@@ -98,7 +98,7 @@ fn merged_film_equals_one_process_and_is_the_expected_one() {
     let state = RenderState::new(&scene, &options(3), None);
     let mut one = ShardRender::new(state, &ends, 0, THREADS).unwrap();
     while one.step() {}
-    let pilot_rays = pilot.schedule().rays();
+    let pilot_rays = pilot.schedule.rays();
     let (sum, rays) = merged(&scene, &plan, pilot);
     assert!(sum.film.bytes() == one.state.film.bytes());
     assert_eq!(pilot_rays + rays.iter().sum::<u64>(), one.rays());
@@ -149,10 +149,10 @@ struct Planned {
 
 fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planned {
     let scene = scene(name, size);
-    let reference = adaptive(&scene, seed, target).schedule().rays() as f64;
+    let reference = adaptive(&scene, seed, target).schedule.rays() as f64;
     let pilot = adaptive(&scene, seed, 2.0 * target);
     let plan = plan(&scene, &pilot, seed, target, 8);
-    let pilot_rays = pilot.schedule().rays() as f64;
+    let pilot_rays = pilot.schedule.rays() as f64;
     let (sum, shards) = merged(&scene, &plan, pilot);
     let total: u64 = shards.iter().sum();
     let largest = shards.iter().max().copied().unwrap_or(0) as f64;

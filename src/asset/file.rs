@@ -62,6 +62,12 @@ impl FileContents {
         AssetError { place, ..AssetError::of_file(&self.path, found, expected) }
     }
 
+    /// Creates an error about this file as a whole. `found` and `expected` are those of
+    /// [`FileContents::error`].
+    pub fn fault(&self, found: impl Into<String>, expected: &str) -> AssetError {
+        self.error(FileLocation::Whole, found, expected)
+    }
+
     /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file,
     /// by the rule in docs/scene-format.md. Returns `None` if `name` is an absolute path, a path
     /// with `..` or a URL, because it could then name a file outside of the folder.

@@ -1,6 +1,6 @@
 //! Images for textures, from PNG and JPEG files.
 
-use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;
 use crate::value::{Fnv1a64, linear_from_srgb};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
@@ -65,8 +65,7 @@ impl Image {
         let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
         let mut reader = reader.map_err(|e| decode_error(source, &ImageError::IoError(e)))?;
         if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
-            let found = "this is neither a PNG nor a JPEG";
-            return Err(source.error(FileLocation::Whole, found, "a PNG or JPEG image"));
+            return Err(source.fault("this is neither a PNG nor a JPEG", "a PNG or JPEG image"));
         }
         let mut limits = Limits::default();
         limits.max_alloc = Some(MAX_PIXELS * 8);
@@ -127,15 +126,11 @@ impl Image {
     /// Panics if the image has no such pixel.
     pub fn height(&self, x: u32, y: u32) -> f32 {
         let index = self.index(x, y);
-        let sum: f32 = match &self.texels {
-            Texels::Bytes(t) => {
-                t[index..index + self.channels].iter().map(|b| f32::from(*b) / 255.0).sum()
-            }
-            Texels::Words(t) => {
-                t[index..index + self.channels].iter().map(|b| f32::from(*b) / 65535.0).sum()
-            }
+        let level = |i: usize| match &self.texels {
+            Texels::Bytes(t) => f32::from(t[i]) / 255.0,
+            Texels::Words(t) => f32::from(t[i]) / 65535.0,
         };
-        sum / self.channels as f32
+        (index..index + self.channels).map(level).sum::<f32>() / self.channels as f32
     }
 
     fn index(&self, x: u32, y: u32) -> usize {
@@ -158,21 +153,17 @@ pub(super) fn check_size(
     if width.max(height) > max_side || pixels > max_pixels || pixels == 0 {
         let least = if pixels == 0 { "at least one, " } else { "" };
         let expected = format!("{least}at most {max_side} a side and {max_pixels} altogether");
-        return Err(source.error(FileLocation::Whole, size, &expected));
+        return Err(source.fault(size, &expected));
     }
     if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
         let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
-        return Err(source.error(FileLocation::Whole, found, "a whole image"));
+        return Err(source.fault(found, "a whole image"));
     }
     Ok(())
 }
 
 fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
-    source.error(
-        FileLocation::Whole,
-        format!("the image cannot be read: {error}"),
-        "a PNG or JPEG image",
-    )
+    source.fault(format!("the image cannot be read: {error}"), "a PNG or JPEG image")
 }
 
 #[cfg(test)]

@@ -7,8 +7,13 @@ use std::sync::Arc;
 
 /// Content of an asset file, or the error of reading it. `None` before the first attempt to read
 /// it.
-#[derive(Clone)]
 pub struct Loaded<T>(Option<Result<Arc<T>, AssetError>>);
+
+impl<T> Clone for Loaded<T> {
+    fn clone(&self) -> Self {
+        Self(self.0.clone())
+    }
+}
 
 impl<T> Default for Loaded<T> {
     fn default() -> Self {

@@ -66,7 +66,7 @@ impl RadianceMap {
                 let exposure = decoder.metadata().exposure.unwrap_or(1.0);
                 if !(exposure.is_finite() && exposure > 0.0) {
                     let found = format!("the exposure of the image is {exposure}");
-                    return Err(source.error(FileLocation::Whole, found, "an exposure above 0"));
+                    return Err(source.fault(found, "an exposure above 0"));
                 }
                 decode(source, decoder, 1.0 / exposure)
             }
@@ -83,10 +83,7 @@ impl RadianceMap {
                 let pixels = (0..height).flat_map(row).map(|(x, y)| image.color(x, y)).collect();
                 Ok(Self::new(image.size(), pixels))
             }
-            _ => {
-                let found = "this is no image of a known format";
-                Err(source.error(FileLocation::Whole, found, EXPECTED))
-            }
+            _ => Err(source.fault("this is no image of a known format", EXPECTED)),
         }
     }
 
@@ -203,10 +200,8 @@ fn decode(
 fn check_layers(source: &FileContents) -> Result<(), AssetError> {
     // The type of the reader is that of the decoder, so that its functions are not compiled twice.
     let reader = Tracking::new(Cursor::new(&source.bytes[..]));
-    let data = MetaData::read_from_buffered(reader, false).map_err(|error| {
-        let found = format!("the header cannot be read: {error}");
-        source.error(FileLocation::Whole, found, EXPECTED)
-    })?;
+    let data = MetaData::read_from_buffered(reader, false)
+        .map_err(|error| source.fault(format!("the header cannot be read: {error}"), EXPECTED))?;
     let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     data.headers.iter().try_for_each(|header| {
         let size = [side(header.layer_size.0), side(header.layer_size.1)];
@@ -215,7 +210,7 @@ fn check_layers(source: &FileContents) -> Result<(), AssetError> {
 }
 
 fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
-    source.error(FileLocation::Whole, format!("the image cannot be read: {error}"), EXPECTED)
+    source.fault(format!("the image cannot be read: {error}"), EXPECTED)
 }
 
 #[cfg(test)]

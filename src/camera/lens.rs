@@ -1,36 +1,30 @@
 //! Description of a thin lens: its aperture and the plane in focus.
 
 use crate::camera::{Camera, ViewAngle};
-use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, ValueType, one_of};
+use crate::value::{ValidationError, one_of};
 use glam::DVec3;
 
-/// Aperture of the camera's lens, given by its radius or its f-number. The blur of objects outside
-/// of the plane in focus is in proportion to the radius.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Aperture {
-    /// Radius of the lens in scene units; 0 is a pinhole.
-    Radius(f64),
-    /// F-number: focal length divided by the diameter of the lens. The radius follows from it for
-    /// film of 36 x 24 mm and scene units of one metre.
-    FNumber(f64),
+one_of! {
+    /// Aperture of the camera's lens, given by its radius or its f-number. The blur of objects
+    /// outside of the plane in focus is in proportion to the radius.
+    pub enum Aperture {
+        /// Radius of the lens; 0 is a pinhole.
+        Radius(f64) = "radius", in closed(0.0, MAX_RADIUS) "scene units";
+        /// Focal length divided by the diameter of the lens, for film of 36 x 24 mm and scene units
+        /// of 1 m.
+        FNumber(f64) = "f_number", in closed(0.01, 1e9);
+    }
 }
 
 one_of! {
-    Aperture { "radius" => Radius, "f_number" => FNumber }
-}
-
-/// Plane in focus of the camera's lens, perpendicular to the view direction. It is given by its
-/// distance or by a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Focus {
-    /// Distance of the plane in focus from the eye along the view direction, in scene units.
-    Distance(f64),
-    /// Any point of the plane in focus, in scene coordinates.
-    Point([f64; 3]),
-}
-
-one_of! {
-    Focus { "distance" => Distance, "point" => Point }
+    /// Plane in focus of the camera's lens, perpendicular to the view direction. It is given by its
+    /// distance or by a point.
+    pub enum Focus {
+        /// Distance from the eye along the view direction.
+        Distance(f64) = "distance", in SIZE "scene units";
+        /// A point that is in focus; the plane contains it.
+        Point([f64; 3]) = "point", in COORDINATE "scene units";
+    }
 }
 
 /// Largest valid lens radius, in scene units.
@@ -44,87 +38,6 @@ const MIN_FOCUS_PER_RADIUS: f64 = 1e-6;
 const HALF_FILM_HEIGHT: f64 = 0.012;
 /// Half the width of the picture on film of 36 x 24 mm \[m\].
 const HALF_FILM_WIDTH: f64 = 0.018;
-
-const APERTURES: &[Field] = &[
-    Field::required(
-        "radius",
-        ValueType::Number(NumberRange::closed(0.0, MAX_RADIUS)),
-        "scene units",
-        "Radius of the lens; 0 is a pinhole.",
-    ),
-    Field::required(
-        "f_number",
-        ValueType::Number(NumberRange::closed(0.01, 1e9)),
-        "",
-        "Focal length divided by the diameter of the lens, for film of 36 x 24 mm and scene units of \
-         1 m.",
-    ),
-];
-
-const FOCI: &[Field] = &[
-    Field::required(
-        "distance",
-        ValueType::Number(NumberRange::SIZE),
-        "scene units",
-        "Distance from the eye along the view direction.",
-    ),
-    Field::required(
-        "point",
-        ValueType::Numbers(3, NumberRange::COORDINATE),
-        "scene units",
-        "A point that is in focus; the plane contains it.",
-    ),
-];
-
-/// Returns the validation errors of `inner` with the name of the field `outer` before each key,
-/// such as `focus.point`.
-pub(super) fn inside(outer: &Field, inner: Validator) -> Vec<ValidationError> {
-    let mut errors = inner.errors();
-    for error in &mut errors {
-        error.found = format!("{}.{}", outer.name, error.found);
-    }
-    errors.into_iter().map(|error| error.prefixed(outer.name)).collect()
-}
-
-impl FieldValue for Aperture {
-    type Written = Self;
-    const TYPE: ValueType = ValueType::OneOf(APERTURES);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let validator = Validator::new(APERTURES);
-        inside(
-            field,
-            match self {
-                Self::Radius(radius) => validator.field("radius", radius),
-                Self::FNumber(number) => validator.field("f_number", number),
-            },
-        )
-    }
-}
-
-impl FieldValue for Focus {
-    type Written = Self;
-    const TYPE: ValueType = ValueType::OneOf(FOCI);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let validator = Validator::new(FOCI);
-        inside(
-            field,
-            match self {
-                Self::Distance(distance) => validator.field("distance", distance),
-                Self::Point(point) => validator.field("point", point),
-            },
-        )
-    }
-}
 
 impl Camera {
     /// Returns the radius of the lens in scene units, 0 to 1e9; 0 is a pinhole.

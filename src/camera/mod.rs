@@ -7,10 +7,7 @@ mod perspective;
 pub use lens::{Aperture, Focus};
 pub use perspective::{PerspectiveCamera, ThinLens};
 
-use crate::value::{
-    Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
-    description, one_of, unit,
-};
+use crate::value::{Description, Field, ValidationError, description, one_of, unit};
 use glam::DVec3;
 
 description! {
@@ -36,17 +33,14 @@ description! {
     }
 }
 
-/// Opening angle of the camera in degrees, between 0 and 180.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ViewAngle {
-    /// Opening angle across the picture's height, in degrees.
-    Vertical(f64),
-    /// Opening angle across the picture's width, in degrees.
-    Horizontal(f64),
-}
-
 one_of! {
-    ViewAngle { "vertical" => Vertical, "horizontal" => Horizontal }
+    /// Opening angle of the camera in degrees, between 0 and 180.
+    pub enum ViewAngle {
+        /// Across the picture's height.
+        Vertical(f64) = "vertical", in between(0.0, 180.0) "degrees";
+        /// Across the picture's width.
+        Horizontal(f64) = "horizontal", in between(0.0, 180.0) "degrees";
+    }
 }
 
 fn eye() -> [f64; 3] {
@@ -80,26 +74,6 @@ impl Default for Camera {
 
 /// Keys of the `[camera]` table in scene files.
 pub const FIELDS: &[Field] = Camera::FIELDS;
-
-const ANGLE: ValueType = ValueType::Number(NumberRange::between(0.0, 180.0));
-const VIEW_ANGLES: &[Field] = &[
-    Field::required("vertical", ANGLE, "degrees", "Across the picture's height."),
-    Field::required("horizontal", ANGLE, "degrees", "Across the picture's width."),
-];
-
-impl FieldValue for ViewAngle {
-    type Written = Self;
-    const TYPE: ValueType = ValueType::OneOf(VIEW_ANGLES);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let (key, degrees) = self.key_degrees();
-        lens::inside(field, Validator::new(VIEW_ANGLES).field(key, &degrees))
-    }
-}
 
 impl ViewAngle {
     /// Returns the key of the opening angle in scene files, `vertical` or `horizontal`, and the

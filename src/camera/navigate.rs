@@ -9,7 +9,7 @@
 //! away from `up`.
 
 use crate::camera::{Camera, ViewAngle};
-use crate::value::{floor_log10, round_significant, rounded_to, unit};
+use crate::value::{round_fine, round_significant, rounded_to, unit};
 use glam::DVec3;
 
 /// Steepest view up or down that interactive movements allow, in degrees above or below the plane
@@ -145,7 +145,7 @@ impl Camera {
         if !(distance > 0.0 && distance.is_finite()) {
             return self.clone();
         }
-        let center = DVec3::from_array(center).map(|x| rounded(x, distance));
+        let center = DVec3::from_array(center).map(|x| round_fine(x, distance));
         let mut aimed = self.clone();
         if aimed.target.is_some() {
             aimed.target = Some(center.to_array());
@@ -192,11 +192,11 @@ impl Camera {
     /// otherwise the eye moves to `eye` and the target is kept.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
-        let round = |v: DVec3| v.map(|x| rounded(x, distance)).to_array();
+        let round = |v: DVec3| v.map(|x| round_fine(x, distance)).to_array();
         if let Some(direction) = next.direction {
             let length = DVec3::from_array(direction).length();
             let length = if length.is_normal() { length } else { 1.0 };
-            next.direction = Some((forward * length).map(|x| rounded(x, length)).to_array());
+            next.direction = Some((forward * length).map(|x| round_fine(x, length)).to_array());
         }
         if eye_stays {
             next.target = next.target.map(|_| round(eye + forward * distance));
@@ -212,7 +212,7 @@ impl Camera {
         let moved = |point: [f64; 3]| {
             std::array::from_fn(|i| match translation[i] {
                 0.0 => point[i],
-                by => rounded(point[i] + by, distance),
+                by => round_fine(point[i] + by, distance),
             })
         };
         let target = self.target.map(moved);
@@ -223,9 +223,4 @@ impl Camera {
     fn valid_or_self(&self, next: Self) -> Self {
         if next.faults().is_empty() { next } else { self.clone() }
     }
-}
-
-/// Rounds `x` to a multiple of a power of ten, which is about a millionth of `scale`.
-fn rounded(x: f64, scale: f64) -> f64 {
-    rounded_to(x, floor_log10(scale) - 6)
 }

@@ -2,7 +2,6 @@
 
 use crate::camera::{Camera, ViewAngle};
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::value::unit;
 use glam::DVec3;
 
 /// Perspective camera compiled for a film size. Directions of pixel corners are computed in double
@@ -52,32 +51,8 @@ impl ThinLens {
 impl PerspectiveCamera {
     /// Compiles `camera` for a film of `width` x `height` pixels. `origin` is the point of the
     /// scene that is the origin of the compiled coordinates.
-    ///
-    /// If `up` is parallel to the view direction, it is replaced by the coordinate axis that is
-    /// least parallel to this direction. Scene files cannot describe such a camera.
     pub fn new(camera: &Camera, [width, height]: [u32; 2], origin: DVec3) -> Self {
-        let eye = DVec3::from(camera.eye);
-        let forward = match (camera.direction, camera.target) {
-            (Some(direction), _) => DVec3::from(direction),
-            (None, Some(target)) => DVec3::from(target) - eye,
-            (None, None) => DVec3::NEG_Z,
-        };
-        let w = unit(forward).unwrap_or(DVec3::NEG_Z);
-        let up = unit(camera.up).unwrap_or(DVec3::Y);
-        let mut u = w.cross(up);
-        if u.length() <= 1e-6 {
-            let a = w.abs();
-            let least = if a.x <= a.y && a.x <= a.z {
-                DVec3::X
-            } else if a.y <= a.z {
-                DVec3::Y
-            } else {
-                DVec3::Z
-            };
-            u = w.cross(least);
-        }
-        let u = u.normalize();
-        let v = u.cross(w);
+        let [u, v, w] = camera.frame();
         let (width, height) = (f64::from(width), f64::from(height));
         // Half the width and half the height of the picture plane at unit distance from the eye.
         let (half_width, half_height) = match camera.view_angle {
@@ -91,7 +66,7 @@ impl PerspectiveCamera {
             }
         };
         Self {
-            eye: eye - origin,
+            eye: DVec3::from(camera.eye) - origin,
             u,
             v,
             w,

@@ -106,13 +106,23 @@ pub enum Command {
     /// Measure the cost of accuracy on a scene: seconds to a given noise, gain and cost of settings
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
-    Check(CheckArgs),
+    Check {
+        /// The scene file
+        scene: PathBuf,
+    },
     /// Print the origin of a picture, checkpoint or plan: scene, samples, noise, seed, shards
     Info(InfoArgs),
     /// Write a commented starter scene
-    New(NewArgs),
+    New {
+        /// The scene file to write; must not exist
+        file: PathBuf,
+    },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
-    Doctor(DoctorArgs),
+    Doctor {
+        /// Measure the rate of the connection as well, which takes a few seconds
+        #[arg(long)]
+        rate: bool,
+    },
 }
 
 /// Arguments of `zerkalo render`.
@@ -279,13 +289,6 @@ pub struct MeasureArgs {
     pub plot: Option<PathBuf>,
 }
 
-/// Arguments of `zerkalo check`.
-#[derive(Debug, Args)]
-pub struct CheckArgs {
-    /// The scene file
-    pub scene: PathBuf,
-}
-
 /// Arguments of `zerkalo watch`.
 #[derive(Debug, Args)]
 #[command(
@@ -310,21 +313,6 @@ pub struct InfoArgs {
     /// Compare the file with this scene; exit status 1 if it shows another one
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-}
-
-/// Arguments of `zerkalo new`.
-#[derive(Debug, Args)]
-pub struct NewArgs {
-    /// The scene file to write; must not exist
-    pub file: PathBuf,
-}
-
-/// Arguments of `zerkalo doctor`.
-#[derive(Debug, Args)]
-pub struct DoctorArgs {
-    /// Measure the rate of the connection as well, which takes a few seconds
-    #[arg(long)]
-    pub rate: bool,
 }
 
 /// Values of `--precision`, each with its help.

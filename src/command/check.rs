@@ -1,18 +1,18 @@
 //! `zerkalo check`: validates a scene and prints its contents.
 
-use crate::command::args::CheckArgs;
 use crate::command::{Failure, print_line, read_scene_and_warn, warn};
 use crate::render::memory_budget;
 use crate::world::{self, AnyWorld};
+use std::path::Path;
 
-pub fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let document = read_scene_and_warn(&args.scene)?;
+pub fn run(path: &Path) -> Result<(), Failure> {
+    let document = read_scene_and_warn(path)?;
     let scene = document.scene();
     let world = AnyWorld::compile(scene, &world::Options::default());
     let [width, height] = scene.film.size;
     let groups = world.group_names();
     let bytes = memory_budget::needed(scene.film.size, groups.len());
-    print_line(&format!("{}: valid", args.scene.display()))?;
+    print_line(&format!("{}: valid", path.display()))?;
     print_line(&format!("  contains  {}", world.inventory()))?;
     print_line(&format!("  picture   {width} x {height} pixels"))?;
     print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")))?;

@@ -7,7 +7,7 @@ use crate::render::EncodedCheckpoint;
 use crate::render::export::Provenance;
 use crate::render::session::Session;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -68,15 +68,12 @@ impl CheckpointWriter {
     /// Requests a checkpoint if the interval since the last one has passed. The call does not
     /// block.
     pub fn poll(&mut self, session: &Session) {
-        match self.results.try_recv() {
-            Ok(written) => {
-                self.busy = false;
-                self.due = Instant::now() + self.interval;
-                // An error is only a warning, because the next checkpoint may succeed, for example
-                // after space on the disk was freed.
-                written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
-            }
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
+        if let Ok(written) = self.results.try_recv() {
+            self.busy = false;
+            self.due = Instant::now() + self.interval;
+            // An error is only a warning, because the next checkpoint may succeed, for example
+            // after space on the disk was freed.
+            written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
         }
         if !self.busy && Instant::now() >= self.due {
             self.busy = true;

@@ -1,7 +1,6 @@
 //! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the
 //! dashboard uses them, and how to improve them.
 
-use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};
 use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
@@ -20,7 +19,7 @@ const COLUMNS: usize = 80;
 /// Width of the left part of the report, which holds the names, in columns of the terminal.
 const NAME: usize = 17;
 
-pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
+pub fn run(rate_requested: bool) -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let environment = Environment::of(variable);
     let obstacle = if environment.term == "dumb" {
@@ -32,14 +31,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     };
     let diagnosis = match obstacle {
         Some(reason) => Err(reason),
-        None => Ok(diagnose(environment.clone(), args.rate)
+        None => Ok(diagnose(environment.clone(), rate_requested)
             .map_err(|error| format!("the terminal cannot be used: {error}"))?),
     };
     let state = state_folder(|name| env::var_os(name));
     let report = DoctorReport {
         environment,
         diagnosis,
-        rate_requested: args.rate,
+        rate_requested,
         locale: ["LC_ALL", "LC_CTYPE", "LANG"]
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),
@@ -66,25 +65,25 @@ struct DoctorReport {
 impl DoctorReport {
     fn report(&self) -> String {
         let mut lines = vec![format!("zerkalo {}", env!("CARGO_PKG_VERSION")), String::new()];
-        let row = |name: &str, value: String| indented(&format!("{name:<NAME$}"), &value);
-        lines.push(row("terminal", self.terminal()));
-        lines.push(row("multiplexer", self.multiplexer()));
-        lines.push(row("colours", self.colors()));
+        let row = |name: &str, value: &str| indented(&format!("{name:<NAME$}"), value);
+        lines.push(row("terminal", &self.terminal()));
+        lines.push(row("multiplexer", &self.multiplexer()));
+        lines.push(row("colours", &self.colors()));
         if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.diagnosis {
-            lines.push(row("background", background(terminal)));
-            lines.push(row("size", size(*cells, *pixels)));
+            lines.push(row("background", &background(terminal)));
+            lines.push(row("size", &size(*cells, *pixels)));
             lines.push(row("whole frames", whole_frames(terminal)));
-            lines.push(row("still pictures", stills(terminal)));
-            lines.push(row("keyboard", "plain key sequences; nothing special is needed".into()));
+            lines.push(row("still pictures", &stills(terminal)));
+            lines.push(row("keyboard", "plain key sequences; nothing special is needed"));
             lines.push(row("acknowledgement", acknowledgement(*mode)));
-            lines.push(row("round trip", round_trip(terminal)));
-            lines.push(row("rate", self.rate(*mode, *rate)));
+            lines.push(row("round trip", &round_trip(terminal)));
+            lines.push(row("rate", &self.rate(*mode, *rate)));
         }
-        lines.push(row("connection", self.connection()));
-        lines.push(row("text", self.text()));
-        lines.push(row("unsaved edits", self.unsaved()));
+        lines.push(row("connection", &self.connection()));
+        lines.push(row("text", &self.text()));
+        lines.push(row("unsaved edits", &self.unsaved()));
         lines.extend(
-            self.unsaved_files.iter().map(|path| row("", format!("file: {}", shown(path)))),
+            self.unsaved_files.iter().map(|path| row("", &format!("file: {}", shown(path)))),
         );
         let hints = self.hints();
         if !hints.is_empty() {
@@ -262,12 +261,11 @@ fn size([columns, rows]: [u16; 2], pixels: Option<[u16; 2]>) -> String {
     format!("{columns} x {rows} cells{pixels}")
 }
 
-fn whole_frames(terminal: &Capabilities) -> String {
-    let update = match terminal.synchronised {
+fn whole_frames(terminal: &Capabilities) -> &'static str {
+    match terminal.synchronised {
         true => "shown at once (mode 2026)",
         false => "shown while they arrive (no mode 2026)",
-    };
-    update.to_string()
+    }
 }
 
 fn stills(terminal: &Capabilities) -> String {
@@ -281,15 +279,14 @@ fn stills(terminal: &Capabilities) -> String {
     format!("in half blocks: {missing}")
 }
 
-fn acknowledgement(mode: PacingMode) -> String {
-    let source = match mode {
+fn acknowledgement(mode: PacingMode) -> &'static str {
+    match mode {
         PacingMode::Unlimited => "none needed (local terminal)",
         PacingMode::AckClocked(None) => "replies of the terminal",
         PacingMode::AckClocked(Some(_)) => "replies of the terminal, through the multiplexer",
         PacingMode::SendQueue => "length of the TCP send queue (/proc/net/tcp)",
         PacingMode::FixedRate => "none: frames are sent at a fixed rate; --bandwidth sets it",
-    };
-    source.to_string()
+    }
 }
 
 fn round_trip(terminal: &Capabilities) -> String {

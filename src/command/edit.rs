@@ -29,10 +29,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     })?;
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
-    let checkpoint = match args.scene.as_deref().filter(|path| is_film_file(path)) {
-        Some(path) => Some(Checkpoint::read(path)?),
-        None => None,
-    };
+    let film = args.scene.as_deref().filter(|path| is_film_file(path));
+    let checkpoint = film.map(Checkpoint::read).transpose()?;
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, reporter.assets.clone())?),
         (None, Some(path)) => open(path, reporter.assets.clone(), state.as_deref())?,
@@ -46,7 +44,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         None => SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
     };
     let precision = match &checkpoint {
-        Some(checkpoint) if checkpoint.header().film.precision == "double" => Precision::Double,
+        Some(checkpoint) if checkpoint.header.film.precision == "double" => Precision::Double,
         Some(_) => Precision::Single,
         None => args.precision.precision,
     };
@@ -120,13 +118,13 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
 /// # Errors
 /// Fails if the scene in the checkpoint is not valid.
 fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
-    let source = checkpoint.header().source().unwrap_or_default();
+    let source = checkpoint.header.source().unwrap_or_default();
     if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
-        && checkpoint.inputs().fit(file.document().scene())
+        && checkpoint.inputs.fit(file.document().scene())
     {
         return Ok(file);
     }
-    Ok(SceneFile::untitled(checkpoint.inputs().scene.clone(), source)?)
+    Ok(SceneFile::untitled(checkpoint.inputs.scene.clone(), source)?)
 }
 
 /// Opens the scene file at `path`. The inner error means that the file can be read but is not a

@@ -67,25 +67,17 @@ impl Origin {
         };
         let (total, base_rays) = (plan.all_rays(), plan.rays(BASE));
         let each = (total - base_rays) / f64::from(settings.shards);
+        let rays = format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}");
+        let sampler = settings.sampler.name();
+        let method = settings_text(sampler, &settings.precision, true, &settings.display);
         let entries = [
             ("Source", settings.source.clone()),
             ("Scene hash", settings.scene_hash.clone()),
             ("Seed", settings.seed.to_string()),
-            (
-                "Settings",
-                settings_text(
-                    settings.sampler.name(),
-                    &settings.precision,
-                    true,
-                    &settings.display,
-                ),
-            ),
+            ("Settings", method),
             ("Plan", target(plan)),
             ("Base", base),
-            (
-                "Expected rays",
-                format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}"),
-            ),
+            ("Expected rays", rays),
             ("Checksum", format!("{:016x}", plan.checksum())),
         ];
         Self {

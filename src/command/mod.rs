@@ -74,10 +74,10 @@ pub fn main() -> ExitCode {
         Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Watch(args)) => watch::run(args),
         Some(Command::Measure(args)) => measure::run(args),
-        Some(Command::Check(args)) => check::run(args),
+        Some(Command::Check { scene }) => check::run(scene),
         Some(Command::Info(args)) => info::run(args),
-        Some(Command::New(args)) => new::run(args),
-        Some(Command::Doctor(args)) => doctor::run(args),
+        Some(Command::New { file }) => new::run(file),
+        Some(Command::Doctor { rate }) => doctor::run(*rate),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {
@@ -148,7 +148,7 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
 
 /// Reads the scene file at `path` and reports the progress of large meshes and images on stderr.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
-    Ok(Document::read_with(path, LoadReporter::new().assets)?)
+    Ok(Document::read(path, LoadReporter::new().assets)?)
 }
 
 /// Reads the scene file at `path` as [`read_scene`] does, and prints its warnings.

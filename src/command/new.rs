@@ -1,14 +1,14 @@
 //! `zerkalo new`: writes a starter scene to a new file.
 
-use crate::command::args::NewArgs;
 use crate::command::{Failure, print_line};
 use crate::disk::{Existing, replace_file};
 use crate::scene::starter;
 use std::io::Write;
+use std::path::Path;
 
-pub fn run(args: &NewArgs) -> Result<(), Failure> {
+pub fn run(path: &Path) -> Result<(), Failure> {
     let starter = starter().as_bytes();
-    replace_file(&args.file, Existing::Refuse, |file| file.write_all(starter))?;
-    let shown = args.file.display();
+    replace_file(path, Existing::Refuse, |file| file.write_all(starter))?;
+    let shown = path.display();
     print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"))
 }

@@ -2,11 +2,12 @@
 //! pictures of complete films.
 
 use crate::command::Failure;
+use crate::command::progress::noise;
 use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::{Depth, Film, ImageOutput};
 use crate::render::RenderState;
-use crate::render::export::{Provenance, metadata};
+use crate::render::export::{Provenance, film_header};
 use crate::render::plan::Part;
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
@@ -61,14 +62,7 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
         sampler: settings.sampler,
         adaptive: true,
     };
-    let mut header = FilmFileHeader {
-        film: state.film.header().clone(),
-        weights: state.mix.clone(),
-        group_names: state.group_names(),
-        display: settings.display,
-        metadata: metadata(state, report, &provenance, &settings.display),
-        chunks: Default::default(),
-    };
+    let mut header = film_header(state, report, &provenance, settings.display);
     part.record(&mut header);
     header
 }
@@ -77,11 +71,7 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
 /// the mean, smallest and largest number of samples per pixel, and the RMSE.
 pub fn summary(report: &Report) -> String {
     let spp = &report.spp;
-    let noise = match report.noise {
-        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
-        None => "noise unknown".to_string(),
-    };
-    format!("{:.0} spp ({}-{})  {noise}", spp.mean, spp.min, spp.max)
+    format!("{:.0} spp ({}-{})  {}", spp.mean, spp.min, spp.max, noise(report))
 }
 
 /// Writes `film` and `header` to the film file at `path`.

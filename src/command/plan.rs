@@ -2,6 +2,7 @@
 
 use crate::command::args::PlanArgs;
 use crate::command::part_file;
+use crate::command::progress::style;
 use crate::command::{Failure, print_line, read_scene_and_warn};
 use crate::disk::{self, check_writable};
 use crate::film::file::FilmReader;
@@ -12,7 +13,7 @@ use crate::render::schedule::{Settings, Stop, USUAL_SLOPE};
 use crate::render::session::Report;
 use crate::render::{Options, SyncRender};
 use crate::sampling::SampleSettings;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
@@ -69,7 +70,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     };
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
-    let bar = spinner();
+    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
     while pilot.step().is_none() {
         if let Some(noise) = pilot.noise_codes() {
             bar.set_message(format!("pilot: noise {noise:.2} of {pilot_noise} 8-bit levels"));
@@ -77,7 +78,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         bar.tick();
     }
     bar.finish_and_clear();
-    let state = pilot.rendering();
+    let state = &pilot.state;
     let settings = PlanSettings {
         source: path.display().to_string(),
         scene_hash: scene_hash(document.text(), document.scene()),
@@ -91,7 +92,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         shards: args.shards,
         base_plan: None,
     };
-    let mut schedule = pilot.schedule().clone();
+    let mut schedule = pilot.schedule.clone();
     schedule.set_stop(stop(args.noise));
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
         .ok_or("the pilot has no estimate of its noise")?;
@@ -107,7 +108,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         base_file.display(),
         part_file::summary(&report),
         schedule.rays(),
-        pilot.seconds()
+        pilot.seconds
     ))?;
     Ok(part.plan)
 }
@@ -159,10 +160,4 @@ fn stop(noise_codes: f64) -> Stop {
 
 fn settings(noise_codes: f64) -> Settings {
     Settings::new(true, stop(noise_codes))
-}
-
-fn spinner() -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} {msg}  {elapsed}")
-        .unwrap_or_else(|_| ProgressStyle::default_spinner());
-    ProgressBar::new_spinner().with_style(style)
 }

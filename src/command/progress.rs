@@ -68,22 +68,20 @@ impl Progress {
 
 fn new_bar() -> ProgressBar {
     // The bar has 10 columns, so that the message with the remaining time fits into 80 columns.
-    let style = ProgressStyle::with_template("{bar:10} {percent:>3} %  {wide_msg}")
-        .expect("the template is well-formed");
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-    bar.with_style(style)
+    bar.with_style(style("{bar:10} {percent:>3} %  {wide_msg}"))
+}
+
+/// Returns the style of a progress bar with the parts of `template`, which must be well-formed.
+pub fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).expect("the template is well-formed")
 }
 
 /// Formats the progress of a render, such as
 /// `33 spp (32-210) 41.2 Msamples/s noise 0.81 3-5 s left`. The first numbers are the mean,
 /// smallest and largest number of samples per pixel. The noise is in 8-bit levels.
 fn status(report: &Report) -> String {
-    let spp = &report.spp;
-    let mut text = if spp.min == spp.max {
-        format!("{} spp", spp.min)
-    } else {
-        format!("{:.0} spp ({}-{})", spp.mean, spp.min, spp.max)
-    };
+    let mut text = counts(report);
     text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
     if let Some(noise) = report.noise {
         text += &format!("  noise {:.2}", noise.rmse_codes);
@@ -92,6 +90,24 @@ fn status(report: &Report) -> String {
         text += &format!("  {} left", span(low, high));
     }
     text
+}
+
+/// Formats the mean, smallest and largest number of samples per pixel, such as `212 spp (32-900)`.
+pub fn counts(report: &Report) -> String {
+    let spp = &report.spp;
+    if spp.min == spp.max {
+        format!("{} spp", spp.min)
+    } else {
+        format!("{:.0} spp ({}-{})", spp.mean, spp.min, spp.max)
+    }
+}
+
+/// Formats the noise of the picture, such as `noise 0.500 8-bit levels`.
+pub fn noise(report: &Report) -> String {
+    match report.noise {
+        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
+        None => "noise unknown".to_string(),
+    }
 }
 
 /// Formats a range of seconds, such as `3-5 s`.

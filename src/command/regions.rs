@@ -1,21 +1,12 @@
-//! `zerkalo render --memory`: finds a way to render within the given memory, and renders pictures
-//! in regions if they do not fit as a whole.
+//! `zerkalo render --memory`: division of a picture that does not fit into the given memory as a
+//! whole.
 
 use crate::command::args::RenderArgs;
-use crate::command::progress::Progress;
-use crate::command::signals::Signals;
 use crate::command::{Failure, warn};
-use crate::film::{Depth, ImageOutput};
 use crate::process_memory::{available_memory, megabytes, resident_memory};
-use crate::render::export::Provenance;
 use crate::render::memory_budget::{Regions, check, divide};
-use crate::render::schedule::{Settings, StoppedBy};
-use crate::render::session::Report;
-use crate::render::{Options, RegionRender};
 use crate::scene::Scene;
 use crate::world::AnyWorld;
-use std::io;
-use std::sync::Arc;
 
 /// Name of the memory limit in messages if `--memory` is the limit: it allows less than the
 /// available memory.
@@ -132,55 +123,4 @@ fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
 /// Formats a number of bytes in kilobytes below 1 MB, otherwise as [`megabytes`] does.
 fn small(bytes: u64) -> String {
     if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
-}
-
-/// Result of a render in regions (bands of rows), for the summary and the statistics.
-pub struct Rendered {
-    pub report: Report,
-    pub stopped_by: StoppedBy,
-    pub precision: &'static str,
-    /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
-    /// sentence states an upper bound of the light that the picture loses by this limit.
-    pub biased: Vec<String>,
-}
-
-/// Renders `scene` in regions of `rows` rows, and writes the rows of the picture as they finish.
-pub fn render(
-    args: &RenderArgs,
-    scene: Scene,
-    (options, settings): (&Options, Settings),
-    rows: u32,
-    (output, depth): (&ImageOutput, Depth),
-    provenance: Provenance,
-    signals: &Signals,
-) -> Result<Rendered, Failure> {
-    let mut progress = Progress::on_stderr();
-    let mut signal = None;
-    let mut observe = |report: &Report| {
-        progress.show(report);
-        signal = signals.caught();
-        signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
-    };
-    let threads = args.compute.threads();
-    let scene = Arc::new(scene);
-    let (rows, observer) = ((rows, threads), &mut observe);
-    let mut render = RegionRender::new(&scene, options, settings, rows, provenance, observer)?;
-    let written = render.write(depth, output);
-    let (precision, biased) = match &written {
-        Ok(_) => (render.state().world.precision(), render.state().world.biases()),
-        Err(_) => ("", Vec::new()),
-    };
-    drop(render);
-    progress.finish();
-    match (written, signal) {
-        (Ok((report, stopped_by)), _) => Ok(Rendered { report, stopped_by, precision, biased }),
-        (Err(_), Some(status)) => {
-            warn(&format!(
-                "stopped by a signal: {} is not written, because regions are missing",
-                output.path().display()
-            ));
-            Err(Failure::Signalled(status))
-        }
-        (Err(error), None) => Err(Failure::Failed(error.to_string())),
-    }
 }

@@ -2,8 +2,8 @@
 
 use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
-use crate::command::progress::Progress;
-use crate::command::regions::{self, Division};
+use crate::command::progress::{Progress, counts, noise};
+use crate::command::regions::Division;
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
 use crate::command::{Failure, print_line, read_scene, shard, warn};
@@ -13,9 +13,10 @@ use crate::process_memory::resident_memory;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
-use crate::render::{Checkpoint, Options};
+use crate::render::{Checkpoint, Options, RegionRender};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -166,25 +167,53 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     // An error of writing the checkpoint is kept until the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (report, precision, biased, written) =
-        write(&session, args, output, provenance).ok_or("the renderer has no picture")?;
+    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
+    let results = session.with(move |state, report| {
+        let written = state.write(report, &provenance, display, depth, &output);
+        (report.clone(), state.world.precision(), state.world.biases(), written)
+    });
+    let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;
     written?;
     let write_seconds = writing.elapsed().as_secs_f64();
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }
 
-/// Renders a picture in regions of `rows` rows.
+/// Renders a picture in regions of `rows` rows, and writes the rows as they finish.
 fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let set_after = started.elapsed();
-    let how = (&options, schedule_settings(args));
-    let file = (output, args.bits);
-    let rendered = regions::render(args, scene, how, rows, file, provenance, &signals)?;
-    let regions::Rendered { report, stopped_by, precision, biased } = rendered;
-    let traced = report.seconds + report.compile_seconds;
-    let write_seconds = (started.elapsed() - set_after).as_secs_f64() - traced;
-    let end = End::Done(stopped_by);
-    Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
+    let mut progress = Progress::on_stderr();
+    let mut signal = None;
+    let mut observe = |report: &Report| {
+        progress.show(report);
+        signal = signals.caught();
+        signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
+    };
+    let (scene, settings) = (Arc::new(scene), schedule_settings(args));
+    let (rows, observer) = ((rows, args.compute.threads()), &mut observe);
+    let mut render = RegionRender::new(&scene, &options, settings, rows, provenance, observer)?;
+    let results = render.write(args.bits, output).map(|(report, stopped_by)| {
+        let world = &render.state().world;
+        (report, stopped_by, world.precision(), world.biases())
+    });
+    drop(render);
+    progress.finish();
+    match (results, signal) {
+        (Ok((report, stopped_by, precision, biased)), _) => {
+            let traced = report.seconds + report.compile_seconds;
+            let write_seconds = (started.elapsed() - set_after).as_secs_f64() - traced;
+            let end = End::Done(stopped_by);
+            Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
+        }
+        (Err(_), Some(status)) => {
+            warn(&format!(
+                "stopped by a signal: {} is not written, because regions are missing",
+                output.path().display()
+            ));
+            Err(Failure::Signalled(status))
+        }
+        (Err(error), None) => Err(error.into()),
+    }
 }
 
 /// Reason for the end of a render: a stop criterion or a signal.
@@ -222,39 +251,18 @@ fn watch(
     end
 }
 
-/// Results of a finished render: its report, the name of the precision, a sentence for each limit
-/// that ends paths early (such as `max_depth`), and the result of writing the picture.
-type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
-
-/// Writes the picture to `output` on the render thread of `session`, and returns the results of the
-/// render. Returns `None` if there is no film yet.
-fn write(
-    session: &Session,
-    args: &RenderArgs,
-    output: &ImageOutput,
-    provenance: Provenance,
-) -> Option<Written> {
-    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
-    session.with(move |state, report| {
-        let written = state.write(report, &provenance, display, depth, &output);
-        (report.clone(), state.world.precision(), state.world.biases(), written)
-    })
-}
-
 /// Reads the checkpoint that `--resume` names. Returns `None` without this option, or if
 /// `--checkpoint` names the same file and the file does not exist yet.
 fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
-    let Some(path) = &args.resume else { return Ok(None) };
-    if args.checkpoint.as_ref() == Some(path) && !path.exists() {
-        return Ok(None);
-    }
-    Ok(Some(Checkpoint::read(path)?))
+    let is_new = |path: &PathBuf| args.checkpoint.as_ref() == Some(path) && !path.exists();
+    let path = args.resume.as_ref().filter(|path| !is_new(path));
+    Ok(path.map(|path| Checkpoint::read(path)).transpose()?)
 }
 
 /// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
 /// of the checkpoint.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
-    let weights = checkpoint.weights().clone();
+    let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
     if session.with(move |state, _| state.mix != weights) == Some(true) {
         warn(
@@ -315,23 +323,9 @@ fn schedule_settings(args: &RenderArgs) -> Settings {
 /// Formats the result of a render, such as `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit
 /// levels  1.31 s`.
 fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
-    let spp = &report.spp;
-    let counts = if spp.min == spp.max {
-        format!("{} spp", spp.min)
-    } else {
-        format!("{:.0} spp ({}-{})", spp.mean, spp.min, spp.max)
-    };
-    let noise = match report.noise {
-        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
-        None => "noise unknown".to_string(),
-    };
-    let mut text = format!(
-        "{}  {}x{}  {counts}  {noise}  {:.2} s",
-        path.display(),
-        size[0],
-        size[1],
-        report.seconds
-    );
+    let ([width, height], seconds) = (size, report.seconds);
+    let (path, counts, noise) = (path.display(), counts(report), noise(report));
+    let mut text = format!("{path}  {width}x{height}  {counts}  {noise}  {seconds:.2} s");
     report.warnings().iter().for_each(|warning| text += &format!("  {warning}"));
     match end {
         End::Signal(_) => text += "  (stopped by a signal: the picture so far)",

@@ -10,7 +10,7 @@ use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene, warn};
 use crate::film::Film;
-use crate::film::file::FilmReader;
+use crate::film::file::{FilmReader, ReadError};
 use crate::render::export::scene_hash;
 use crate::render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use crate::render::session::Report;
@@ -130,13 +130,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
             path.display()
         ))
     };
-    let reader = match FilmReader::open(path) {
-        Ok(reader) => reader,
-        Err(error) => {
-            warn(&format!("warning: {error}; the shard starts again"));
-            return Ok(None);
-        }
-    };
+    let report = |error: &ReadError| warn(&format!("warning: {error}; the shard starts again"));
+    let Ok(reader) = FilmReader::open(path).inspect_err(report) else { return Ok(None) };
     let found = Part::of_header(path, reader.header())?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
     if found.plan.checksum() != part.plan.checksum() {
@@ -146,13 +141,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     if shard.number != part.shards[0].number {
         return Err(failed(&format!("holds shard {}", shard.number)));
     }
-    match reader.read() {
-        Ok((_, film)) => Ok(Some((film, found.rays, shard.complete))),
-        Err(error) => {
-            warn(&format!("warning: {error}; the shard starts again"));
-            Ok(None)
-        }
-    }
+    let film = reader.read().inspect_err(report);
+    Ok(film.ok().map(|(_, film)| (film, found.rays, shard.complete)))
 }
 
 /// Compiles the scene and creates the render of the shards with the given `numbers`; a shard is a

@@ -283,12 +283,7 @@ const TEXTURE_KINDS: &[Field] = &[
 const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
 
 impl FieldValue for Texture {
-    type Written = Self;
     const TYPE: ValueType = ValueType::OneOf(TEXTURE_KINDS);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let validator = match self {
@@ -301,12 +296,7 @@ impl FieldValue for Texture {
 }
 
 impl FieldValue for Bump {
-    type Written = Self;
     const TYPE: ValueType = ValueType::OneOf(BUMP_KINDS);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let Self::Image(image) = self;

@@ -75,20 +75,19 @@ pub fn follow(
     for step in 1.. {
         let done = render.step().is_some();
         let estimate = render.noise_codes();
-        let timed_out = render.seconds() >= end.seconds;
+        let timed_out = render.seconds >= end.seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
         // Further samples do not change a picture without noise.
         let noiseless = estimate == Some(0.0);
         if changed || done || timed_out {
             last_estimate = estimate.unwrap_or(last_estimate);
-            let rendering = render.rendering();
-            let errors = reference.errors(&rendering.film, &rendering.mix);
-            if points.last().is_none_or(|last| last.samples < render.schedule().samples()) {
+            let errors = reference.errors(&render.state.film, &render.state.mix);
+            if points.last().is_none_or(|last| last.samples < render.schedule.samples()) {
                 points.push(Point {
                     step,
-                    samples: render.schedule().samples(),
-                    spp: render.schedule().spp().mean,
-                    seconds: vec![render.seconds()],
+                    samples: render.schedule.samples(),
+                    spp: render.schedule.spp().mean,
+                    seconds: vec![render.seconds],
                     estimated_codes: estimate,
                     errors,
                 });
@@ -99,7 +98,7 @@ pub fn follow(
             }
         }
     }
-    let stolen = stolen_share(before.as_ref(), variant.threads, render.seconds());
+    let stolen = stolen_share(before.as_ref(), variant.threads, render.seconds);
     Ok((points, stolen, render))
 }
 
@@ -119,7 +118,7 @@ pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>
             render.step();
             step += 1;
         }
-        point.seconds.push(render.seconds());
+        point.seconds.push(render.seconds);
     }
-    Ok(stolen_share(before.as_ref(), variant.threads, render.seconds()))
+    Ok(stolen_share(before.as_ref(), variant.threads, render.seconds))
 }

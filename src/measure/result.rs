@@ -2,7 +2,7 @@
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
-use crate::measure::experiment::{Experiment, Variant};
+use crate::measure::experiment::Experiment;
 use crate::measure::reference_image::Bias;
 use serde::Serialize;
 
@@ -147,23 +147,6 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 }
 
 impl Measured {
-    /// Creates the results of one variant of the settings from its first render.
-    pub fn new(
-        variant: &Variant,
-        points: Vec<Point>,
-        stolen: Option<f64>,
-        bias: Option<Bias>,
-    ) -> Self {
-        Self {
-            experiment: variant.experiment,
-            name: variant.name.clone(),
-            threads: variant.threads,
-            points,
-            stolen: vec![stolen],
-            bias,
-        }
-    }
-
     /// Returns the indices of the repetitions that count: all that other programs did not disturb.
     /// If these are fewer than [`MIN_COUNTED`], the [`MIN_COUNTED`] least disturbed ones count.
     fn counted(&self) -> Vec<usize> {
@@ -198,18 +181,16 @@ impl Measured {
         })
     }
 
-    /// Returns the time at which the render's own estimate of its error fell to `codes` 8-bit
-    /// levels. It is used for biased variants, whose true error does not converge to 0. Returns
-    /// `None` if the estimate stayed larger.
-    pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
-        self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
-    }
-
     /// Returns the time at which the error fell to `codes` 8-bit levels. The error is the render's
-    /// own estimate for biased variants, and the true error for unbiased ones. Returns `None` if
-    /// the error stayed larger.
+    /// own estimate for biased variants, whose true error does not converge to 0, and the true
+    /// error for unbiased ones. Returns `None` if the error stayed larger.
     pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
-        if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
+        match self.bias {
+            Some(_) => {
+                self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
+            }
+            None => self.time_to(codes),
+        }
     }
 
     fn interpolated_time(&self, codes: f64, error: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
@@ -338,7 +319,9 @@ mod tests {
         assert!(!target.at_most && (target.spread - 1.0).abs() < 1e-12);
         assert!(curve.time_to(3.0).unwrap().at_most);
         assert_eq!(curve.time_to(0.4), None);
-        assert!((curve.estimated_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
+        let bias = Some(Bias { z: 0.0, codes: 0.0, least_codes: 0.0 });
+        let biased = Measured { bias, ..curve.clone() };
+        assert!((biased.true_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
         assert!((curve.slope().unwrap().value + 0.5).abs() < 1e-12);
         assert!((curve.samples_per_second().unwrap().0 - 500.0).abs() < 1e-9);
     }

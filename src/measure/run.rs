@@ -66,7 +66,9 @@ pub fn measure(
     let total = 1 + variants.len() * plan.repetitions.max(1);
     let mut keep_going = report(Progress { step: "reference", done: 0, total });
 
-    warm_up(default)?;
+    let mut warm_up = default.start()?;
+    while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
+    drop(warm_up);
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
     let rendered = match reference {
         Some(given) => RenderedReference { reference: given, spp: 0.0, seconds: 0.0 },
@@ -86,16 +88,22 @@ pub fn measure(
         let codes = if i == 0 { least } else { compared_at };
         let end = End { codes, seconds: longest, use_estimate: !variant.experiment.unbiased() };
         let (points, stolen, render) = follow(variant, reference, end)?;
-        let rendering = render.rendering();
         let bias = (!variant.experiment.unbiased())
-            .then(|| reference.bias(&rendering.film, &rendering.mix));
-        let result = Measured::new(variant, points, stolen, bias);
+            .then(|| reference.bias(&render.state.film, &render.state.mix));
+        let result = Measured {
+            experiment: variant.experiment,
+            name: variant.name.clone(),
+            threads: variant.threads,
+            points,
+            stolen: vec![stolen],
+            bias,
+        };
         if i == 0 {
             let missed = plan.targets.iter().filter(|codes| result.time_to(**codes).is_none());
             expected = missed.filter_map(|codes| extrapolate(&render, *codes)).collect();
             let seconds_left = plan.seconds - started.elapsed().as_secs_f64();
             let runs = plan.repetitions.max(1) * (variants.len() - 1);
-            let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds();
+            let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds;
             let seconds_per_run = (seconds_left - default_seconds) / (2 * runs.max(1)) as f64;
             compared_at = comparison_noise(&result, &plan.targets, seconds_per_run);
             longest = MAX_SLOWDOWN * result.time_to(compared_at).map_or(longest, |c| c.seconds);
@@ -172,12 +180,6 @@ fn is_steady(measured: &Measured, codes: f64) -> bool {
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
 }
 
-fn warm_up(variant: &Variant) -> io::Result<()> {
-    let mut render = variant.start()?;
-    while render.seconds() < WARM_UP_SECONDS && render.step().is_none() {}
-    Ok(())
-}
-
 /// Reference picture with the cost of rendering it.
 struct RenderedReference {
     reference: Reference,
@@ -191,17 +193,16 @@ fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<R
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut render = other.start()?;
-    while render.seconds() < seconds && render.noise_codes().is_none_or(|noise| noise > codes) {
+    while render.seconds < seconds && render.noise_codes().is_none_or(|noise| noise > codes) {
         if render.step().is_some() {
             break;
         }
     }
-    let rendering = render.rendering();
-    let display = &other.options.display;
+    let (state, display) = (&render.state, &other.options.display);
     Ok(RenderedReference {
-        reference: Reference::of_film(&rendering.film, &rendering.mix, display),
-        spp: render.schedule().spp().mean,
-        seconds: render.seconds(),
+        reference: Reference::of_film(&state.film, &state.mix, display),
+        spp: render.schedule.spp().mean,
+        seconds: render.seconds,
     })
 }
 

@@ -7,17 +7,17 @@
 //! because equal renders take different times.
 
 use crate::disk::{Existing, WriteError};
+use crate::film::Film;
 use crate::film::file::{
     Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
     write_film_file,
 };
-use crate::film::{Film, LightWeights};
-use crate::render::export::{Provenance, metadata};
+use crate::render::export::{Provenance, film_header};
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::session::Report;
 use crate::render::{Options, RenderState};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Document, Scene};
+use crate::scene::Scene;
 use crate::world::{self, AnyWorld};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ impl SampleInputs {
             contents_hash: scene.contents_hash(),
             program: PROGRAM.to_string(),
             sampler: sampler.name().to_string(),
-            scene: Document::new(scene, "").text().to_string(),
+            scene: scene.to_text(),
         }
     }
 
@@ -110,19 +110,12 @@ impl EncodedCheckpoint {
     ) -> Self {
         let film = &state.film;
         let compiled = state.lighting().compiled();
-        let header = FilmFileHeader {
-            film: film.header().clone(),
-            weights: state.mix.clone(),
-            group_names: state.group_names(),
-            display: state.display(),
-            metadata: metadata(state, report, provenance, &state.display()),
-            chunks: [
-                SampleInputs::new(compiled, provenance.sampler).encode(),
-                (SCHEDULE, schedule.encode()),
-                (CLOCK, report.seconds.to_le_bytes().to_vec()),
-            ]
-            .into(),
-        };
+        let mut header = film_header(state, report, provenance, state.display());
+        header.chunks.extend([
+            SampleInputs::new(compiled, provenance.sampler).encode(),
+            (SCHEDULE, schedule.encode()),
+            (CLOCK, report.seconds.to_le_bytes().to_vec()),
+        ]);
         let mut pieces = vec![header.encode()];
         pool.install(|| {
             let tiles = (0..tile_chunks(film)).into_par_iter();
@@ -148,8 +141,10 @@ impl EncodedCheckpoint {
 #[derive(Debug)]
 pub struct Checkpoint {
     path: PathBuf,
-    header: FilmFileHeader,
-    inputs: SampleInputs,
+    /// Header of the checkpoint's film file: all contents except for the film.
+    pub header: FilmFileHeader,
+    /// Inputs of the samples: scene, sampler, program version.
+    pub inputs: SampleInputs,
     film: Film,
 }
 
@@ -198,25 +193,10 @@ impl Checkpoint {
         Ok(Self { path: path.to_path_buf(), header, inputs, film })
     }
 
-    /// Returns the header of the checkpoint's film file: all contents except for the film.
-    pub fn header(&self) -> &FilmFileHeader {
-        &self.header
-    }
-
     /// Returns the random seed and the kind of random numbers of the samples.
     pub fn sampling(&self) -> SampleSettings {
         let kind = SamplerKind::from_name(&self.inputs.sampler).unwrap_or(SamplerKind::Sobol);
         SampleSettings { seed: self.header.film.seed, kind }
-    }
-
-    /// Returns the inputs of the samples: scene, sampler, program version.
-    pub fn inputs(&self) -> &SampleInputs {
-        &self.inputs
-    }
-
-    /// Returns the weight of each light group in the picture of the checkpoint.
-    pub fn weights(&self) -> &LightWeights {
-        &self.header.weights
     }
 
     /// Compiles the scene of the checkpoint and restores the render of this scene. The samples are
@@ -232,7 +212,7 @@ impl Checkpoint {
     ) -> Result<Resumed, ReadError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
-        let same = Document::new(scene, "").text() == self.inputs.scene;
+        let same = scene.to_text() == self.inputs.scene;
         let compiled = if same {
             Arc::clone(scene)
         } else {

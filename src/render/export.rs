@@ -2,6 +2,7 @@
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
 use crate::disk::WriteError;
+use crate::film::file::FilmFileHeader;
 use crate::film::{Depth, Display, ImageData, ImageOutput, WholeFilm};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
@@ -53,6 +54,24 @@ pub fn scene_hash(text: &str, scene: &Scene) -> String {
         hash.update(&contents.to_le_bytes());
     }
     format!("fnv1a64:{:016x}", hash.value())
+}
+
+/// Creates the header of a film file for the film of `state`. `report` is the latest report on this
+/// film.
+pub fn film_header(
+    state: &RenderState,
+    report: &Report,
+    provenance: &Provenance,
+    display: Display,
+) -> FilmFileHeader {
+    FilmFileHeader {
+        film: state.film.header().clone(),
+        weights: state.mix.clone(),
+        group_names: state.group_names(),
+        display,
+        metadata: metadata(state, report, provenance, &display),
+        chunks: Default::default(),
+    }
 }
 
 /// Returns the metadata of a picture file as pairs of key and value.

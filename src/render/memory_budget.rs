@@ -27,13 +27,9 @@ pub fn needed(size: [u32; 2], groups: usize) -> u64 {
 /// # Errors
 /// Returns a message with the needed and the available memory and a remedy.
 pub fn check(size: [u32; 2], groups: usize, reusable: u64) -> Result<(), String> {
-    match available_memory() {
-        Some(available) => {
-            let bytes = available.bytes.saturating_add(reusable);
-            compare(size, groups, Available { bytes, ..available })
-        }
-        None => Ok(()),
-    }
+    let Some(available) = available_memory() else { return Ok(()) };
+    let bytes = available.bytes.saturating_add(reusable);
+    compare(size, groups, Available { bytes, ..available })
 }
 
 fn compare(size: [u32; 2], groups: usize, available: Available) -> Result<(), String> {

@@ -34,10 +34,4 @@ impl Relighting {
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);
         can_reuse.then(|| LightWeights { weights: self.groups.mix(scene) })
     }
-
-    /// Returns the name of each light group. Image files store the light of each group in channels
-    /// with this name. `scene` is the scene that the picture shows.
-    pub fn names(&self, scene: &Scene) -> Vec<String> {
-        self.groups.names(scene)
-    }
 }

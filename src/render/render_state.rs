@@ -155,7 +155,7 @@ impl RenderState {
 
     /// Returns the name of each light group. The lights of a group share one weight in the picture.
     pub fn group_names(&self) -> Vec<String> {
-        self.lighting.names(&self.scene)
+        self.world.light_groups().names(&self.scene)
     }
 
     /// Returns the relighting of this film: its light groups, and the scene for which its samples

@@ -13,10 +13,13 @@ use std::time::Instant;
 
 /// Progressive render that blocks the calling thread, without a background session.
 pub struct SyncRender {
-    rendering: RenderState,
-    schedule: Schedule,
+    /// Compiled scene and its film.
+    pub state: RenderState,
+    /// Schedule of the render, with its latest noise estimates.
+    pub schedule: Schedule,
+    /// Seconds that the render has spent on tracing rays, without scene compilation.
+    pub seconds: f64,
     pool: rayon::ThreadPool,
-    seconds: f64,
 }
 
 impl SyncRender {
@@ -32,11 +35,11 @@ impl SyncRender {
         threads: usize,
     ) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
-        let rendering = RenderState::checked(&Arc::new(scene.clone()), options, None)
+        let state = RenderState::checked(&Arc::new(scene.clone()), options, None)
             .map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
-        let schedule = rendering.schedule(settings);
-        Ok(Self { rendering, schedule, pool, seconds: 0.0 })
+        let schedule = state.schedule(settings);
+        Ok(Self { state, schedule, pool, seconds: 0.0 })
     }
 
     /// Traces the next allocation round: the samples that the schedule adds next, in both
@@ -49,18 +52,13 @@ impl SyncRender {
                 Step::Trace(wave) => wave,
             };
             let start = Instant::now();
-            let report = self.rendering.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             self.seconds += start.elapsed().as_secs_f64();
             self.schedule.complete(&wave, &report);
             if wave.replicate == 1 {
                 return None;
             }
         }
-    }
-
-    /// Returns the seconds that the render has spent on tracing rays, without scene compilation.
-    pub fn seconds(&self) -> f64 {
-        self.seconds
     }
 
     /// Returns the estimated RMSE of the displayed picture, in 8-bit levels. Returns `None` before
@@ -74,15 +72,5 @@ impl SyncRender {
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))
-    }
-
-    /// Returns the schedule of the render, with its latest noise estimates.
-    pub fn schedule(&self) -> &Schedule {
-        &self.schedule
-    }
-
-    /// Returns the compiled scene and its film.
-    pub fn rendering(&self) -> &RenderState {
-        &self.rendering
     }
 }

@@ -1,6 +1,6 @@
 //! Resolver of the mesh and image files that a scene refers to.
 
-use crate::asset::{AssetError, Assets, Image, Mesh, RadianceMap};
+use crate::asset::Assets;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -41,20 +41,9 @@ impl AssetResolver {
         *self.folder.write().unwrap_or_else(PoisonError::into_inner) = folder_of(scene);
     }
 
-    /// Returns the mesh in the file `name`. The cache reads the file if necessary.
-    pub(super) fn mesh(&self, name: &str) -> Result<Arc<Mesh>, AssetError> {
-        self.assets.mesh(&self.folder().join(name))
-    }
-
-    /// Returns the image in the file `name`. The cache reads the file if necessary.
-    pub(super) fn image(&self, name: &str) -> Result<Arc<Image>, AssetError> {
-        self.assets.image(&self.folder().join(name))
-    }
-
-    /// Returns the radiance map (for an environment light) in the file `name`. The cache reads the
-    /// file if necessary.
-    pub(super) fn radiance_map(&self, name: &str) -> Result<Arc<RadianceMap>, AssetError> {
-        self.assets.radiance_map(&self.folder().join(name))
+    /// Returns the path of the file `name`.
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.folder.read().unwrap_or_else(PoisonError::into_inner).join(name)
     }
 
     /// Returns `true` if the file name `name` breaks when the scene is saved as the file `scene`:
@@ -62,12 +51,8 @@ impl AssetResolver {
     /// `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
-        fs::canonicalize(self.folder().join(name))
+        fs::canonicalize(self.path(name))
             .is_ok_and(|target| there.ok().is_none_or(|there| there != target))
-    }
-
-    fn folder(&self) -> PathBuf {
-        self.folder.read().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 

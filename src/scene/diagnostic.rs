@@ -5,7 +5,7 @@ use crate::value::{sanitized, sort_by_number};
 use std::fmt;
 
 /// Error or warning about a scene file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Name of the scene file as the user gave it.
     pub file: String,
@@ -68,8 +68,8 @@ pub(super) struct FirstDiagnostics {
 }
 
 impl FirstDiagnostics {
-    /// Adds a diagnostic at the byte offset `at`, which `make` creates without line and column.
-    /// `make` is not called if there are enough diagnostics at smaller offsets.
+    /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and
+    /// column. `make` is not called if there are enough diagnostics at smaller offsets.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -107,12 +107,13 @@ impl FirstDiagnostics {
         self.found.is_empty()
     }
 
-    /// Returns `(diagnostics, number)`: the stored diagnostics with lines and columns in `text`,
-    /// sorted by location, and the number of those that were not stored.
-    pub fn located(mut self, text: &str) -> (Vec<Diagnostic>, usize) {
+    /// Returns `(diagnostics, number)`: the stored diagnostics with the name `file`, lines and
+    /// columns in `text`, sorted by location, and the number of those that were not stored.
+    pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);
         let located = |(at, diagnostic): (usize, Diagnostic)| Diagnostic {
+            file: file.to_string(),
             line_column: Some(lines.line_column(at)),
             ..diagnostic
         };
@@ -141,10 +142,8 @@ impl SceneErrors {
         help: &str,
     ) -> Self {
         let (file, help) = (file.to_string(), help.to_string());
-        Self {
-            messages: vec![Diagnostic { file, line_column, subject: String::new(), found, help }],
-            more: 0,
-        }
+        let message = Diagnostic { file, line_column, found, help, ..Diagnostic::default() };
+        Self { messages: vec![message], more: 0 }
     }
 
     /// Returns the first diagnostics, at most 100, sorted by location.

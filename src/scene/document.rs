@@ -36,21 +36,20 @@ pub struct Document {
     scene: Arc<Scene>,
 }
 
-impl Document {
-    /// Reads and validates the scene file at `path`.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
-    pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        Self::read_with(path, Arc::default())
+impl Scene {
+    /// Returns the text of a new scene file that describes this scene, which must be valid.
+    pub fn to_text(&self) -> String {
+        new_text(String::new(), &[], &Self::default(), self)
     }
+}
 
+impl Document {
     /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
     /// scene refers to.
     ///
     /// # Errors
     /// The errors of [`Scene::read`].
-    pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+    pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 
@@ -93,21 +92,6 @@ impl Document {
             text,
             scene,
         })
-    }
-
-    /// Creates a document for `scene`, which must be valid. `name` is the file name in diagnostics.
-    pub fn new(scene: &Scene, name: &str) -> Self {
-        let text = Arc::new(new_text(String::new(), &[], &Scene::default(), scene));
-        let scene = Arc::new(scene.clone());
-        Self {
-            name: name.to_string(),
-            origin: (Arc::clone(&text), Arc::clone(&scene)),
-            former_words: Vec::new(),
-            warnings: Vec::new(),
-            migration_warning: None,
-            text,
-            scene,
-        }
     }
 
     /// Changes the text so that it describes `scene`, which must be valid.

@@ -199,10 +199,7 @@ impl SceneFile {
         }
         let mut document = self.document.clone();
         document.apply(scene);
-        replace(&path, document.text(), true)?;
-        self.fingerprint = fnv1a64(document.text().as_bytes());
-        self.document = document;
-        Ok(())
+        self.write(document, &path, true)
     }
 
     /// Writes the valid `scene` to another file, which becomes the scene's file.
@@ -235,10 +232,26 @@ impl SceneFile {
         }
         let mut document = self.document.clone().renamed(&path.display().to_string());
         document.apply(scene);
-        replace(path, document.text(), overwrite)?;
+        self.write(document, path, overwrite)?;
         resolver.move_to(path);
         self.path = Some(path.to_path_buf());
-        self.fingerprint = fnv1a64(document.text().as_bytes());
+        Ok(())
+    }
+
+    /// Replaces the content of the file at `path` by the text of `document` atomically and durably.
+    /// If `overwrite` is `false`, fails if the file exists.
+    fn write(&mut self, document: Document, path: &Path, overwrite: bool) -> Result<(), SaveError> {
+        let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+        let text = document.text().as_bytes();
+        let written = replace_file(path, existing, |file| file.write_all(text));
+        written.map_err(|WriteError { kind, what, remedy, .. }| match kind {
+            ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
+            _ => SaveError::Failed {
+                path: path.to_path_buf(),
+                what: sanitized(&format!("{what}; {remedy}")),
+            },
+        })?;
+        self.fingerprint = fnv1a64(text);
         self.document = document;
         Ok(())
     }
@@ -258,18 +271,4 @@ fn content(path: &Path) -> io::Result<Option<u64>> {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
     }
-}
-
-/// Replaces the content of the file at `path` by `text` atomically and durably. If `overwrite` is
-/// `false`, fails if the file exists.
-fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
-    let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
-    let written = replace_file(path, existing, |file| file.write_all(text.as_bytes()));
-    written.map_err(|WriteError { kind, what, remedy, .. }| match kind {
-        ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
-        _ => SaveError::Failed {
-            path: path.to_path_buf(),
-            what: sanitized(&format!("{what}; {remedy}")),
-        },
-    })
 }

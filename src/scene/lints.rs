@@ -1,88 +1,89 @@
 //! Lints: legal values of a scene that are probably mistakes.
 
+use crate::light::Light;
 use crate::material::{Fresnel, Highlight, Material};
 use crate::scene::Scene;
 use crate::scene::validate::Problem;
 use crate::value::{Color, number};
+
+/// Doubtful value: its path in the scene, and a phrase that states it.
+type Case = (Vec<String>, String);
+
+/// Lint of materials: returns the key of a doubtful value and a phrase that states it.
+type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
+
+/// Lints of materials, each with the help in its warning.
+const MATERIAL_LINTS: [(MaterialLint, &str); 4] = [
+    (brighter_than_its_light, "Allowed: the picture is clipped only for display."),
+    (
+        |m| {
+            let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
+            Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
+        },
+        "Surfaces have an alpha from 0 to about 1.",
+    ),
+    (
+        |m| without_effect("alpha", m.alpha.is_some() && !m.has_microfacets()),
+        "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
+    ),
+    (
+        |m| {
+            let is_opaque = m.transmission == 0.0;
+            without_effect("attenuation_color", is_opaque && m.attenuation_color != Color::WHITE)
+        },
+        "It colours light inside of solids: give the material a transmission.",
+    ),
+];
+
+fn without_effect(key: &'static str, is_found: bool) -> Option<(&'static str, String)> {
+    is_found.then(|| (key, format!("{key} has no effect here")))
+}
 
 impl Scene {
     /// Returns one warning for each kind of doubtful value in the scene. The warning states the
     /// first such value and the number of others.
     /// [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
     pub fn warnings(&self) -> Vec<Problem> {
-        let materials = |lint: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
-            let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, lint(m)?)));
-            let (name, (key, found)) = cases.next()?;
-            Some((
-                vec!["materials".to_string(), name.clone(), key.to_string()],
-                found,
-                cases.count(),
-            ))
-        };
         let mut problems = Vec::new();
-        let mut add = |case: Option<(Vec<String>, String, usize)>, help: &str| {
-            let Some((path, found, others)) = case else { return };
+        let mut add = |help: &str, cases: &mut dyn Iterator<Item = Case>| {
+            let Some((path, found)) = cases.next() else { return };
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
-            let more = match others {
+            let more = match cases.count() {
                 0 => String::new(),
                 1 => " (and one more like it)".to_string(),
                 n => format!(" (and {n} more like it)"),
             };
             problems.push(self.problem(&path, found + &more, help.to_string()));
         };
+        for (lint, help) in MATERIAL_LINTS {
+            let case = |(name, material): (&String, &Material)| {
+                let (key, found) = lint(material)?;
+                Some((vec!["materials".to_string(), name.clone(), key.to_string()], found))
+            };
+            add(help, &mut self.materials.iter().filter_map(case));
+        }
+        let dark = |(i, light): (usize, &Light)| {
+            let (key, what) = match light {
+                light if light.intensity == 0.0 => ("intensity", "intensity is 0"),
+                light if light.color == Color::BLACK => ("color", "color is black"),
+                _ => return None,
+            };
+            let path = vec!["light".to_string(), i.to_string(), key.to_string()];
+            light.on.then(|| (path, format!("{what}, so that it gives no light")))
+        };
+        let dark = &mut self.lights.iter().enumerate().filter_map(dark);
+        add("Leave the light out, or write on = false.", dark);
+        let whole = |found: &str| (Vec::new(), found.to_string());
         add(
-            materials(&brighter_than_its_light),
-            "Allowed: the picture is clipped only for display.",
-        );
-        add(
-            materials(&|m| {
-                let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
-                Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
-            }),
-            "Surfaces have an alpha from 0 to about 1.",
-        );
-        add(
-            materials(&|m| {
-                (m.alpha.is_some() && !m.has_microfacets())
-                    .then(|| ("alpha", "alpha has no effect here".to_string()))
-            }),
-            "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
-        );
-        add(
-            materials(&|m| {
-                let opaque = m.transmission == 0.0 && m.attenuation_color != Color::WHITE;
-                opaque.then(|| {
-                    ("attenuation_color", "attenuation_color has no effect here".to_string())
-                })
-            }),
-            "It colours light inside of solids: give the material a transmission.",
-        );
-        add(self.dark_light(), "Leave the light out, or write on = false.");
-        add(
-            self.objects.is_empty().then(|| (Vec::new(), "there is no object".to_string(), 0)),
             "The picture will show nothing but the background. An object begins with [[object]].",
+            &mut self.objects.is_empty().then(|| whole("there is no object")).into_iter(),
         );
+        let no_light = "there is no light, no ambient and no background";
         add(
-            self.is_dark().then(|| {
-                (Vec::new(), "there is no light, no ambient and no background".to_string(), 0)
-            }),
             "The picture will be black. A light begins with [[light]].",
+            &mut self.is_dark().then(|| whole(no_light)).into_iter(),
         );
         problems
-    }
-
-    fn dark_light(&self) -> Option<(Vec<String>, String, usize)> {
-        let mut dark = self.lights.iter().enumerate().filter(|(_, light)| {
-            light.on && (light.intensity == 0.0 || light.color == Color::BLACK)
-        });
-        let (i, light) = dark.next()?;
-        let (key, what) = if light.intensity == 0.0 {
-            ("intensity", "intensity is 0")
-        } else {
-            ("color", "color is black")
-        };
-        let path = vec!["light".to_string(), i.to_string(), key.to_string()];
-        Some((path, format!("{what}, so that it gives no light"), dark.count()))
     }
 
     fn is_dark(&self) -> bool {

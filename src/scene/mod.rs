@@ -21,7 +21,7 @@ mod validate;
 
 pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
-pub use crate::shape::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp};
+pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use asset_resolver::AssetResolver;
 pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};

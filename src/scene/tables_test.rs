@@ -103,8 +103,8 @@ fn field_tables_match_deserialised_keys() {
     same_keys::<Object>("object", Object::FIELDS);
     same_keys::<Shape>("shape", KINDS);
     same_keys::<CsgOperand>("part", inner(inner(KINDS, "union"), "of"));
-    same_keys::<TransformOp>("step", TRANSFORM_OP_FIELDS);
-    same_keys::<Rotate>("rotate", inner(TRANSFORM_OP_FIELDS, "rotate"));
+    same_keys::<TransformOp>("step", TransformOp::FIELDS);
+    same_keys::<Rotate>("rotate", inner(TransformOp::FIELDS, "rotate"));
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn field_tables_match_defaults() {
     same_defaults::<Object>("object", Object::FIELDS, EXAMPLES[0].1);
     same_defaults::<Rotate>(
         "rotate",
-        inner(TRANSFORM_OP_FIELDS, "rotate"),
+        inner(TransformOp::FIELDS, "rotate"),
         "axis = [0.0, 1.0, 0.0]\ndegrees = 1.0",
     );
 }

@@ -3,8 +3,9 @@
 use crate::material::Mapping;
 use crate::scene::Scene;
 use crate::scene::diagnostic::MAX_REPORTED;
-use crate::scene::format::suggest::nearest;
+use crate::scene::format::suggest::did_you_mean;
 use crate::value::{Description, ValidationError, truncated};
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
 
@@ -60,16 +61,23 @@ struct Problems<'a> {
 }
 
 impl Problems<'_> {
+    /// Adds a problem of the value at `path`. `make` returns its phrase and its help; it is called
+    /// only if a further problem can be stored.
+    fn report(&mut self, path: &[&str], make: impl FnOnce() -> (String, String)) {
+        if self.found.len() < MAX_REPORTED {
+            let (found, help) = make();
+            self.found.push(self.scene.problem(path, found, help));
+        } else {
+            self.more += 1;
+        }
+    }
+
     /// Adds the validation errors `errors` of the scene's table at `path`.
     fn add(&mut self, path: &[&str], errors: Vec<ValidationError>) {
         for error in errors {
-            if self.is_full() {
-                continue;
-            }
             let mut all = path.to_vec();
             all.extend(error.key.split('.').filter(|k| !k.is_empty()));
-            let help = format!("Expected {}.", error.expected);
-            self.found.push(self.scene.problem(&all, error.found, help));
+            self.report(&all, || (error.found, format!("Expected {}.", error.expected)));
         }
     }
 
@@ -79,25 +87,6 @@ impl Problems<'_> {
             self.add(&[list, &index.to_string()], errors);
         }
     }
-
-    /// Returns `true` if no further problem can be stored. The caller must then drop the problem
-    /// that it was about to add; the problem is already counted in `more`.
-    fn is_full(&mut self) -> bool {
-        self.is_full_with(0)
-    }
-
-    /// Returns `true` if no further problem can be stored. `others` is the number of problems that
-    /// the caller has found but not stored yet; they count as stored. If the result is `true`, the
-    /// caller must then drop one problem, which is already counted in `more`.
-    fn is_full_with(&mut self, others: usize) -> bool {
-        let is_full = self.found.len() + others >= MAX_REPORTED;
-        self.more += usize::from(is_full);
-        is_full
-    }
-}
-
-fn keys(parts: &[&str]) -> Vec<String> {
-    parts.iter().map(|p| p.to_string()).collect()
 }
 
 impl Scene {
@@ -110,22 +99,22 @@ impl Scene {
     }
 
     pub(super) fn problem(&self, path: &[&str], found: String, help: String) -> Problem {
-        let path = keys(path);
+        let path: Vec<String> = path.iter().map(|key| key.to_string()).collect();
         Problem { subject: self.subject(&path), path, found, help }
     }
 
     /// Loads the files that the scene refers to, except for those that are loaded already. Files
     /// that cannot be read are errors in the next validation.
     pub fn resolve(&mut self) {
-        let resolver = &self.resolver;
+        let (resolver, assets) = (&self.resolver, self.resolver.assets());
         for object in &mut self.objects {
-            object.shape.resolve(|name| resolver.mesh(name));
+            object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }
         for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
-            environment.resolve(|name| resolver.radiance_map(name));
+            environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
         }
         for material in self.materials.values_mut() {
-            material.resolve(|name| resolver.image(name));
+            material.resolve(|name| assets.image(&resolver.path(name)));
         }
     }
 
@@ -186,57 +175,55 @@ impl Scene {
             let spaces = object.shape.texture_spaces();
             let lacks_uv = |k: &usize| uv_keys[*k].is_some() && !spaces[*k].has_uv();
             let Some(part) = (0..spaces.len()).find(lacks_uv) else { continue };
-            if problems.is_full() {
-                continue;
-            }
+            let kind = object.shape.key();
             let what = match object.shape.file() {
                 Some(file) => format!("there are none in \"{}\"", truncated(file)),
-                None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
-                None => format!("a {} has none", object.shape.key()),
+                None if spaces.len() > 1 => format!("parts of a {kind} have none"),
+                None => format!("a {kind} has none"),
             };
-            let found = format!(
-                "the {} of material \"{}\" needs texture coordinates (mapping = \"uv\"), and {what}",
-                uv_keys[part].unwrap_or_default(),
-                truncated(materials[part]),
-            );
-            let help =
-                "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
-                        another mapping works: \"auto\" takes the one that suits the shape."
-                    .to_string();
-            problems.found.push(self.problem(&["object", &i.to_string(), "material"], found, help));
+            let found = || {
+                format!(
+                    "the {} of material \"{}\" needs texture coordinates (mapping = \"uv\"), and \
+                     {what}",
+                    uv_keys[part].unwrap_or_default(),
+                    truncated(materials[part]),
+                )
+            };
+            let help = "Expected a mesh whose file has them, a rectangle or a platform. On other \
+                        shapes another mapping works: \"auto\" takes the one that suits the shape.";
+            let path = ["object", &i.to_string(), "material"];
+            problems.report(&path, || (found(), help.to_string()));
         }
     }
 
     fn missing_materials(&self, problems: &mut Problems) {
         let is_missing = |name: &str| !name.is_empty() && !self.materials.contains_key(name);
-        let mut missing = Vec::new();
         for (i, object) in self.objects.iter().enumerate() {
-            if is_missing(&object.material) && !problems.is_full_with(missing.len()) {
-                missing.push((format!("object.{i}.material"), object.material.as_str()));
-            }
-            for (key, name) in object.shape.named_materials() {
-                if is_missing(name) && !problems.is_full_with(missing.len()) {
-                    missing.push((format!("object.{i}.shape.{key}"), name));
-                }
+            let whole = (Cow::from("material"), object.material.as_str());
+            let parts = object.shape.named_materials().into_iter();
+            let parts = parts.map(|(key, name)| (Cow::from(format!("shape.{key}")), name));
+            for (key, name) in [whole].into_iter().chain(parts).filter(|(_, name)| is_missing(name))
+            {
+                let index = i.to_string();
+                let path: Vec<_> = ["object", &index].into_iter().chain(key.split('.')).collect();
+                problems.report(&path, || self.missing_material(name));
             }
         }
-        for (key, name) in missing {
-            let defined: Vec<_> =
-                self.materials.keys().take(20).map(|n| format!("\"{}\"", truncated(n))).collect();
-            let mut help = match defined.as_slice() {
-                [] => "No material is defined; one begins with [materials.NAME].".to_string(),
-                names if names.len() < self.materials.len() => {
-                    format!("Defined: {}, and more.", names.join(", "))
-                }
-                names => format!("Defined: {}.", names.join(", ")),
-            };
-            let known = self.materials.keys().map(String::as_str);
-            if let Some(meant) = nearest(name, known) {
-                help += &format!(" Did you mean \"{}\"?", truncated(meant));
+    }
+
+    /// Returns phrase and help of the problem that the material `name` is not defined.
+    fn missing_material(&self, name: &str) -> (String, String) {
+        let defined: Vec<_> =
+            self.materials.keys().take(20).map(|n| format!("\"{}\"", truncated(n))).collect();
+        let help = match defined.as_slice() {
+            [] => "No material is defined; one begins with [materials.NAME].".to_string(),
+            names if names.len() < self.materials.len() => {
+                format!("Defined: {}, and more.", names.join(", "))
             }
-            let found = format!("material \"{}\" is not defined", truncated(name));
-            problems.found.push(self.problem(&key.split('.').collect::<Vec<_>>(), found, help));
-        }
+            names => format!("Defined: {}.", names.join(", ")),
+        };
+        let meant = did_you_mean(name, self.materials.keys().map(String::as_str));
+        (format!("material \"{}\" is not defined", truncated(name)), help + &meant)
     }
 
     fn same_names<'a>(
@@ -248,12 +235,9 @@ impl Scene {
         let mut first = HashMap::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
             if let Some(other) = first.get(name) {
-                if problems.is_full() {
-                    continue;
-                }
-                let found = format!("{list} {} has the same name", other + 1);
+                let found = || format!("{list} {} has the same name", other + 1);
                 let help = "Expected a name of its own, or none.".to_string();
-                problems.found.push(self.problem(&[list, &i.to_string(), "name"], found, help));
+                problems.report(&[list, &i.to_string(), "name"], || (found(), help));
             } else {
                 first.insert(name, i);
             }

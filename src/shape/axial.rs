@@ -27,6 +27,28 @@ pub(super) fn frustum_between(
     Form::conical_frustum(DAffine3::from_mat3_translation(linear, start), narrow / wide)
 }
 
+/// Implements the methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the axis
+/// between the points `$base` and `$top`.
+macro_rules! by_axis {
+    ($base:ident, $top:ident) => {
+        fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+            vec![&mut self.$base, &mut self.$top]
+        }
+
+        /// Returns `true` if the solid can represent a rotation about the vertical. A solid with a
+        /// vertical axis can: it is symmetric about the vertical and does not change. Any other
+        /// cannot.
+        fn rotate_y(&mut self, _: f64) -> bool {
+            self.$base[0] == self.$top[0] && self.$base[2] == self.$top[2]
+        }
+
+        fn texture_axes(&self) -> glam::DMat3 {
+            $crate::shape::axial::axes_between(self.$base, self.$top)
+        }
+    };
+}
+pub(super) use by_axis;
+
 /// Returns texture axes whose y axis points from `base` to `top`, as the columns of a rotation
 /// matrix.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
@@ -50,11 +72,6 @@ pub(super) fn axis_faults(
     });
     sizes.push((name, DVec3::from_array(base).distance(DVec3::from_array(top))));
     checks.and(no_axis).ratio(&sizes, &[base, top].concat()).errors()
-}
-
-/// Returns `true` if the axis from `base` to `top` is vertical.
-pub(super) fn is_upright(base: [f64; 3], top: [f64; 3]) -> bool {
-    base[0] == top[0] && base[2] == top[2]
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::{axes_between, axis_faults, frustum_between, is_upright};
+use crate::shape::axial::{axis_faults, by_axis, frustum_between};
 use crate::value::{Description, ValidationError, description};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 description! {
     /// A right circular cone with a flat base.
@@ -34,17 +34,5 @@ impl ShapeDesc for Cone {
         Self { base: base.to_array(), apex: top.to_array(), radius }
     }
 
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        vec![&mut self.base, &mut self.apex]
-    }
-
-    /// Returns `true` if the cone can represent a rotation about the vertical. An upright cone can:
-    /// it is symmetric about the vertical and does not change. Any other cone cannot.
-    fn rotate_y(&mut self, _: f64) -> bool {
-        is_upright(self.base, self.apex)
-    }
-
-    fn texture_axes(&self) -> DMat3 {
-        axes_between(self.base, self.apex)
-    }
+    by_axis!(base, apex);
 }

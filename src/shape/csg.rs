@@ -7,7 +7,7 @@
 use crate::primitive::Form;
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::shape::registry::KIND_TABLE;
-use crate::shape::transform::{TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
+use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
     Description, Field, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
@@ -50,7 +50,7 @@ static PART_FIELDS: [Field; 3] = [
     ),
     Field::optional(
         "transform",
-        ValueType::ListOf(TRANSFORM_OP_FIELDS),
+        ValueType::ListOf(TransformOp::FIELDS),
         "",
         "it stays as its shape says",
         "Steps that move, rotate and scale it, in order.",

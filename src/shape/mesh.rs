@@ -1,6 +1,6 @@
 //! Triangle meshes from files.
 
-use crate::asset::{AssetError, Mesh, TriangleMesh};
+use crate::asset::{AssetError, Loaded, Mesh, TriangleMesh};
 use crate::primitive::{Form, MeshForm};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{ValidationError, choices, description};
@@ -16,8 +16,7 @@ description! {
         file: String = "";
         /// Normals used for shading: curved triangles or flat ones.
         normals: Normals = "smooth";
-        // Content of the file, or the error of reading it. `None` until the file has been loaded.
-        skip content: Option<Result<Arc<Mesh>, AssetError>>;
+        skip content: Loaded<Mesh>;
     }
 }
 
@@ -82,10 +81,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
 impl MeshDesc {
     /// Returns the mesh of the file, or the placeholder if no mesh was read.
     fn mesh(&self) -> &Arc<Mesh> {
-        match &self.content {
-            Some(Ok(mesh)) => mesh,
-            _ => &PLACEHOLDER,
-        }
+        self.content.content().unwrap_or(&PLACEHOLDER)
     }
 }
 
@@ -100,12 +96,7 @@ impl ShapeDesc for MeshDesc {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        match &self.content {
-            Some(Err(error)) => {
-                vec![ValidationError::new("file", error.what(), error.expected.clone())]
-            }
-            _ => Vec::new(),
-        }
+        self.content.fault().into_iter().collect()
     }
 
     /// Creates a mesh without a file: the placeholder at the origin. The box to fill is ignored,
@@ -121,9 +112,8 @@ impl Shape {
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
-            && mesh.content.is_none()
         {
-            mesh.content = Some(load(&mesh.file));
+            mesh.content.resolve(|| load(&mesh.file));
         }
     }
 
@@ -148,7 +138,7 @@ impl Shape {
     /// shape names no file or the file could not be read.
     pub fn mesh(&self) -> Option<&Arc<Mesh>> {
         match self {
-            Self::MeshDesc(mesh) => mesh.content.as_ref()?.as_ref().ok(),
+            Self::MeshDesc(mesh) => mesh.content.content(),
             _ => None,
         }
     }

@@ -41,7 +41,7 @@ pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
 pub use texture_space::TextureSpace;
 pub use torus::Torus;
-pub use transform::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
+pub use transform::{Rotate, Scale, TransformOp, compose, ill_conditioned};
 pub use unit_frustum::UnitFrustum;
 
 #[cfg(test)]

@@ -174,12 +174,7 @@ kinds! {
 }
 
 impl FieldValue for Shape {
-    type Written = Self;
     const TYPE: ValueType = ValueType::OneOf(KINDS);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()

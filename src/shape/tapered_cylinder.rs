@@ -2,9 +2,9 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::{axes_between, axis_faults, frustum_between, is_upright};
+use crate::shape::axial::{axis_faults, by_axis, frustum_between};
 use crate::value::{Description, NumberRange, ValidationError, description};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 description! {
     /// A circular cylinder that narrows or widens linearly, with flat ends: a cone cut off.
@@ -49,17 +49,5 @@ impl ShapeDesc for TaperedCylinder {
         }
     }
 
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        vec![&mut self.base, &mut self.top]
-    }
-
-    /// Returns `true` without a change if the cylinder is upright, because it is then symmetric
-    /// about the vertical. Otherwise returns `false`.
-    fn rotate_y(&mut self, _: f64) -> bool {
-        is_upright(self.base, self.top)
-    }
-
-    fn texture_axes(&self) -> DMat3 {
-        axes_between(self.base, self.top)
-    }
+    by_axis!(base, top);
 }

@@ -3,30 +3,29 @@
 use crate::primitive::{Form, PlaneForm};
 use crate::shape::Shape;
 use crate::value::{
-    Description, Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, Validator,
-    ValueType, description, one_of, sin_cos_degrees, unit,
+    Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, ValueType, description,
+    one_of, sin_cos_degrees, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
 use toml::de::DeValue;
 use toml::{Spanned, Value};
 
-/// One step of a transform. Angles are in degrees, counter-clockwise for a viewer at whom the axis
-/// points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TransformOp {
-    /// Moves the object by this vector, in scene units.
-    Translate([f64; 3]),
-    /// Rotates the object about the x axis by this angle in degrees.
-    RotateX(f64),
-    /// Rotates the object about the y axis, the vertical, by this angle in degrees:
-    /// counter-clockwise seen from above.
-    RotateY(f64),
-    /// Rotates the object about the z axis by this angle in degrees.
-    RotateZ(f64),
-    /// Rotates the object about any axis through the origin.
-    Rotate(Rotate),
-    /// Scales the object about the origin, by one factor or by three factors along the axes.
-    Scale(Scale),
+one_of! {
+    /// One step of a transform. Angles are counter-clockwise for a viewer at whom the axis points.
+    pub enum TransformOp {
+        /// Moves by this vector.
+        Translate([f64; 3]) = "translate", in COORDINATE "scene units";
+        /// Rotates about the x axis.
+        RotateX(f64) = "rotate_x", in FINITE "degrees";
+        /// Rotates about the y axis, the vertical: counter-clockwise seen from above.
+        RotateY(f64) = "rotate_y", in FINITE "degrees";
+        /// Rotates about the z axis.
+        RotateZ(f64) = "rotate_z", in FINITE "degrees";
+        /// Rotates about any axis through the origin.
+        Rotate(Rotate) = "rotate";
+        /// Scales away from the origin; negative: mirrors.
+        Scale(Scale) = "scale";
+    }
 }
 
 description! {
@@ -57,43 +56,14 @@ impl TomlValue for Scale {
     }
 }
 
-one_of! {
-    TransformOp {
-        "translate" => Translate,
-        "rotate_x" => RotateX,
-        "rotate_y" => RotateY,
-        "rotate_z" => RotateZ,
-        "rotate" => Rotate,
-        "scale" => Scale,
+impl FieldValue for Scale {
+    const TYPE: ValueType = ValueType::Factor;
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let [x, y, z] = &self.0;
+        if x == y && y == z { x.errors(field) } else { self.0.errors(field) }
     }
 }
-
-/// Keys of a transform's step; each step has exactly one.
-pub const TRANSFORM_OP_FIELDS: &[Field] = &[
-    Field::required(
-        "translate",
-        ValueType::Numbers(3, NumberRange::COORDINATE),
-        "scene units",
-        "Moves by this vector.",
-    ),
-    Field::required("rotate_x", ANGLE, "degrees", "Rotates about the x axis."),
-    Field::required(
-        "rotate_y",
-        ANGLE,
-        "degrees",
-        "Rotates about the y axis, the vertical: counter-clockwise seen from above.",
-    ),
-    Field::required("rotate_z", ANGLE, "degrees", "Rotates about the z axis."),
-    Field::required("rotate", ValueType::Table(Rotate::FIELDS), "", Rotate::DOC),
-    Field::required(
-        "scale",
-        ValueType::Factor,
-        "",
-        "Scales away from the origin; negative: mirrors.",
-    ),
-];
-
-const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
 
 impl TransformOp {
     /// Returns the transform step as an affine map. The step must be valid.
@@ -109,30 +79,10 @@ impl TransformOp {
             Self::Scale(Scale(by)) => DAffine3::from_scale(DVec3::from_array(by)),
         }
     }
-
-    /// Returns the validation errors of the transform step.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        let checks = Validator::new(TRANSFORM_OP_FIELDS);
-        match self {
-            Self::Translate(by) => checks.field("translate", by),
-            Self::RotateX(degrees) => checks.field("rotate_x", degrees),
-            Self::RotateY(degrees) => checks.field("rotate_y", degrees),
-            Self::RotateZ(degrees) => checks.field("rotate_z", degrees),
-            Self::Rotate(rotate) => checks.field("rotate", rotate),
-            Self::Scale(Scale([x, y, z])) if x == y && y == z => checks.field("scale", x),
-            Self::Scale(Scale(by)) => checks.field("scale", by),
-        }
-        .errors()
-    }
 }
 
 impl FieldValue for Vec<TransformOp> {
-    type Written = Self;
-    const TYPE: ValueType = ValueType::ListOf(TRANSFORM_OP_FIELDS);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
+    const TYPE: ValueType = ValueType::ListOf(TransformOp::FIELDS);
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let errors = |(i, step): (usize, &TransformOp)| {

@@ -20,19 +20,9 @@ pub trait Description {
 
 /// Rust type to which the values of keys in scene files are converted.
 pub trait FieldValue {
-    /// Rust type of a default value in a `description!` declaration, such as `[f64; 3]` for a
-    /// colour.
-    type Written;
-
     /// Type of the values in scene files. The range of numbers is [`NumberRange::FINITE`] unless
     /// the declaration of a key gives another.
     const TYPE: ValueType;
-
-    /// Converts a default value of a declaration to this type.
-    ///
-    /// # Panics
-    /// Panics if `written` is not valid for the type, which is an error in the declaration.
-    fn from_written(written: Self::Written) -> Self;
 
     /// Returns the validation errors of `self`, the value of the key that `field` describes. The
     /// key of each error begins with the name of that key.
@@ -42,6 +32,34 @@ pub trait FieldValue {
     /// key.
     fn is_absent(&self) -> bool {
         false
+    }
+}
+
+/// Conversion of a default value in a `description!` declaration, such as `[f64; 3]` for a colour,
+/// to the Rust type of its key.
+pub trait FromWritten<W> {
+    /// Converts a default value of a declaration to this type.
+    ///
+    /// # Panics
+    /// Panics if `written` is not valid for the type, which is an error in the declaration.
+    fn from_written(written: W) -> Self;
+}
+
+impl<T> FromWritten<T> for T {
+    fn from_written(written: T) -> Self {
+        written
+    }
+}
+
+impl FromWritten<[f64; 3]> for Color {
+    fn from_written(written: [f64; 3]) -> Self {
+        Self(written)
+    }
+}
+
+impl FromWritten<&'static str> for String {
+    fn from_written(written: &'static str) -> Self {
+        written.to_string()
     }
 }
 
@@ -56,12 +74,7 @@ pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
 macro_rules! numeric {
     ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
         impl $(<const $n: usize>)? FieldValue for $type {
-            type Written = Self;
             const TYPE: ValueType = $value_type;
-
-            fn from_written(written: Self) -> Self {
-                written
-            }
 
             fn errors(&self, field: &Field) -> Vec<ValidationError> {
                 let numbers: fn(&Self) -> Vec<f64> = $numbers;
@@ -79,12 +92,7 @@ numeric! {
 }
 
 impl FieldValue for Color {
-    type Written = [f64; 3];
     const TYPE: ValueType = ValueType::Color(NumberRange::FINITE);
-
-    fn from_written(written: [f64; 3]) -> Self {
-        Self(written)
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.0.errors(field)
@@ -92,12 +100,7 @@ impl FieldValue for Color {
 }
 
 impl FieldValue for bool {
-    type Written = Self;
     const TYPE: ValueType = ValueType::Switch;
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
 
     fn errors(&self, _: &Field) -> Vec<ValidationError> {
         Vec::new()
@@ -105,12 +108,7 @@ impl FieldValue for bool {
 }
 
 impl FieldValue for String {
-    type Written = &'static str;
     const TYPE: ValueType = ValueType::Text;
-
-    fn from_written(written: &'static str) -> Self {
-        written.to_string()
-    }
 
     fn errors(&self, _: &Field) -> Vec<ValidationError> {
         Vec::new()
@@ -122,12 +120,7 @@ impl FieldValue for String {
 }
 
 impl<T: FieldValue> FieldValue for Option<T> {
-    type Written = T::Written;
     const TYPE: ValueType = T::TYPE;
-
-    fn from_written(written: T::Written) -> Self {
-        Some(T::from_written(written))
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.as_ref().map(|value| value.errors(field)).unwrap_or_default()
@@ -140,12 +133,7 @@ impl<T: FieldValue> FieldValue for Option<T> {
 
 /// Implementation of [`FieldValue`] for a table inside a table.
 impl<T: Description> FieldValue for T {
-    type Written = Self;
     const TYPE: ValueType = ValueType::Table(T::FIELDS);
-
-    fn from_written(written: Self) -> Self {
-        written
-    }
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.validator().errors().into_iter().map(|error| error.prefixed(field.name)).collect()
@@ -202,17 +190,18 @@ macro_rules! choices {
             }
         }
 
-        impl $crate::value::FieldValue for $name {
-            type Written = &'static str;
-            const TYPE: $crate::value::ValueType =
-                $crate::value::ValueType::Choice(Self::CHOICES);
-
+        impl $crate::value::FromWritten<&'static str> for $name {
             fn from_written(written: &'static str) -> Self {
                 match written {
                     $($word => Self::$variant,)+
                     _ => panic!("`{written}` is not a word of {}", stringify!($name)),
                 }
             }
+        }
+
+        impl $crate::value::FieldValue for $name {
+            const TYPE: $crate::value::ValueType =
+                $crate::value::ValueType::Choice(Self::CHOICES);
 
             fn errors(&self, _: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
                 Vec::new()
@@ -382,7 +371,7 @@ macro_rules! description {
         }
     };
     (@value $type:ty = $default:expr) => {
-        <$type as $crate::value::FieldValue>::from_written($default)
+        <$type as $crate::value::FromWritten<_>>::from_written($default)
     };
     (@value $type:ty) => {
         <$type as Default>::default()

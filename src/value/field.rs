@@ -194,7 +194,8 @@ impl fmt::Display for ValueType {
     }
 }
 
-fn names(fields: &[Field]) -> String {
+/// Returns the names of `fields`, separated by commas.
+pub(crate) fn names(fields: &[Field]) -> String {
     fields.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 

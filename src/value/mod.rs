@@ -17,14 +17,15 @@ mod validation;
 
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
-pub use description::{Description, FieldValue};
+pub use description::{Description, FieldValue, FromWritten};
 pub(crate) use description::{choices, description, doc_text};
 pub use direction::unit;
+pub(crate) use field::names;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::{Fnv1a64, fnv1a64};
 pub use number_range::{NumberRange, number};
 pub use order::{ascending, insertion_sort, sort_by_number, total_order};
-pub use round::{floor_log10, round_nice, round_significant, rounded_to, turned};
+pub use round::{floor_log10, round_fine, round_nice, round_significant, rounded_to, turned};
 pub use text::{sanitized, truncated};
 pub(crate) use toml_value::{TableReader, choice, one_of, only_entry, written};
 pub use toml_value::{TomlError, TomlValue};

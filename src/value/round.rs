@@ -38,6 +38,11 @@ pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }
 
+/// Rounds `x` to a multiple of a power of ten, which is about a millionth of `scale`.
+pub fn round_fine(x: f64, scale: f64) -> f64 {
+    rounded_to(x, floor_log10(scale) - 6)
+}
+
 /// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
 ///
 /// The horizontal components of the result are rounded to about a millionth of its horizontal

@@ -179,7 +179,71 @@ pub(crate) fn choice(value: &Spanned<DeValue>, choices: &[Choice]) -> Result<usi
 
 /// Implements [`TomlValue`] for an enum whose variants have one value each. In scene files such an
 /// enum is a table with one key, the name of the variant.
+///
+/// A declaration of the whole enum also implements [`FieldValue`](crate::value::FieldValue). Each
+/// variant has its help text, key, range and unit, written as in `description!`:
+///
+/// ```ignore
+/// one_of! {
+///     /// Opening angle of the camera.
+///     pub enum ViewAngle {
+///         /// Across the picture's height.
+///         Vertical(f64) = "vertical", in between(0.0, 180.0) "degrees";
+///     }
+/// }
+/// ```
 macro_rules! one_of {
+    (
+        $(#[$attribute:meta])+
+        pub enum $name:ident {
+            $(
+                $(#[doc = $help:literal])+
+                $variant:ident($type:ty) = $key:literal
+                $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?;
+            )+
+        }
+    ) => {
+        $(#[$attribute])+
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum $name {
+            $($(#[doc = $help])+ $variant($type),)+
+        }
+
+        $crate::value::one_of! {
+            $name { $($key => $variant),+ }
+        }
+
+        impl $name {
+            /// Keys in scene files, one for each variant; exactly one of them is given.
+            pub const FIELDS: &'static [$crate::value::Field] = &[$(
+                $crate::value::Field::required(
+                    $key,
+                    <$type as $crate::value::FieldValue>::TYPE
+                        $(.within($crate::value::NumberRange::$range $(($($bound),+))?))?,
+                    concat!("" $($(, $unit)?)?),
+                    $crate::value::doc_text(concat!($($help),+)),
+                ),
+            )+];
+
+            /// Returns the validation errors of the value, with the key of the variant.
+            pub fn faults(&self) -> Vec<$crate::value::ValidationError> {
+                let checks = $crate::value::Validator::new(Self::FIELDS);
+                match self {
+                    $(Self::$variant(value) => checks.field($key, value),)+
+                }
+                .errors()
+            }
+        }
+
+        impl $crate::value::FieldValue for $name {
+            const TYPE: $crate::value::ValueType = $crate::value::ValueType::OneOf(Self::FIELDS);
+
+            fn errors(&self, field: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
+                let inside = |error: $crate::value::ValidationError| error.inside(field.name);
+                self.faults().into_iter().map(inside).collect()
+            }
+        }
+    };
     ($name:ident { $($key:literal => $variant:ident),+ $(,)? }) => {
         impl $crate::value::TomlValue for $name {
             fn from_toml(
@@ -205,21 +269,6 @@ macro_rules! one_of {
     };
 }
 pub(crate) use one_of;
-
-fn float(value: &Spanned<DeValue>) -> Result<f64, TomlError> {
-    match value.get_ref() {
-        DeValue::Float(digits) => {
-            let digits = digits.as_str();
-            let number = digits.parse().ok();
-            // A number too large for the type is parsed as infinite.
-            number
-                .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
-                .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
-        }
-        DeValue::Integer(_) => integer(value).map(|number| number as f64),
-        _ => Err(wrong(value, "a number")),
-    }
-}
 
 fn integer(value: &Spanned<DeValue>) -> Result<i64, TomlError> {
     let digits = value.get_ref().as_integer().ok_or_else(|| wrong(value, "an integer"))?;
@@ -248,7 +297,18 @@ fn exactly<'a>(
 
 impl TomlValue for f64 {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        float(value)
+        match value.get_ref() {
+            DeValue::Float(digits) => {
+                let digits = digits.as_str();
+                let number = digits.parse().ok();
+                // A number too large for the type is parsed as infinite.
+                number
+                    .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
+                    .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
+            }
+            DeValue::Integer(_) => integer(value).map(|number| number as f64),
+            _ => Err(wrong(value, "a number")),
+        }
     }
 
     fn to_toml(&self) -> Value {

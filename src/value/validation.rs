@@ -27,6 +27,13 @@ impl ValidationError {
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
         self
     }
+
+    /// Returns the error with `outer` and a dot before its key and before its phrase, such as
+    /// `focus.distance is -1`.
+    pub fn inside(mut self, outer: &str) -> Self {
+        self.found = format!("{outer}.{}", self.found);
+        self.prefixed(outer)
+    }
 }
 
 /// Collector of validation errors. It checks the values of one table of a scene file against the

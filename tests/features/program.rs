@@ -19,7 +19,7 @@ use zerkalo::render::session::{Session, State};
 use zerkalo::render::{Checkpoint, Options, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::edit::{self, Edit, EditError, Target};
-use zerkalo::scene::{Document, History, Scene};
+use zerkalo::scene::{History, Scene};
 use zerkalo::shape::Shape;
 use zerkalo::world::{self, Precision};
 
@@ -61,7 +61,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
             break reason;
         }
     };
-    let glossy = tiles(&render.rendering().film, &scene).into_iter().filter(|(_, g)| *g);
+    let glossy = tiles(&render.state.film, &scene).into_iter().filter(|(_, g)| *g);
     let samples: Vec<u32> = glossy.map(|(samples, _)| samples).collect();
     let most = samples.iter().copied().max().unwrap_or(0);
     let noise = render.noise_codes().unwrap_or(f64::INFINITY);
@@ -180,7 +180,7 @@ impl Desk {
 
 /// Returns the picture of `scene` after the scene was saved and read again.
 fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
-    let text = Document::new(scene, "room.toml").text().to_string();
+    let text = scene.to_text();
     let read = Scene::parse(&text, "room.toml").unwrap_or_else(|e| panic!("{e}"));
     let mut rendering = begin(&read, 1, Precision::Auto);
     follow(&mut rendering, settings(false, 0, SPP), &pool(2));
@@ -258,7 +258,7 @@ fn a15_user_edits() {
         let settings = settings(false, 0, SPP);
         let mut render = SyncRender::new(scene, &options(), settings, 2).unwrap();
         while render.step().is_none() {}
-        render.schedule().samples()
+        render.schedule.samples()
     };
     assert!(sample_count(&capped) < sample_count(history.scene()));
     // Undoing all edits restores the scene and its picture.

@@ -298,7 +298,7 @@ fn film_files_with_repaired_checksums() {
         let Some(_) = film(&bytes) else { return false };
         write(&path, &bytes);
         let Ok(checkpoint) = Checkpoint::read(&path) else { return false };
-        let inputs = SampleInputs::of(checkpoint.header()).expect("inputs");
+        let inputs = SampleInputs::of(&checkpoint.header).expect("inputs");
         if continued < 200
             && let Ok(scene) = Scene::parse(&inputs.scene, "a.toml")
         {

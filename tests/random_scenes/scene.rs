@@ -12,7 +12,7 @@ use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
 use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
 use zerkalo::scene::{
-    Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
+    Acceleration, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
 };
 use zerkalo::value::{Color, Description, Field, TomlValue};
 
@@ -327,5 +327,5 @@ pub fn scene(seed: u64) -> Random {
     let mut numbers = Numbers::new(seed ^ 0x5ce4_e000_0000_0000);
     let drawn = (0..100).find_map(|_| draw(&mut numbers, layout));
     let scene = drawn.unwrap_or_else(|| panic!("seed {seed}: no scene without faults in 100"));
-    Random { layout, text: Document::new(&scene, "random").text().to_string() }
+    Random { layout, text: scene.to_text() }
 }

@@ -229,9 +229,9 @@ fn line_ends_and_byte_order_mark_stay() {
 
 #[test]
 fn empty_scene_is_written() {
-    let document = Document::new(&Scene::default(), "empty.toml");
-    assert_eq!(document.text(), "[film]\nsize = [640, 480]\n");
-    assert_eq!(self::document(document.text()).scene(), &Scene::default());
+    let text = Scene::default().to_text();
+    assert_eq!(text, "[film]\nsize = [640, 480]\n");
+    assert_eq!(document(&text).scene(), &Scene::default());
     let after = edited("film.size = [640, 480]\n", |s| s.trace.max_depth = 3);
     assert_eq!(after, "film.size = [640, 480]\n\n[trace]\nmax_depth = 3\n");
 }
@@ -240,10 +240,10 @@ proptest! {
     #[test]
     fn random_scenes_survive_writing_and_reading(scene in random::scene()) {
         prop_assert_eq!(scene.faults(), []);
-        let document = Document::new(&scene, "scene.toml");
-        let again = Scene::parse(document.text(), "scene.toml");
-        prop_assert!(again.is_ok(), "{}\n{}", again.unwrap_err(), document.text());
-        prop_assert_eq!(again.unwrap(), scene, "{}", document.text());
+        let text = scene.to_text();
+        let again = Scene::parse(&text, "scene.toml");
+        prop_assert!(again.is_ok(), "{}\n{text}", again.unwrap_err());
+        prop_assert_eq!(again.unwrap(), scene, "{}", text);
     }
 
     #[test]
@@ -254,7 +254,7 @@ proptest! {
     ) {
         let text = match LAYOUTS.get(layout) {
             Some(text) => text.to_string(),
-            None => Document::new(&others[1], "scene.toml").text().to_string(),
+            None => others[1].to_text(),
         };
         let mut document = document(&text);
         let mut scene = document.scene().clone();

@@ -72,9 +72,9 @@ fn perform(
         14 => ("own material", edit::own_material(scene, &subject)),
         15 => ("store camera", edit::store_view(scene, (at % 2 == 0).then_some("left"))),
         16 => ("recall camera", edit::recall_view(scene, "left")),
-        17 => ("roughen", edit::adjust_roughness(scene, Some(&subject), amount.trunc())),
-        18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
-        _ => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
+        17 => ("roughen", edit::step_mirror(scene, Some(&subject), "roughness", amount.trunc())),
+        18 => ("reflect", edit::step_mirror(scene, Some(&subject), "reflection", amount.trunc())),
+        _ => ("next lobe", edit::step_mirror(scene, None, "lobe", amount)),
     }
 }
 

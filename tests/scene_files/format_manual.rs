@@ -3,7 +3,7 @@
 use crate::common::shape_examples::EXAMPLES;
 use std::fmt::Write as _;
 use zerkalo::scene::FIELDS;
-use zerkalo::shape::{KINDS, TRANSFORM_OP_FIELDS};
+use zerkalo::shape::{KINDS, TransformOp};
 use zerkalo::value::{DefaultValue, Field, ValueType};
 
 const INTRODUCTION: &str = "\
@@ -205,8 +205,8 @@ fn steps(out: &mut String) {
         out,
         "```toml\ntransform = [{ rotate_y = 30.0 }, { translate = [0.0, 1.0, 0.0] }]\n```\n\n",
     );
-    kinds(out, TRANSFORM_OP_FIELDS);
-    for field in TRANSFORM_OP_FIELDS {
+    kinds(out, TransformOp::FIELDS);
+    for field in TransformOp::FIELDS {
         nested(out, field);
     }
 }

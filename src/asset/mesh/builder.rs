@@ -65,7 +65,7 @@ impl<'a> Builder<'a> {
         let reserved = self.positions.try_reserve(vertices);
         reserved.and_then(|()| self.triangles.try_reserve(triangles)).map_err(|_| {
             let found = format!("there is no memory for {triangles} triangles");
-            self.source.error(FileLocation::Whole, found, "a smaller mesh, or more free memory")
+            self.source.fault(found, "a smaller mesh, or more free memory")
         })
     }
 
@@ -83,7 +83,7 @@ impl<'a> Builder<'a> {
             if count > max {
                 let found = format!("the mesh has {count} {noun}");
                 let expected = format!("at most {max}");
-                return Err(self.source.error(FileLocation::Whole, found, &expected));
+                return Err(self.source.fault(found, &expected));
             }
         }
         Ok(())
@@ -140,8 +140,7 @@ impl<'a> Builder<'a> {
         let found = self.colors.iter().rposition(|c| *c == color);
         let index = found.unwrap_or(self.colors.len());
         self.color = u16::try_from(index).map_err(|_| {
-            let found = "the mesh has more than 65536 different colours";
-            self.source.error(FileLocation::Whole, found, "at most 65536")
+            self.source.fault("the mesh has more than 65536 different colours", "at most 65536")
         })?;
         if found.is_none() {
             self.colors.push(color);
@@ -198,11 +197,7 @@ impl<'a> Builder<'a> {
         self.check_limits(0, 0)?;
         let source = self.source;
         if self.triangles.is_empty() {
-            return Err(source.error(
-                FileLocation::Whole,
-                "the mesh has no triangles",
-                "at least one",
-            ));
+            return Err(source.fault("the mesh has no triangles", "at least one"));
         }
         self.coordinates()?;
         let center = self.center();
@@ -224,7 +219,7 @@ impl<'a> Builder<'a> {
         let extent = extent.fold(0.0, f64::max);
         if extent < MIN_EXTENT {
             let found = format!("the mesh is {extent:e} large");
-            return Err(source.error(FileLocation::Whole, found, "a size from 1e-9 to 1e9"));
+            return Err(source.fault(found, "a size from 1e-9 to 1e9"));
         }
         let normals = self.unit_normals(&positions);
         let uvs = self.checked_uvs(positions.len())?;
@@ -299,7 +294,7 @@ impl<'a> Builder<'a> {
         let dropped = before - self.triangles.len();
         if self.triangles.is_empty() {
             let found = format!("none of the {before} triangles has an area");
-            return Err(self.source.error(FileLocation::Whole, found, "at least one that has"));
+            return Err(self.source.fault(found, "at least one that has"));
         }
         match dropped {
             0 => {}

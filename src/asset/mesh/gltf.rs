@@ -194,19 +194,16 @@ impl<'a> Part<'a> {
         let color = [r, g, b];
         if !color.iter().all(|x| (0.0..=1e6).contains(x)) {
             let found = "a base colour is not a colour";
-            return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
+            return Err(self.source.fault(found, "numbers of at least 0"));
         }
         // Triangles without a stored colour are white. White therefore needs to be stored only if
         // the mesh has a stored colour already.
         if color != [1.0; 3] || builder.has_colors() {
             builder.color(color)?;
         }
-        let indices = match self.primitive.indices() {
-            Some(accessor) => {
-                Some(self.slice(&accessor, Dimensions::Scalar, accessor.data_type())?)
-            }
-            None => None,
-        };
+        let indices = self.primitive.indices();
+        let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar, a.data_type()));
+        let indices = indices.transpose()?;
         let corners = indices.as_ref().map_or(vertices, |s| s.count);
         let faces = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
         builder.reserve(vertices, faces)?;

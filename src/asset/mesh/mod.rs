@@ -10,7 +10,7 @@ mod stl;
 
 pub use bvh::{Mesh, TriangleBlock};
 
-use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::error::AssetError;
 use crate::asset::file::FileContents;
 use crate::value::Fnv1a64;
 use std::path::Path;
@@ -97,11 +97,7 @@ impl TriangleMesh {
             "gltf" | "glb" => gltf::parse(&source),
             _ => {
                 let found = format!("\"{extension}\" is not a kind of mesh file");
-                Err(source.error(
-                    FileLocation::Whole,
-                    found,
-                    "a name that ends in .obj, .ply, .stl, .gltf or .glb",
-                ))
+                Err(source.fault(found, "a name that ends in .obj, .ply, .stl, .gltf or .glb"))
             }
         }
     }

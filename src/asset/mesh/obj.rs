@@ -31,7 +31,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let counts = check_faces(source)?;
     builder.check_limits(counts[0], 0)?;
-    let libraries = Libraries::new(source);
+    let libraries = RefCell::new(Libraries::default());
     let options = LoadOptions {
         single_index: true,
         triangulate: true,
@@ -39,12 +39,13 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         ignore_lines: true,
     };
     let mut lines = Lines { rest: &source.bytes, line: 0, current: b"" };
-    let loaded = tobj::load_obj_buf(&mut lines, &options, |path| libraries.load(path));
+    let load = |path: &Path| libraries.borrow_mut().load(source, path);
+    let loaded = tobj::load_obj_buf(&mut lines, &options, load);
     let (models, materials) = loaded.map_err(|error| {
         let place = FileLocation::Line(lines.line);
         source.error(place, describe(error), "a line of the OBJ format")
     })?;
-    let libraries = libraries.found.into_inner();
+    let libraries = libraries.into_inner();
     if let Some(error) = libraries.error {
         return Err(error);
     }
@@ -234,51 +235,39 @@ fn without_color(line: &[u8]) -> &[u8] {
 /// Results of loading the MTL files of an OBJ file: the paths of the files loaded so far, notes for
 /// the user, and the first error.
 #[derive(Default)]
-struct Found {
+struct Libraries {
     seen: Vec<PathBuf>,
     notes: Vec<String>,
     error: Option<AssetError>,
 }
 
-/// Loader of the MTL files that an OBJ file names.
-struct Libraries<'a> {
-    source: &'a FileContents,
-    found: RefCell<Found>,
-}
-
-impl<'a> Libraries<'a> {
-    fn new(source: &'a FileContents) -> Self {
-        Self { source, found: RefCell::default() }
-    }
-
-    /// Returns the materials of the MTL file `name`. Returns no materials in four cases:
+impl Libraries {
+    /// Returns the materials of the MTL file `name`, which the OBJ file `source` names. Returns no
+    /// materials in four cases:
     ///
     /// - `name` leads out of the folder; this is recorded as an error
     /// - the file cannot be read; this is recorded as a note
     /// - the file was loaded before
     /// - [`MAX_MTL_FILES`] other files were loaded before
-    fn load(&self, name: &Path) -> MTLLoadResult {
+    fn load(&mut self, source: &FileContents, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
-        let mut found = self.found.borrow_mut();
         let name = name.to_string_lossy();
-        let Some(path) = self.source.resolve_relative(&name) else {
-            let what = format!("mtllib names \"{}\"", truncated(&name));
-            let error = self.source.error(
-                FileLocation::Whole,
-                what,
+        let Some(path) = source.resolve_relative(&name) else {
+            let error = source.fault(
+                format!("mtllib names \"{}\"", truncated(&name)),
                 "a relative path without \"..\", to a file in the same folder or below",
             );
-            found.error.get_or_insert(error);
+            self.error.get_or_insert(error);
             return nothing();
         };
-        if found.seen.contains(&path) || found.seen.len() >= MAX_MTL_FILES {
+        if self.seen.contains(&path) || self.seen.len() >= MAX_MTL_FILES {
             return nothing();
         }
-        found.seen.push(path.clone());
+        self.seen.push(path.clone());
         match FileContents::read(&path, MAX_MTL_BYTES) {
             Ok(library) => tobj::load_mtl_buf(&mut diffuse_colors(&library.bytes).as_bytes()),
             Err(error) => {
-                found.notes.push(format!("no colours: {}", error.what()));
+                self.notes.push(format!("no colours: {}", error.what()));
                 nothing()
             }
         }

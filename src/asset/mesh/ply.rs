@@ -162,9 +162,7 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
 /// Checks that a PLY header declares the required elements and properties, and that `left`, the
 /// number of bytes after the header, suffices for the declared elements.
 fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
-    let missing = |what: &str| {
-        Err(source.error(FileLocation::Whole, format!("the header names no {what}"), "a mesh"))
-    };
+    let missing = |what: &str| Err(source.fault(format!("the header names no {what}"), "a mesh"));
     let Some(vertex) = header.elements.get("vertex") else { return missing("element vertex") };
     for names in &NUMBERS[..3] {
         if !vertex.properties.contains_key(names[0]) {
@@ -177,15 +175,14 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
     }
     let order = |name| header.elements.get_index_of(name);
     if order("face") < order("vertex") {
-        let found = "the faces precede the vertices";
-        return Err(source.error(FileLocation::Whole, found, "vertices first"));
+        return Err(source.fault("the faces precede the vertices", "vertices first"));
     }
     let mut least = 0u128;
     for element in header.elements.values() {
         let bytes = least_bytes(element, header.encoding);
         if bytes == 0 && element.count > 0 {
             let found = format!("the element {} has no properties", element.name);
-            return Err(source.error(FileLocation::Whole, found, "at least one"));
+            return Err(source.fault(found, "at least one"));
         }
         least += bytes as u128 * element.count as u128;
         if least > left as u128 + 1 {
@@ -193,7 +190,7 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
                 "the header declares {} times {}, more than the file holds",
                 element.count, element.name
             );
-            return Err(source.error(FileLocation::Whole, found, "as many as there are"));
+            return Err(source.fault(found, "as many as there are"));
         }
     }
     Ok(())

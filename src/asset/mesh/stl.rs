@@ -34,7 +34,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
         let Some(announced) = announced else {
             let found =
                 format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
-            return Err(source.error(FileLocation::Whole, found, "an STL file"));
+            return Err(source.fault(found, "an STL file"));
         };
         if !fits {
             let found =
@@ -53,29 +53,25 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let wrong = |error: std::io::Error, place| {
         source.error(place, format!("the file cannot be read: {error}"), "an STL file")
     };
+    let triangles = stl_io::create_stl_reader(&mut reader)
+        .map_err(|error| wrong(error, FileLocation::Whole))?;
     let mut failure = None;
-    match stl_io::create_stl_reader(&mut reader) {
-        Err(error) => return Err(wrong(error, FileLocation::Whole)),
-        Ok(triangles) => {
-            for (n, triangle) in triangles.enumerate() {
-                let triangle = match triangle {
-                    Ok(triangle) => triangle,
-                    Err(error) => {
-                        failure = Some((error, n));
-                        break;
-                    }
-                };
-                let place = || FileLocation::Part(format!("triangle {n} (from 0)"));
-                let corners = triangle.vertices.map(|v| v.0);
-                if corners.iter().flatten().any(|x| !x.is_finite()) {
-                    let found = "a corner is not finite";
-                    return Err(source.error(place(), found, "finite coordinates"));
-                }
-                builder.check_limits(3, 1)?;
-                let corners = corners.map(|c| welder.index(c, &mut builder));
-                builder.triangle(corners, place)?;
+    for (n, triangle) in triangles.enumerate() {
+        let triangle = match triangle {
+            Ok(triangle) => triangle,
+            Err(error) => {
+                failure = Some((error, n));
+                break;
             }
+        };
+        let place = || FileLocation::Part(format!("triangle {n} (from 0)"));
+        let corners = triangle.vertices.map(|v| v.0);
+        if corners.iter().flatten().any(|x| !x.is_finite()) {
+            return Err(source.error(place(), "a corner is not finite", "finite coordinates"));
         }
+        builder.check_limits(3, 1)?;
+        let corners = corners.map(|c| welder.index(c, &mut builder));
+        builder.triangle(corners, place)?;
     }
     if let Some((error, n)) = failure {
         let line = FileLocation::Line(reader.line);

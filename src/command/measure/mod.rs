@@ -5,13 +5,14 @@ mod data;
 mod table;
 
 use crate::command::args::MeasureArgs;
+use crate::command::progress::style;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene_and_warn};
 use crate::disk::{self, check_writable};
 use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
 use crate::world::{self, AnyWorld};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,10 +31,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let display = args.picture.display();
-    let reference = match &args.reference {
-        Some(path) => Some(given_reference(path, scene.film.size, &display)?),
-        None => None,
-    };
+    let reference = args.reference.as_ref();
+    let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
+    let reference = reference.transpose()?;
     let threads = args.compute.threads();
     let experiments = match (&args.only, args.full) {
         (experiments, _) if !experiments.is_empty() => experiments.clone(),
@@ -56,7 +56,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
     let signals = Signals::watch()?;
-    let bar = progress_bar();
+    let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
@@ -132,12 +132,4 @@ fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Ref
         Some([a, b]) => Reference::of_replicates(read.size, a, b, display),
         None => Reference::of_pixels(read.size, read.pixels, display),
     })
-}
-
-fn progress_bar() -> ProgressBar {
-    let bar = ProgressBar::new(1);
-    let style = ProgressStyle::with_template("measuring {bar:30} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    bar.set_style(style);
-    bar
 }

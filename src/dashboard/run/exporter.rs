@@ -11,7 +11,7 @@ use crate::render::schedule::Settings;
 use crate::render::session::{Report, Session, State};
 use crate::render::{EncodedCheckpoint, Options, RenderState};
 use crate::sampling::SamplerKind;
-use crate::scene::{Document, Scene};
+use crate::scene::Scene;
 use crossbeam_channel::Sender;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -88,15 +88,14 @@ impl Exporter {
     /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
     /// to it.
     fn source(&self, scene: &Scene) -> (String, String) {
-        let document = match self.file.get() {
+        match self.file.get() {
             Some(file) => {
                 let mut document = file.document().clone();
                 document.apply(scene);
-                document
+                (document.name().to_string(), document.text().to_string())
             }
-            None => Document::new(scene, &self.stem()),
-        };
-        (document.name().to_string(), document.text().to_string())
+            None => (self.stem(), scene.to_text()),
+        }
     }
 }
 

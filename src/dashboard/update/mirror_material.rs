@@ -8,17 +8,18 @@ use crate::value::{number, truncated};
 
 impl UpdateContext<'_> {
     pub(super) fn roughness(&mut self, steps: f64) {
-        let edit = edit::adjust_roughness(self.scene(), Some(&self.model.selection), steps);
+        let edit = edit::step_mirror(self.scene(), Some(&self.model.selection), "roughness", steps);
         self.commit_mirror(edit, Coalesce::Repeat);
     }
 
     pub(super) fn reflection(&mut self, steps: f64) {
-        let edit = edit::reflect(self.scene(), Some(&self.model.selection), steps);
+        let edit =
+            edit::step_mirror(self.scene(), Some(&self.model.selection), "reflection", steps);
         self.commit_mirror(edit, Coalesce::Repeat);
     }
 
     pub(super) fn next_lobe(&mut self) {
-        let edit = edit::next_lobe(self.scene(), Some(&self.model.selection), true);
+        let edit = edit::step_mirror(self.scene(), Some(&self.model.selection), "lobe", 1.0);
         self.commit_mirror(edit, Coalesce::Single);
     }
 

@@ -170,25 +170,32 @@ impl Plan {
     }
 
     fn parse_body(lines: &mut Lines) -> Result<Self, PlanError> {
-        let source = lines.setting("scene", "a file name", |text| Some(text.to_string()))?;
-        let scene_hash = lines.setting("scene_hash", "a hash", |text| Some(text.to_string()))?;
-        let size = lines.setting("size", "WIDTHxHEIGHT, 1 to 16384 pixels each", |text| {
-            let (width, height) = text.split_once('x')?;
-            let size = [number(width)?, number(height)?];
-            size.iter().all(|n| (1..=MAX_SIDE).contains(n)).then_some(size)
-        })?;
-        let seed = lines.setting("seed", "an integer from 0", number)?;
-        let sampler = lines.setting("sampler", "sobol or random", SamplerKind::from_name)?;
-        let precision = lines.setting("precision", "single or double", |text| {
-            ["single", "double"].contains(&text).then(|| text.to_string())
-        })?;
-        let exposure_ev = lines.setting("exposure", "a number from -64 to 64", |text| {
-            number(text).filter(|ev: &f64| ev.abs() <= 64.0)
-        })?;
-        let tone = lines.setting("tone", "clip or neutral", |text| Tone::from_str(text).ok())?;
-        let rays_per_pixel = lines.setting("rays_per_pixel", "an integer from 0", number)?;
         let positive = |text: &str| number(text).filter(|n: &f64| n.is_finite() && *n > 0.0);
-        let noise_codes = lines.setting("noise", "a number above 0", positive)?;
+        // The fields are read in the order of the file. The last two follow other lines.
+        let mut settings = PlanSettings {
+            source: lines.setting("scene", "a file name", |text| Some(text.to_string()))?,
+            scene_hash: lines.setting("scene_hash", "a hash", |text| Some(text.to_string()))?,
+            size: lines.setting("size", "WIDTHxHEIGHT, 1 to 16384 pixels each", |text| {
+                let (width, height) = text.split_once('x')?;
+                let size = [number(width)?, number(height)?];
+                size.iter().all(|n| (1..=MAX_SIDE).contains(n)).then_some(size)
+            })?,
+            seed: lines.setting("seed", "an integer from 0", number)?,
+            sampler: lines.setting("sampler", "sobol or random", SamplerKind::from_name)?,
+            precision: lines.setting("precision", "single or double", |text| {
+                ["single", "double"].contains(&text).then(|| text.to_string())
+            })?,
+            display: Display {
+                exposure_ev: lines.setting("exposure", "a number from -64 to 64", |text| {
+                    number(text).filter(|ev: &f64| ev.abs() <= 64.0)
+                })?,
+                tone: lines.setting("tone", "clip or neutral", |text| Tone::from_str(text).ok())?,
+            },
+            rays_per_pixel: lines.setting("rays_per_pixel", "an integer from 0", number)?,
+            noise_codes: lines.setting("noise", "a number above 0", positive)?,
+            shards: 0,
+            base_plan: None,
+        };
         let predicted_codes = lines.setting("predicted_noise", "a number from 0", |text| {
             number(text).filter(|n: &f64| n.is_finite() && *n >= 0.0)
         })?;
@@ -197,15 +204,15 @@ impl Plan {
             let slopes = [number(plain)?, number(glossy)?];
             slopes.iter().all(|s| (0.1..=2.0).contains(s)).then_some(slopes)
         })?;
-        let shards = lines.setting("shards", "an integer from 1 to 65536", |text| {
+        settings.shards = lines.setting("shards", "an integer from 1 to 65536", |text| {
             number(text).filter(|n| (1..=MAX_SHARDS).contains(n))
         })?;
-        let base_plan = lines.setting("base", "pilot or a checksum", |text| match text {
+        settings.base_plan = lines.setting("base", "pilot or a checksum", |text| match text {
             "pilot" => Some(None),
             _ if text.len() == 16 => u64::from_str_radix(text, 16).ok().map(Some),
             _ => None,
         })?;
-        let count = tiles_of(size);
+        let count = tiles_of(settings.size);
         lines.setting("tiles", &format!("{count}, the number of tiles of the size"), |text| {
             number(text).filter(|n: &usize| *n == count)
         })?;
@@ -219,20 +226,6 @@ impl Plan {
             let what = format!("found `{}`, expected the checksum", truncated(line));
             return Err(lines.error(what));
         }
-        let display = Display { exposure_ev, tone };
-        let settings = PlanSettings {
-            source,
-            scene_hash,
-            size,
-            seed,
-            sampler,
-            precision,
-            display,
-            rays_per_pixel,
-            noise_codes,
-            shards,
-            base_plan,
-        };
         Ok(Self { settings, predicted_codes, slopes, tiles })
     }
 }

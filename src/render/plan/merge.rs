@@ -47,19 +47,12 @@ impl Merged {
         let mut files: Vec<_> = inputs.iter().zip(readers).collect();
         sort_by_number(&mut files, |(input, _)| input.shards[0].number.into());
         let shards: Vec<PartShard> = shards.into_values().map(|(_, shard)| shard).collect();
-        let mut sum: Option<(Film, FilmFileHeader)> = None;
-        for (_, reader) in files {
-            match &mut sum {
-                Some((film, _)) => {
-                    reader.add_to(film).map_err(|e| e.to_string())?;
-                }
-                None => {
-                    let (header, film) = reader.read().map_err(|e| e.to_string())?;
-                    sum = Some((film, header));
-                }
-            }
+        let mut readers = files.into_iter().map(|(_, reader)| reader);
+        let first = readers.next().ok_or("there is nothing to merge")?;
+        let (mut header, mut film) = first.read().map_err(|e| e.to_string())?;
+        for reader in readers {
+            reader.add_to(&mut film).map_err(|e| e.to_string())?;
         }
-        let (film, mut header) = sum.ok_or_else(|| "there is nothing to merge".to_string())?;
         if shards.iter().all(|shard| shard.complete) {
             let numbers: Vec<u32> = shards.iter().map(|shard| shard.number).collect();
             if let Some(tile) = plan.differing_tile(&film, &numbers) {

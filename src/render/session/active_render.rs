@@ -263,9 +263,7 @@ impl ActiveRender {
     /// with jobs of about [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
-        let Some(speed) = self.throughput.samples_per_second().or_else(|| self.mean_speed()) else {
-            return wave;
-        };
+        let Some(speed) = self.speed() else { return wave };
         let samples_per_thread_second = speed / context.pool.current_num_threads() as f64;
         let longest = (JOB_SECONDS * samples_per_thread_second / TILE_PIXELS) as u32
             / SAMPLE_ALIGNMENT
@@ -273,9 +271,12 @@ impl ActiveRender {
         wave.cut((speed * seconds) as u64, longest.max(SAMPLE_ALIGNMENT))
     }
 
-    fn mean_speed(&self) -> Option<f64> {
+    /// Returns the samples traced per second in the latest second, or else since the start of the
+    /// render. Returns `None` before the first measurement.
+    fn speed(&self) -> Option<f64> {
         let seconds = self.seconds();
-        (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds)
+        let mean = || (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds);
+        self.throughput.samples_per_second().or_else(mean)
     }
 
     /// Traces the first-hit buffer (first hits of camera rays) of the size that the client has
@@ -348,11 +349,7 @@ impl ActiveRender {
             bad_samples: self.state.film.bad_samples().count,
             saturated_samples: self.state.film.saturated_samples(),
             saturated_pixels: self.state.film.saturated_pixels(),
-            recent_samples_per_second: self
-                .throughput
-                .samples_per_second()
-                .or_else(|| self.mean_speed())
-                .unwrap_or(0.0),
+            recent_samples_per_second: self.speed().unwrap_or(0.0),
             threads: context.pool.current_num_threads(),
             lanes: self.state.world.lanes(),
             inventory: Arc::clone(&self.inventory),

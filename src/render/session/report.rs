@@ -110,18 +110,13 @@ impl Report {
     /// Returns the warnings to the user, such as `3 saturated samples`. Bad samples, saturated
     /// samples and saturated pixels each give one warning if their number is not 0.
     pub fn warnings(&self) -> Vec<String> {
-        let plural = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
-        let mut out = Vec::new();
-        if self.bad_samples > 0 {
-            out.push(format!("{} left out", plural(self.bad_samples, "bad sample")));
-        }
-        if self.saturated_samples > 0 {
-            out.push(plural(self.saturated_samples, "saturated sample"));
-        }
-        if self.saturated_pixels > 0 {
-            out.push(plural(self.saturated_pixels, "saturated pixel"));
-        }
-        out
+        let counts = [
+            (self.bad_samples, "bad sample", " left out"),
+            (self.saturated_samples, "saturated sample", ""),
+            (self.saturated_pixels, "saturated pixel", ""),
+        ];
+        let warning = |(n, one, end)| format!("{n} {one}{}{end}", if n == 1 { "" } else { "s" });
+        counts.into_iter().filter(|(n, ..)| *n > 0).map(warning).collect()
     }
 
     /// Returns the number of samples of all pixels together per second of tracing: the mean since

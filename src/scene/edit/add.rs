@@ -12,7 +12,8 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scale, Scene, TransformOp};
 use crate::shape::{KINDS, Shape, compose};
 use crate::value::{
-    Color, number, round_nice, round_significant, rounded_to, sort_by_number, total_order, unit,
+    Color, names, number, round_nice, round_significant, rounded_to, sort_by_number, total_order,
+    unit,
 };
 use glam::DVec3;
 
@@ -58,9 +59,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     let room = DVec3::splat(size);
     let base = place_for(scene, room);
     let Some(mut shape) = Shape::fitted_to(kind, base, room) else {
-        let names: Vec<_> = KINDS.iter().map(|k| k.name).collect();
         let found = format!("there is no kind of object called \"{kind}\"");
-        return Err(EditError::new(&found, &format!("Expected one of {}.", names.join(", "))));
+        return Err(EditError::new(&found, &format!("Expected one of {}.", names(KINDS))));
     };
     face_camera(&mut shape, scene);
     if let Form::Plane(_) = shape.form() {

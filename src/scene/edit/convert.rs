@@ -14,7 +14,8 @@ use crate::scene::edit::toml_view::{insert_value, read};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
 use crate::value::{
-    Field, NumberRange, ValueType, number, round_nice, round_significant, rounded_to, unit,
+    Field, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
+    unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -320,17 +321,12 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
             let distance = crate::scene::edit::pivot_distance(&seen);
             if let Some(view) = camera.view() {
                 let target = eye + view * distance;
-                camera.target = Some(target.map(|x| rounded(x, distance)).to_array());
+                camera.target = Some(target.map(|x| round_fine(x, distance)).to_array());
                 camera.direction = None;
             }
         }
         _ => {}
     }
-}
-
-/// Rounds `x` to about a millionth of `scale`, so that a direction computed from it stays accurate.
-fn rounded(x: f64, scale: f64) -> f64 {
-    rounded_to(x, crate::value::floor_log10(scale) - 6)
 }
 
 /// Appends a transform step of the kind `name` to the list `key`, with the value that changes

@@ -201,15 +201,11 @@ impl StepRule {
             ValueType::Number(range) | ValueType::Numbers(_, range) => {
                 if field.unit == "degrees" {
                     Self::Degrees { range }
-                } else if range == NumberRange::SIZE {
+                } else if range == NumberRange::SIZE || field.name == "scale" {
+                    // A size, or the scale of a texture.
                     Self::Rungs { floor: 0.0, range }
                 } else if range == NumberRange::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
-                } else if field.name == "scale" {
-                    // Scale of a texture.
-                    Self::Rungs { floor: 0.0, range }
-                } else if field.name == "offset" {
-                    Self::Units { unit: 0.05, range }
                 } else if field.name == "height" {
                     // Height of a bump map. The step is small, because useful heights are at most a
                     // hundredth of the size of the surface.
@@ -218,7 +214,9 @@ impl StepRule {
                     // The step up from 0 leads to 0.001, the smallest value whose blur is visible
                     // at the far end of a room.
                     Self::Rungs { floor: 0.001, range }
-                } else if range == NumberRange::SHARE || range == NumberRange::COEFFICIENT {
+                } else if field.name == "offset"
+                    || [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range)
+                {
                     Self::Units { unit: 0.05, range }
                 } else if field.unit == "scene units" {
                     Self::Rungs { floor: step_length(scene) / 10.0, range }

@@ -4,7 +4,7 @@
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
-use crate::scene::edit::{Edit, EditError, Target, step, toggle};
+use crate::scene::edit::{Edit, EditError, Target, step};
 
 /// Returns the name of the material that the mirror commands change: the first of the following
 /// that reflects.
@@ -52,46 +52,22 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
 
-fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditError> {
-    mirror(scene, selected).map(Target::Material).ok_or_else(|| {
-        let help = "Give an object's material a reflection first.";
-        EditError::new("nothing in this scene reflects", help)
-    })
-}
-
-/// Changes the roughness of the material that [`mirror`] finds for `selected`, by `steps` presses
-/// of an arrow key, as [`step`] does.
+/// Changes the value of `key` of the material that [`mirror`] finds for `selected`, such as its
+/// `roughness`, `reflection` or `lobe`, by `steps` presses of an arrow key, as [`step`] does.
 ///
 /// # Errors
 /// Fails if [`mirror`] finds no material.
-pub fn adjust_roughness(
+pub fn step_mirror(
     scene: &Scene,
     selected: Option<&Target>,
+    key: &str,
     steps: f64,
 ) -> Result<Edit, EditError> {
-    step(scene, &find_mirror(scene, selected)?, "roughness", None, steps)
-}
-
-/// Changes the reflection coefficient of the material that [`mirror`] finds for `selected`, by
-/// `steps` arrow steps, as [`step`] does.
-///
-/// # Errors
-/// Fails if [`mirror`] finds no material.
-pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
-    step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
-}
-
-/// Changes the lobe of the material that [`mirror`] finds for `selected` to the next one, or to the
-/// previous one if `forward` is `false`, cyclically.
-///
-/// # Errors
-/// Fails if [`mirror`] finds no material.
-pub fn next_lobe(
-    scene: &Scene,
-    selected: Option<&Target>,
-    forward: bool,
-) -> Result<Edit, EditError> {
-    toggle(scene, &find_mirror(scene, selected)?, "lobe", forward)
+    let material = mirror(scene, selected).map(Target::Material).ok_or_else(|| {
+        let help = "Give an object's material a reflection first.";
+        EditError::new("nothing in this scene reflects", help)
+    })?;
+    step(scene, &material, key, None, steps)
 }
 
 #[cfg(test)]
@@ -121,7 +97,7 @@ mod tests {
         assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
-        assert!(adjust_roughness(&scene, None, 1.0).unwrap_err().found.contains("nothing"));
+        assert!(step_mirror(&scene, None, "roughness", 1.0).unwrap_err().found.contains("nothing"));
     }
 
     #[test]
@@ -151,18 +127,22 @@ mod tests {
         let start = scene.clone();
         let mut seen = vec![0.0];
         for _ in 0..60 {
-            scene = adjust_roughness(&scene, None, 1.0).unwrap().scene;
+            scene = step_mirror(&scene, None, "roughness", 1.0).unwrap().scene;
             seen.push(scene.materials["mirror"].roughness);
         }
         assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
         assert!(seen.contains(&0.3) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
         for expected in seen.iter().rev().skip(1) {
-            scene = adjust_roughness(&scene, None, -1.0).unwrap().scene;
+            scene = step_mirror(&scene, None, "roughness", -1.0).unwrap().scene;
             assert_eq!(scene.materials["mirror"].roughness, *expected);
         }
         assert_eq!(scene, start);
-        assert_eq!(adjust_roughness(&scene, None, -1.0).unwrap().scene, start, "0 is the end");
-        let fine = adjust_roughness(&scene, None, 0.1).unwrap().scene;
+        assert_eq!(
+            step_mirror(&scene, None, "roughness", -1.0).unwrap().scene,
+            start,
+            "0 is the end"
+        );
+        let fine = step_mirror(&scene, None, "roughness", 0.1).unwrap().scene;
         assert_eq!(fine.materials["mirror"].roughness, 0.001);
     }
 
@@ -171,18 +151,18 @@ mod tests {
         let mut scene = built_in();
         let mut lobes = Vec::new();
         for _ in 0..5 {
-            scene = next_lobe(&scene, None, true).unwrap().scene;
+            scene = step_mirror(&scene, None, "lobe", 1.0).unwrap().scene;
             lobes.push(scene.materials["mirror"].lobe);
         }
         assert_eq!(lobes, [Lobe::Square, Lobe::Beckmann, Lobe::Ggx, Lobe::Mirror, Lobe::Cone]);
         assert_eq!(
-            next_lobe(&scene, None, false).unwrap().scene.materials["mirror"].lobe,
+            step_mirror(&scene, None, "lobe", -1.0).unwrap().scene.materials["mirror"].lobe,
             Lobe::Mirror
         );
-        let edit = reflect(&scene, None, 1.0).unwrap();
+        let edit = step_mirror(&scene, None, "reflection", 1.0).unwrap();
         assert_eq!(edit.scene.materials["mirror"].reflection, 0.97);
         assert_eq!(edit.label, "reflection of mirror");
-        let edit = reflect(&scene, None, -0.1).unwrap();
+        let edit = step_mirror(&scene, None, "reflection", -0.1).unwrap();
         assert_eq!(edit.scene.materials["mirror"].reflection, 0.915);
     }
 }

@@ -29,7 +29,7 @@ pub use bounds::{BoundingSphere, bounds, pivot_distance, scene_bounds, step_leng
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
 pub use lens::{change_aperture, focus_on};
-pub use mirror_material::{adjust_roughness, mirror, next_lobe, reflect};
+pub use mirror_material::{mirror, step_mirror};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
 pub use rotate::turn;

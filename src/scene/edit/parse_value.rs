@@ -2,8 +2,8 @@
 
 use crate::scene::edit::EditError;
 use crate::scene::format::emit::color;
-use crate::scene::format::suggest::nearest;
-use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
+use crate::scene::format::suggest::did_you_mean;
+use crate::value::{Color, Field, NumberRange, ValueType, number, sanitized, truncated};
 use toml::Value;
 
 /// Parses `text` as a value of `field`. A whole number must be in its range. The ranges of other
@@ -23,7 +23,7 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
         None => Err(wrong()),
     };
     let floats = |list: Vec<f64>| Value::Array(list.into_iter().map(Value::Float).collect());
-    let whole = |x: f64, range: crate::value::NumberRange| {
+    let whole = |x: f64, range: NumberRange| {
         let fits = x.fract() == 0.0 && range.holds(x);
         if fits { Ok(Value::Integer(x as i64)) } else { Err(wrong()) }
     };
@@ -35,8 +35,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
             Ok(Value::Boolean(index < 4))
         }
         ValueType::Choice(choices) => {
-            let words: Vec<_> = choices.iter().map(|c| c.name).collect();
-            word(field, unquoted(text), &words).map(|index| Value::String(words[index].to_string()))
+            let word = word(field, unquoted(text), choices.iter().map(|c| c.name));
+            word.map(Value::from)
         }
         ValueType::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
         ValueType::Wholes(n, range) => {
@@ -80,16 +80,19 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     }
 }
 
-/// Returns the result of [`choose`], or an error that lists the accepted words.
-pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
-    choose(text, words).ok_or_else(|| {
-        let quote = |word: &str| format!("\"{}\"", truncated(word));
-        let quoted: Vec<_> = words.iter().take(20).map(|w| quote(w)).collect();
+/// Returns the word that [`choose`] finds, or an error that lists the accepted words.
+pub(super) fn word<'a>(
+    field: &Field,
+    text: &str,
+    words: impl IntoIterator<Item = &'a str>,
+) -> Result<&'a str, EditError> {
+    let words: Vec<_> = words.into_iter().collect();
+    choose(text, &words).map(|index| words[index]).ok_or_else(|| {
+        let quote = |word: &&str| format!("\"{}\"", truncated(word));
+        let quoted: Vec<_> = words.iter().take(20).map(quote).collect();
         let more = if quoted.len() < words.len() { ", …" } else { "" };
-        let mut help = format!("Expected one of {}{more}.", quoted.join(", "));
-        if let Some(meant) = nearest(text, words.iter().copied()) {
-            help += &format!(" Did you mean {}?", quote(meant));
-        }
+        let meant = did_you_mean(text, words.iter().copied());
+        let help = format!("Expected one of {}{more}.{meant}", quoted.join(", "));
         EditError::new(&format!("{} cannot be \"{}\"", field.name, truncated(text)), &help)
     })
 }

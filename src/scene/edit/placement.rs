@@ -20,18 +20,14 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
     };
-    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
-    let form = object.form();
+    if !subject.exists(scene) {
+        return Err(EditError::gone(subject));
+    }
+    let mut others: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let form = others.remove(*index);
     let Some((low, high)) = form.bounds() else {
         return Err(EditError::new("a plane without end has no lowest point", ""));
     };
-    let others: Vec<_> = scene
-        .objects
-        .iter()
-        .enumerate()
-        .filter(|(i, _)| i != index)
-        .map(|(_, object)| object.form())
-        .collect();
     let level = (low.y + high.y) / 2.0;
     let support_points = support_points(&form, (low, high));
     let heights = |down: bool| {

@@ -7,7 +7,7 @@ use crate::scene::edit::parse_value::{floats, show};
 use crate::scene::edit::toml_view::{exclusive_keys, fields, get, read};
 use crate::scene::edit::{EditError, Target};
 use crate::scene::format::emit::{color, preset};
-use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
+use crate::value::{DefaultValue, Field, NumberRange, ValueType, names, number};
 use toml::{Table, Value};
 
 /// Word that a property accepts as its value.
@@ -21,7 +21,7 @@ pub struct Word {
 }
 
 /// Kind of a property's value, by which an inspector chooses the input element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Widget {
     /// Widget for free text, such as a name.
     Text,
@@ -36,13 +36,14 @@ pub enum Widget {
     /// that kind.
     List,
     /// Widget for a number, or for a list of numbers such as a position.
+    #[default]
     Numbers,
     /// Widget for a colour: three numbers, the linear red, green and blue.
     Color,
 }
 
 /// Property of an edit target: one row of an inspector.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Property {
     /// Dotted key, as [`set`](crate::scene::edit::set) requires it: `shape.sphere.radius`,
     /// `transform.0.rotate_y`.
@@ -223,20 +224,15 @@ impl PropertyWalker<'_> {
             key,
             label: field.name.replace('_', " "),
             depth,
-            entry: Widget::Numbers,
-            value: String::new(),
-            components: Vec::new(),
-            color: None,
             unit: field.unit,
             expected: expected(field.takes),
-            words: Vec::new(),
             doc: field.doc,
-            is_default: false,
             default: match field.preset {
                 DefaultValue::Required => None,
                 DefaultValue::Is(text) => Some(text.trim_matches('"').to_string()),
                 DefaultValue::Without(instead) => Some(instead.to_string()),
             },
+            ..Property::default()
         }
     }
 }
@@ -264,10 +260,7 @@ fn expected(takes: ValueType) -> String {
         ValueType::Color(NumberRange { high, .. }) => {
             format!("red, green, blue (linear, 0 to {}) or #rrggbb", number(high))
         }
-        ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => {
-            let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            format!("one of {}", names.join(", "))
-        }
+        ValueType::OneOf(kinds) | ValueType::ListOf(kinds) => format!("one of {}", names(kinds)),
         ValueType::Choice(choices) => {
             let names: Vec<_> = choices.iter().map(|c| c.name).collect();
             format!("one of {}", names.join(", "))

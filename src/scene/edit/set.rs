@@ -27,8 +27,7 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
     let optional = matches!(field.preset, DefaultValue::Without(_));
     match field.takes {
         ValueType::OneOf(kinds) if !(text.is_empty() && optional) => {
-            let names: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            let name = names[word(field, text, &names)?];
+            let name = word(field, text, kinds.iter().map(|k| k.name))?;
             return convert::switch(scene, subject, key, name);
         }
         ValueType::ListOf(steps) => {
@@ -36,8 +35,7 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
             match text {
                 "" => drop(object.remove(key)),
                 _ => {
-                    let names: Vec<_> = steps.iter().map(|k| k.name).collect();
-                    let name = names[word(field, text, &names)?];
+                    let name = word(field, text, steps.iter().map(|k| k.name))?;
                     convert::append_step(&mut object, key, name);
                 }
             }
@@ -49,8 +47,8 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
         return clear(scene, subject, key, field, values);
     }
     let value = if is_material(subject, field) {
-        let names: Vec<_> = scene.materials.keys().map(String::as_str).collect();
-        Value::String(names[word(field, text.trim_matches('"'), &names)?].to_string())
+        let names = scene.materials.keys().map(String::as_str);
+        Value::from(word(field, text.trim_matches('"'), names)?)
     } else {
         parse(field, text)?
     };

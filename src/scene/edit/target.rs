@@ -145,11 +145,8 @@ impl Target {
                 let kind = object.map_or("object", |o| o.shape.key());
                 named(object.map(|o| &o.name)).unwrap_or_else(|| format!("{kind} {}", i + 1))
             }
-            Self::Camera => "camera".into(),
-            Self::Ambient => "ambient".into(),
-            Self::Background => "background".into(),
-            Self::Film => "film".into(),
-            Self::IntegratorSettings => "trace".into(),
+            // The other targets are tables, named by their key.
+            other => other.path().concat(),
         }
     }
 

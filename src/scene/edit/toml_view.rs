@@ -120,38 +120,27 @@ pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let mut keys = key.split('.');
     let first = table.get(keys.next()?)?;
     keys.try_fold(first, |value, key| match value {
-        Value::Table(table) => table.get(key),
         Value::Array(list) => list.get(key.parse::<usize>().ok()?),
-        _ => None,
+        other => other.get(key),
     })
 }
 
 /// Sets the dotted `key` of `table` to `value`, or removes `key` if `value` is `None`. Returns
 /// `false` if `table` has no inner table for the parts of `key` before its last dot.
 pub(super) fn insert_value(table: &mut Table, key: &str, value: Option<Value>) -> bool {
-    let (outer, last) = match key.rsplit_once('.') {
-        Some((outer, last)) => (Some(outer), last),
-        None => (None, key),
-    };
-    let place = match outer {
-        None => Some(table),
-        Some(outer) => {
-            let mut keys = outer.split('.');
-            let first = keys.next().and_then(|key| table.get_mut(key));
-            let place = first.and_then(|first| {
-                keys.try_fold(first, |value, key| match value {
-                    Value::Table(table) => table.get_mut(key),
-                    Value::Array(list) => list.get_mut(key.parse::<usize>().ok()?),
-                    _ => None,
-                })
-            });
-            place.and_then(Value::as_table_mut)
+    let Some((first, rest)) = key.split_once('.') else {
+        match value {
+            Some(value) => drop(table.insert(key.to_string(), value)),
+            None => drop(table.remove(key)),
         }
+        return true;
     };
-    let Some(place) = place else { return false };
-    match value {
-        Some(value) => drop(place.insert(last.to_string(), value)),
-        None => drop(place.remove(last)),
+    match (table.get_mut(first), rest.split_once('.')) {
+        (Some(Value::Table(inner)), _) => insert_value(inner, rest, value),
+        (Some(Value::Array(list)), Some((index, rest))) => {
+            let entry = index.parse().ok().and_then(|i: usize| list.get_mut(i)?.as_table_mut());
+            entry.is_some_and(|inner| insert_value(inner, rest, value))
+        }
+        _ => false,
     }
-    true
 }

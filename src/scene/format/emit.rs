@@ -3,47 +3,35 @@
 
 use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
-use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
+use toml_edit::{Array, InlineTable, Item, Table};
 
 /// Returns the TOML item for a new `value` in a scene file. `takes` is the type of `value`. If
 /// `headers` is `true`, tables may have `[headers]`; otherwise they are inline.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
+    let item = |table: Table| match headers {
+        true => Item::Table(table),
+        false => Item::Value(table.into_inline_table().into()),
+    };
     match (takes, value) {
-        (ValueType::Table(fields), Value::Table(table)) if headers => {
-            Item::Table(fresh_table(fields, table))
+        (ValueType::Table(fields), Value::Table(table)) => item(fresh_table(fields, table)),
+        (ValueType::OneOf(fields), Value::Table(table)) => {
+            let mut dotted = fresh_table(fields, table);
+            dotted.set_dotted(true);
+            item(dotted)
         }
-        (ValueType::Named(fields), Value::Table(named)) if headers => {
+        (ValueType::Named(fields), Value::Table(named)) => {
             let mut outer = Table::new();
             outer.set_implicit(true);
             for (name, value) in named {
-                outer.insert(name, fresh(ValueType::Table(fields), value, true));
+                outer.insert(name, fresh(ValueType::Table(fields), value, headers));
             }
-            Item::Table(outer)
+            item(outer)
         }
-        (ValueType::Tables(_), Value::Array(list)) if headers => {
-            let tables: ArrayOfTables = list.iter().map(|v| fresh_entry(takes, v)).collect();
-            Item::ArrayOfTables(tables)
+        (ValueType::Tables(fields), Value::Array(list)) if headers => {
+            Item::ArrayOfTables(list.iter().map(|v| fresh_entry(fields, v)).collect())
         }
-        (ValueType::OneOf(fields), Value::Table(table)) if headers => {
-            let mut dotted = fresh_table(fields, table);
-            dotted.set_dotted(true);
-            Item::Table(dotted)
-        }
-        (ValueType::Table(fields) | ValueType::OneOf(fields), Value::Table(table)) => {
-            let table = fresh_table(fields, table).into_inline_table();
-            Item::Value(toml_edit::Value::InlineTable(table))
-        }
-        (ValueType::Named(fields), Value::Table(named)) => {
-            let mut outer = InlineTable::new();
-            for (name, value) in named {
-                if let Ok(entry) = fresh(ValueType::Table(fields), value, false).into_value() {
-                    outer.insert(name, entry);
-                }
-            }
-            Item::Value(toml_edit::Value::InlineTable(outer))
-        }
-        (ValueType::Tables(_) | ValueType::ListOf(_), Value::Array(list)) => {
-            let entries = list.iter().map(|v| fresh_entry(takes, v).into_inline_table());
+        (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Array(list)) => {
+            let entries = list.iter().map(|v| fresh_entry(fields, v).into_inline_table());
             Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
         }
         (ValueType::Color(_), value) => Item::Value(color_leaf(value)),
@@ -64,15 +52,10 @@ pub(crate) fn color(value: &Value) -> Option<Color> {
     channels.try_into().ok().map(Color)
 }
 
-/// Returns the table for `value`, an entry of a list in a scene file. `list` is the type of that
-/// list. The table can be converted to an inline table.
-pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
-    match (list, value) {
-        (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Table(table)) => {
-            fresh_table(fields, table)
-        }
-        _ => Table::new(),
-    }
+/// Returns the table for `value`, an entry of a list in a scene file with the keys `fields`. The
+/// table can be converted to an inline table.
+pub(crate) fn fresh_entry(fields: &'static [Field], value: &Value) -> Table {
+    value.as_table().map_or_else(Table::new, |table| fresh_table(fields, table))
 }
 
 /// Returns a table with the keys of `values` that differ from their defaults. Inner tables are

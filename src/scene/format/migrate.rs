@@ -6,7 +6,6 @@ use crate::primitive::Acceleration;
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::{line_column, subject_in};
-use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml_edit::{DocumentMut, Item, Key};
@@ -54,29 +53,22 @@ fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
 #[derive(Clone, Debug)]
 pub(crate) struct FormerWord {
     /// Byte offset of the former name in the file.
-    start: usize,
+    pub start: usize,
     /// Path of keys to the table that contains the former name. All keys of the path are current
     /// names.
-    table: Vec<String>,
+    pub table: Vec<String>,
     /// Key that has the former name as its value; `None` if the former name is itself a key.
     key: Option<&'static str>,
     former: &'static str,
     present: &'static str,
 }
 
-/// Table of a scene file with a key under both its former and its current name.
-struct Conflict {
-    table: Vec<String>,
-    former: (&'static str, Range<usize>),
-    present: (&'static str, Range<usize>),
-}
-
 /// Replaces the former words in `root` by the current ones and returns them. A former word is a key
 /// or value that was renamed since an earlier version of the scene format. The current word gets
-/// the byte range of the former one. `root` is the parsed `part` of the file with the name `file`
-/// and the text `text`. Adds an error to `errors` for each table that has a key under both names.
+/// the byte range of the former one. `root` is the parsed `part` of the file with the text `text`.
+/// Adds an error to `errors` for each table that has a key under both names.
 pub(crate) fn migrate(
-    (file, text): (&str, &str),
+    text: &str,
     root: &mut DeTable,
     part: &Part,
     errors: &mut FirstDiagnostics,
@@ -84,18 +76,14 @@ pub(crate) fn migrate(
     let mut migration =
         Migration { part, path: Vec::new(), words: Vec::new(), conflicts: Vec::new() };
     migration.table(root);
-    for conflict in &migration.conflicts {
-        let (former, at) = &conflict.former;
-        let (present, other) = &conflict.present;
-        let other = part.in_file(other.start);
-        errors.add(part.in_file(at.start), || {
-            let (line, column) = line_column(text, other);
+    for (FormerWord { start, table, former, present, .. }, other) in &migration.conflicts {
+        errors.add(*start, || {
+            let (line, column) = line_column(text, *other);
             Diagnostic {
-                file: file.to_string(),
-                line_column: None,
-                subject: subject_in(root, &conflict.table, part.first_object),
+                subject: subject_in(root, table, part.first_object),
                 found: format!("`{former}` is the former name of `{present}`, which is given, too"),
                 help: format!("Expected only `{present}`, at {line}:{column}."),
+                ..Diagnostic::default()
             }
         });
     }
@@ -106,7 +94,9 @@ struct Migration<'a> {
     part: &'a Part,
     path: Vec<String>,
     words: Vec<FormerWord>,
-    conflicts: Vec<Conflict>,
+    /// Keys that a table has under both names, each with the byte offset of the current name in the
+    /// file.
+    conflicts: Vec<(FormerWord, usize)>,
 }
 
 impl Migration<'_> {
@@ -143,23 +133,14 @@ impl Migration<'_> {
 
     fn key(&mut self, table: &mut DeTable, former: &'static str, present: &'static str) {
         let Some((key, value)) = table.remove_entry(former) else { return };
-        let span = key.span();
+        let start = self.part.in_file(key.span().start);
+        let word = FormerWord { start, table: self.path.clone(), key: None, former, present };
         if let Some((other, _)) = table.get_key_value(present) {
-            self.conflicts.push(Conflict {
-                table: self.path.clone(),
-                former: (former, span),
-                present: (present, other.span()),
-            });
-            return;
+            self.conflicts.push((word, self.part.in_file(other.span().start)));
+        } else {
+            self.words.push(word);
+            table.insert(Spanned::new(key.span(), present.into()), value);
         }
-        self.words.push(FormerWord {
-            start: self.part.in_file(span.start),
-            table: self.path.clone(),
-            key: None,
-            former,
-            present,
-        });
-        table.insert(Spanned::new(span, present.into()), value);
     }
 
     fn value(&mut self, table: &mut DeTable, key: &'static str, pairs: &[Pair]) {
@@ -175,25 +156,12 @@ impl Migration<'_> {
     }
 }
 
-/// Returns the former word (obsolete name of a key or value) among `words` that comes first in the
-/// file, as `(byte offset in the file, word, name of its table in diagnostics)`. The name of a
-/// table is, for example, `object "queen"`. `root` is the parsed `part` that contains the words.
-/// Returns `None` if `words` is empty.
-pub(crate) fn first_word(
-    root: &DeTable,
-    part: &Part,
-    words: &[FormerWord],
-) -> Option<(usize, FormerWord, String)> {
-    let first = words.iter().min_by_key(|word| word.start)?;
-    Some((first.start, first.clone(), subject_in(root, &first.table, part.first_object)))
-}
-
 /// Returns the warning that a file has `count` former words (obsolete names of keys or values). It
-/// quotes the first of them, which is given as `(byte offset in the file, word, name of its table
-/// in diagnostics)`. `file` and `text` are name and text of the file.
+/// quotes the first of them, which is given with the name of its table in diagnostics. `file` and
+/// `text` are name and text of the file.
 pub(crate) fn warning(
     (file, text): (&str, &str),
-    (start, first, subject): &(usize, FormerWord, String),
+    (first, subject): &(FormerWord, String),
     count: usize,
 ) -> Diagnostic {
     let FormerWord { former, present, .. } = first;
@@ -207,7 +175,7 @@ pub(crate) fn warning(
     };
     Diagnostic {
         file: file.to_string(),
-        line_column: Some(line_column(text, *start)),
+        line_column: Some(line_column(text, first.start)),
         subject: subject.clone(),
         found: name + &count,
         help: help.to_string(),

@@ -16,9 +16,10 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
 /// Changes `document`, which describes the scene `old`, to describe the scene `new`.
 pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml::Table) {
-    let mut rewriter = Rewriter { keeper: CommentKeeper::default() };
-    rewriter.table(document.as_table_mut(), true, old, new, &Keys::Fixed(schema::FIELDS));
-    rewriter.keeper.put_back(document);
+    let mut keeper = CommentKeeper::default();
+    let scene = ValueType::Table(schema::FIELDS);
+    patch_table(&mut keeper, document.as_table_mut(), true, old, new, scene);
+    keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
         // A file without any key is not a valid scene. At least the size of the picture is
         // therefore written.
@@ -41,188 +42,159 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Keys that a table in a scene file may have, with the types of their values: fixed keys, or names
-/// that the user chooses.
-enum Keys {
-    /// Keys of a table that permits only these fields, each with a type of its own.
-    Fixed(&'static [Field]),
-    /// Keys that are names chosen by the user. The value of each is a table with these fields.
-    Named(&'static [Field]),
-}
-
-impl Keys {
-    /// Returns the keys whose values are compared between the tables `old` and `new`, each with the
-    /// type of its value: all fixed keys, or the names that occur in either table. Keys that only
-    /// `new` has are added to the file in this order.
-    fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
-        match self {
-            Self::Fixed(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
-            Self::Named(fields) => {
-                let removed = old.keys().filter(|k| !new.contains_key(*k));
-                removed.chain(new.keys()).map(|k| (k.clone(), ValueType::Table(fields))).collect()
-            }
+/// Returns the keys whose values are compared between the tables `old` and `new` of the type
+/// `takes`, each with the type of its value: all keys of the type, or the names that occur in
+/// either table. Keys that only `new` has are added to the file in this order.
+fn keys(takes: ValueType, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
+    match takes {
+        ValueType::Table(fields) | ValueType::OneOf(fields) => {
+            fields.iter().map(|f| (f.name.to_string(), f.takes)).collect()
         }
+        ValueType::Named(fields) => {
+            let removed = old.keys().filter(|k| !new.contains_key(*k));
+            removed.chain(new.keys()).map(|k| (k.clone(), ValueType::Table(fields))).collect()
+        }
+        _ => Vec::new(),
     }
 }
 
-struct Rewriter {
-    keeper: CommentKeeper,
-}
-
-impl Rewriter {
-    /// Changes `table`, which describes `old`, to describe `new`. `keys` are the keys that it may
-    /// have. Inner tables may have `[headers]` if `headers` is `true`.
-    fn table(
-        &mut self,
-        table: &mut dyn TableLike,
-        headers: bool,
-        old: &toml::Table,
-        new: &toml::Table,
-        keys: &Keys,
-    ) {
-        let renamed;
-        let old = match keys {
-            Keys::Named(_) => {
-                renamed = rename(table, old, new);
-                &renamed
-            }
-            Keys::Fixed(_) => old,
-        };
-        let mut removed = Vec::new();
-        let mut added = Vec::new();
-        for (key, takes) in keys.of(old, new) {
-            match (old.get(&key), new.get(&key)) {
-                (Some(_), None) if table.contains_key(&key) => removed.push(key),
-                (old, Some(new)) if old != Some(new) => match table.get_mut(&key) {
-                    Some(item) => self.item(item, headers, old, new, takes),
-                    None => added.push((key, takes, new)),
-                },
-                _ => {}
-            }
-        }
-        // If exactly one key was removed, the first new key takes over its comments. Examples are
-        // the key of a shape that was converted to another kind, and `direction` in place of
-        // `target`.
-        let successor =
-            if removed.len() == 1 { added.first().map(|(key, ..)| key.clone()) } else { None };
-        for key in removed {
-            let decor = table.key(&key).map(|k| k.leaf_decor().clone());
-            let Some(item) = table.remove(&key) else { continue };
-            self.keeper.removed(&item);
-            if let (Some(successor), Some(decor), Item::Value(value)) = (&successor, decor, &item) {
-                let Some((_, takes, new)) = added.iter().find(|(key, ..)| key == successor) else {
-                    continue;
-                };
-                let mut item = fresh(*takes, new, false);
-                if let Some(new_value) = item.as_value_mut() {
-                    *new_value.decor_mut() = value.decor().clone();
-                }
-                table.insert(successor, item);
-                if let Some(mut key) = table.key_mut(successor) {
-                    *key.leaf_decor_mut() = decor;
-                }
-            }
-        }
-        for (key, takes, value) in added {
-            if !table.contains_key(&key) {
-                table.insert(&key, fresh(takes, value, headers));
-            }
-        }
-    }
-
-    fn item(
-        &mut self,
-        item: &mut Item,
-        headers: bool,
-        old: Option<&Value>,
-        new: &Value,
-        takes: ValueType,
-    ) {
-        let headers = headers && !item.as_table().is_some_and(|t| t.is_dotted());
-        let headers_inside = headers && (item.is_table() || item.is_array_of_tables());
-        match (takes, old, new) {
-            (
-                ValueType::Table(fields) | ValueType::OneOf(fields),
-                Some(Value::Table(a)),
-                Value::Table(b),
-            ) => {
-                if let Some(table) = item.as_table_like_mut() {
-                    self.table(table, headers_inside, a, b, &Keys::Fixed(fields));
-                }
-            }
-            (ValueType::Named(fields), Some(Value::Table(a)), Value::Table(b)) => {
-                if let Some(table) = item.as_table_like_mut() {
-                    self.table(table, headers_inside, a, b, &Keys::Named(fields));
-                }
-            }
-            (
-                ValueType::Tables(fields) | ValueType::ListOf(fields),
-                Some(Value::Array(a)),
-                Value::Array(b),
-            ) => self.list(item, a, b, takes, fields),
-            _ => edit_leaf(item, old, new),
-        }
-    }
-
-    fn list(
-        &mut self,
-        item: &mut Item,
-        old: &[Value],
-        new: &[Value],
-        takes: ValueType,
-        fields: &'static [Field],
-    ) {
-        let from = align(old, new);
-        let edit = |rewriter: &mut Self, table: &mut dyn TableLike, i: usize, j: usize, headers| {
-            if let (Value::Table(a), Value::Table(b)) = (&old[i], &new[j]) {
-                rewriter.table(table, headers, a, b, &Keys::Fixed(fields));
-            }
-        };
-        match item {
-            Item::ArrayOfTables(list) => {
-                let mut tables: Vec<_> = list.iter().cloned().map(Some).collect();
-                list.clear();
-                let mut next = Vec::new();
-                for (j, origin) in from.iter().enumerate() {
-                    match origin.and_then(|i| Some((i, tables.get_mut(i)?.take()?))) {
-                        Some((i, mut table)) => {
-                            edit(self, &mut table, i, j, true);
-                            next.push(table);
-                        }
-                        None => next.push(fresh_entry(takes, &new[j])),
-                    }
-                }
-                let removed: ArrayOfTables = tables.into_iter().flatten().collect();
-                self.keeper.removed(&Item::ArrayOfTables(removed));
-                crate::scene::format::comments::in_order(&mut next, &from);
-                list.extend(next);
-            }
-            Item::Value(toml_edit::Value::Array(list)) => {
-                let mut values: Vec<_> = list.iter().cloned().map(Some).collect();
-                let before = values.iter().flatten().map(spaces_before).next_back();
-                let indent = before.filter(|spaces| !spaces.is_empty()).unwrap_or(" ".into());
-                list.clear();
-                for (j, origin) in from.iter().enumerate() {
-                    match origin.and_then(|i| Some((i, values.get_mut(i)?.take()?))) {
-                        Some((i, mut value)) => {
-                            if let Some(table) = value.as_inline_table_mut() {
-                                edit(self, table, i, j, false);
-                            }
-                            list.push_formatted(value);
-                        }
-                        None => {
-                            let mut value = fresh_entry(takes, &new[j]).into_inline_table();
-                            if j > 0 {
-                                let above = comment_of_the_last(list, j + 1 == new.len());
-                                value.decor_mut().set_prefix(above + &indent);
-                            }
-                            list.push_formatted(toml_edit::Value::InlineTable(value));
-                        }
-                    }
-                }
-            }
+/// Changes `table`, which describes `old`, to describe `new`. `takes` is the type of the table.
+/// Inner tables may have `[headers]` if `headers` is `true`. The comments of removed tables go to
+/// `keeper`.
+fn patch_table(
+    keeper: &mut CommentKeeper,
+    table: &mut dyn TableLike,
+    headers: bool,
+    old: &toml::Table,
+    new: &toml::Table,
+    takes: ValueType,
+) {
+    let old = if let ValueType::Named(_) = takes { &rename(table, old, new) } else { old };
+    let mut removed = Vec::new();
+    let mut added = Vec::new();
+    for (key, takes) in keys(takes, old, new) {
+        match (old.get(&key), new.get(&key)) {
+            (Some(_), None) if table.contains_key(&key) => removed.push(key),
+            (old, Some(new)) if old != Some(new) => match table.get_mut(&key) {
+                Some(item) => patch_item(keeper, item, headers, old, new, takes),
+                None => added.push((key, takes, new)),
+            },
             _ => {}
         }
+    }
+    // If exactly one key was removed, the first new key takes over its comments. Examples are the
+    // key of a shape that was converted to another kind, and `direction` in place of `target`.
+    let successor = added.first().filter(|_| removed.len() == 1);
+    for key in removed {
+        let decor = table.key(&key).map(|k| k.leaf_decor().clone());
+        let Some(item) = table.remove(&key) else { continue };
+        keeper.removed(&item);
+        if let (Some((key, takes, new)), Some(decor), Item::Value(value)) =
+            (successor, decor, &item)
+        {
+            let mut item = fresh(*takes, new, false);
+            if let Some(new_value) = item.as_value_mut() {
+                *new_value.decor_mut() = value.decor().clone();
+            }
+            table.insert(key, item);
+            if let Some(mut key) = table.key_mut(key) {
+                *key.leaf_decor_mut() = decor;
+            }
+        }
+    }
+    for (key, takes, value) in added {
+        if !table.contains_key(&key) {
+            table.insert(&key, fresh(takes, value, headers));
+        }
+    }
+}
+
+fn patch_item(
+    keeper: &mut CommentKeeper,
+    item: &mut Item,
+    headers: bool,
+    old: Option<&Value>,
+    new: &Value,
+    takes: ValueType,
+) {
+    let headers = headers && !item.as_table().is_some_and(|t| t.is_dotted());
+    let headers_inside = headers && (item.is_table() || item.is_array_of_tables());
+    match (takes, old, new) {
+        (
+            ValueType::Table(_) | ValueType::OneOf(_) | ValueType::Named(_),
+            Some(Value::Table(a)),
+            Value::Table(b),
+        ) => {
+            if let Some(table) = item.as_table_like_mut() {
+                patch_table(keeper, table, headers_inside, a, b, takes);
+            }
+        }
+        (
+            ValueType::Tables(fields) | ValueType::ListOf(fields),
+            Some(Value::Array(a)),
+            Value::Array(b),
+        ) => patch_list(keeper, item, a, b, fields),
+        _ => edit_leaf(item, old, new),
+    }
+}
+
+fn patch_list(
+    keeper: &mut CommentKeeper,
+    item: &mut Item,
+    old: &[Value],
+    new: &[Value],
+    fields: &'static [Field],
+) {
+    let from = align(old, new);
+    let mut edit = |table: &mut dyn TableLike, i: usize, j: usize, headers| {
+        if let (Value::Table(a), Value::Table(b)) = (&old[i], &new[j]) {
+            patch_table(keeper, table, headers, a, b, ValueType::Table(fields));
+        }
+    };
+    match item {
+        Item::ArrayOfTables(list) => {
+            let mut tables: Vec<_> = list.iter().cloned().map(Some).collect();
+            list.clear();
+            let mut next = Vec::new();
+            for (j, origin) in from.iter().enumerate() {
+                match origin.and_then(|i| Some((i, tables.get_mut(i)?.take()?))) {
+                    Some((i, mut table)) => {
+                        edit(&mut table, i, j, true);
+                        next.push(table);
+                    }
+                    None => next.push(fresh_entry(fields, &new[j])),
+                }
+            }
+            let removed: ArrayOfTables = tables.into_iter().flatten().collect();
+            keeper.removed(&Item::ArrayOfTables(removed));
+            crate::scene::format::comments::in_order(&mut next, &from);
+            list.extend(next);
+        }
+        Item::Value(toml_edit::Value::Array(list)) => {
+            let mut values: Vec<_> = list.iter().cloned().map(Some).collect();
+            let before = values.iter().flatten().map(spaces_before).next_back();
+            let indent = before.filter(|spaces| !spaces.is_empty()).unwrap_or(" ".into());
+            list.clear();
+            for (j, origin) in from.iter().enumerate() {
+                match origin.and_then(|i| Some((i, values.get_mut(i)?.take()?))) {
+                    Some((i, mut value)) => {
+                        if let Some(table) = value.as_inline_table_mut() {
+                            edit(table, i, j, false);
+                        }
+                        list.push_formatted(value);
+                    }
+                    None => {
+                        let mut value = fresh_entry(fields, &new[j]).into_inline_table();
+                        if j > 0 {
+                            let above = comment_of_the_last(list, j + 1 == new.len());
+                            value.decor_mut().set_prefix(above + &indent);
+                        }
+                        list.push_formatted(toml_edit::Value::InlineTable(value));
+                    }
+                }
+            }
+        }
+        _ => {}
     }
 }
 

@@ -5,8 +5,8 @@ use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics, SceneErrors};
 use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
-use crate::scene::format::source_map::{line_column, locate};
-use crate::scene::{AssetResolver, Object, Scene};
+use crate::scene::format::source_map::{line_column, locate, subject_in};
+use crate::scene::{AssetResolver, Document, Object, Scene};
 use crate::value::{TomlError, TomlValue, sort_by_number};
 use std::fs::File;
 use std::io::{self, Read};
@@ -32,9 +32,7 @@ impl Scene {
     /// unknown keys, wrong types, values out of range, undefined names. Values are validated only
     /// if there are no errors in keys and types.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
-        let resolver = AssetResolver::new(path, Arc::default());
-        read_text(path, |path| File::open(path))
-            .and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
+        Document::read(path, Arc::default()).map(Document::into_scene)
     }
 
     /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
@@ -61,9 +59,9 @@ impl Scene {
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
-    /// First of the `former_words` in the file, as `(byte offset in the file, word, name of its
-    /// table in diagnostics)`. `None` if there are no former words.
-    first_word: Option<(usize, FormerWord, String)>,
+    /// First of the `former_words` in the file, with the name of its table in diagnostics. `None`
+    /// if there are no former words.
+    first_word: Option<(FormerWord, String)>,
     name: &'a str,
     text: &'a str,
     parts: Vec<Part>,
@@ -97,13 +95,10 @@ impl<'a> SourceScene<'a> {
             text,
             parts,
         };
-        match source.read_parts()? {
-            Reading::Done => {}
-            // The file also lists objects outside of `[[object]]` sections. They belong to the same
-            // list; the file is therefore parsed again as a whole.
-            Reading::NotInParts => {
-                return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
-            }
+        if !source.read_parts()? {
+            // The objects outside of `[[object]]` sections belong to the same list; the file is
+            // therefore parsed again as a whole.
+            return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
         source.scene.resolve();
@@ -112,14 +107,15 @@ impl<'a> SourceScene<'a> {
             return Ok(source);
         }
         let mut errors = FirstDiagnostics::default();
-        locate((name, text), &source.parts, problems, &mut errors);
+        locate(text, &source.parts, problems, &mut errors);
         errors.count_more(more);
-        Err(SceneErrors::new(errors.located(text)))
+        Err(SceneErrors::new(errors.located((name, text))))
     }
 
     /// Reads the scene from the parts of the text and checks keys and types. Values are validated
-    /// later.
-    fn read_parts(&mut self) -> Result<Reading, SceneErrors> {
+    /// later. Returns `false` if the file has objects outside of `[[object]]` sections and must
+    /// therefore be read as a whole.
+    fn read_parts(&mut self) -> Result<bool, SceneErrors> {
         let (name, text) = (self.name, self.text);
         let mut errors = FirstDiagnostics::default();
         let mut syntax: Option<(usize, String)> = None;
@@ -138,7 +134,7 @@ impl<'a> SourceScene<'a> {
                 continue;
             }
             if is_split && number == 0 && root.get_ref().contains_key("object") {
-                return Ok(Reading::NotInParts);
+                return Ok(false);
             }
             if !is_split && root.get_ref().is_empty() {
                 return Err(SceneErrors::at(
@@ -148,15 +144,15 @@ impl<'a> SourceScene<'a> {
                     "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
                 ));
             }
-            let words = migrate((name, text), root.get_mut(), part, &mut errors);
-            let first = migrate::first_word(root.get_ref(), part, &words);
-            if let Some(first) =
-                first.filter(|new| self.first_word.as_ref().is_none_or(|w| new.0 < w.0))
+            let words = migrate(text, root.get_mut(), part, &mut errors);
+            if let Some(word) = words.iter().min_by_key(|word| word.start)
+                && self.first_word.as_ref().is_none_or(|(first, _)| word.start < first.start)
             {
-                self.first_word = Some(first);
+                let subject = subject_in(root.get_ref(), &word.table, part.first_object);
+                self.first_word = Some((word.clone(), subject));
             }
             self.former_words.extend(words);
-            schema::check(name, &root, part, &mut errors);
+            schema::check(&root, part, &mut errors);
             if !errors.is_empty() {
                 continue;
             }
@@ -175,18 +171,18 @@ impl<'a> SourceScene<'a> {
             return Err(SceneErrors::at(name, Some(line_column(text, at)), found, ""));
         }
         if !errors.is_empty() {
-            return Err(SceneErrors::new(errors.located(text)));
+            return Err(SceneErrors::new(errors.located((name, text))));
         }
         self.scene.objects.shrink_to_fit();
-        Ok(Reading::Done)
+        Ok(true)
     }
 
     /// Returns the warnings about doubtful values and about former names of keys and values, sorted
     /// by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let mut found = FirstDiagnostics::default();
-        locate((self.name, self.text), &self.parts, self.scene.warnings(), &mut found);
-        let mut warnings = found.located(self.text).0;
+        locate(self.text, &self.parts, self.scene.warnings(), &mut found);
+        let mut warnings = found.located((self.name, self.text)).0;
         warnings.extend(self.migration_warning());
         let place = |(line, column): (usize, usize)| (line << 32 | column) as i64;
         sort_by_number(&mut warnings, |warning| warning.line_column.map_or(0, place));
@@ -198,13 +194,6 @@ impl<'a> SourceScene<'a> {
         let first = self.first_word.as_ref()?;
         Some(migrate::warning((self.name, self.text), first, self.former_words.len()))
     }
-}
-
-/// Result of reading a scene file part by part, if no error was found.
-enum Reading {
-    Done,
-    /// The file has objects outside of `[[object]]` sections and must therefore be read as a whole.
-    NotInParts,
 }
 
 /// Returns the scene in the table `root`.

@@ -4,10 +4,11 @@
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::subject_in;
-use crate::scene::format::suggest::nearest;
+use crate::scene::format::suggest::{did_you_mean, nearest};
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
 use crate::value::{
-    Color, DefaultValue, Description, Field, NumberRange, ValueType, sort_by_number, truncated,
+    Color, DefaultValue, Description, Field, NumberRange, ValueType, names, sort_by_number,
+    truncated,
 };
 use crate::{camera, light, material};
 use std::ops;
@@ -60,14 +61,9 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
 }
 
 /// Adds the schema errors (unknown keys, wrong types, missing keys) in `root` to `errors`. `root`
-/// is the parsed `part` of the scene file `file`.
-pub(crate) fn check(
-    file: &str,
-    root: &Spanned<DeTable>,
-    part: &Part,
-    errors: &mut FirstDiagnostics,
-) {
-    let mut walk = SchemaChecker { file, part, root: root.get_ref(), path: Vec::new(), errors };
+/// is the parsed `part` of the scene file.
+pub(crate) fn check(root: &Spanned<DeTable>, part: &Part, errors: &mut FirstDiagnostics) {
+    let mut walk = SchemaChecker { part, root: root.get_ref(), path: Vec::new(), errors };
     walk.table(root.get_ref(), 0..0, FIELDS);
 }
 
@@ -91,7 +87,6 @@ fn phrase(keys: &[String]) -> String {
 }
 
 struct SchemaChecker<'a> {
-    file: &'a str,
     part: &'a Part,
     root: &'a DeTable<'a>,
     path: Vec<String>,
@@ -100,13 +95,11 @@ struct SchemaChecker<'a> {
 
 impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
-        let subject = || subject_in(self.root, &self.path, self.part.first_object);
         self.errors.add(self.part.in_file(span.start), || Diagnostic {
-            file: self.file.to_string(),
-            line_column: None,
-            subject: subject(),
+            subject: subject_in(self.root, &self.path, self.part.first_object),
             found,
             help,
+            ..Diagnostic::default()
         });
     }
 
@@ -145,19 +138,15 @@ impl SchemaChecker<'_> {
         if self.errors.skips(self.part.in_file(key.span().start)) {
             return None;
         }
-        let names = || fields.iter().map(|f| f.name);
-        let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
-        let intended = nearest(key.get_ref(), names());
-        if let Some(intended) = intended {
-            help += &format!(" Did you mean {intended:?}?");
-        }
+        let known = || fields.iter().map(|f| f.name);
+        let help = format!("Known: {}.{}", names(fields), did_you_mean(key.get_ref(), known()));
         let place = match self.inner() {
             inner if inner.is_empty() => String::new(),
             inner => format!(" in {}", truncated(&inner)),
         };
         let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
         self.add(key.span(), found, help);
-        intended
+        nearest(key.get_ref(), known())
     }
 
     fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
@@ -258,10 +247,8 @@ impl SchemaChecker<'_> {
             }
             (takes, value) if fits(takes, value) => {}
             (ValueType::Choice(choices), DeValue::String(word)) => {
-                let mut help = format!("Expected {}.", field.takes);
-                if let Some(intended) = nearest(word, choices.iter().map(|c| c.name)) {
-                    help += &format!(" Did you mean {intended:?}?");
-                }
+                let intended = did_you_mean(word, choices.iter().map(|c| c.name));
+                let help = format!("Expected {}.{intended}", field.takes);
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
             (ValueType::Tables(_), _) if self.path.len() == 1 => {

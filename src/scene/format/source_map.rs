@@ -6,7 +6,6 @@ use crate::scene::format::parts::Part;
 use crate::scene::validate::{Problem, subject};
 use std::collections::BTreeMap;
 use std::ops::Range;
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Returns line and column of the byte offset `at` in `text`. Both are counted from 1; columns
@@ -48,32 +47,24 @@ impl<'a> LineCounter<'a> {
 /// Returns the byte range of the value at `path` in a scene file. If the file does not have this
 /// value, returns the range of its nearest ancestor.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
-    let Some((first, rest)) = path.split_first() else { return 0..0 };
-    match root.get(first.as_str()) {
-        Some(value) => deepest_span(value, rest),
-        None => 0..0,
-    }
-}
-
-fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
-    let inner = path.split_first().and_then(|(first, rest)| {
-        let next = match value.get_ref() {
-            DeValue::Table(table) => table.get(first.as_str()),
-            DeValue::Array(list) => first.parse().ok().and_then(|i: usize| list.get(i)),
+    let mut keys = path.iter();
+    let Some(mut value) = keys.next().and_then(|key| root.get(key.as_str())) else { return 0..0 };
+    for key in keys {
+        let inner = match value.get_ref() {
+            DeValue::Table(table) => table.get(key.as_str()),
+            DeValue::Array(list) => key.parse().ok().and_then(|i: usize| list.get(i)),
             _ => None,
         };
-        next.map(|next| (next, rest))
-    });
-    match inner {
-        Some((next, rest)) => deepest_span(next, rest),
-        None => value.span(),
+        let Some(inner) = inner else { break };
+        value = inner;
     }
+    value.span()
 }
 
-/// Adds diagnostics for `problems` of the scene to `found`. `file` and `text` are name and text of
-/// the scene file, which consists of `parts`. The parts that contain the problems are parsed again.
+/// Adds diagnostics for `problems` of the scene to `found`. `text` is the text of the scene file,
+/// which consists of `parts`. The parts that contain the problems are parsed again.
 pub(crate) fn locate(
-    (file, text): (&str, &str),
+    text: &str,
     parts: &[Part],
     problems: Vec<Problem>,
     found: &mut FirstDiagnostics,
@@ -93,7 +84,7 @@ pub(crate) fn locate(
         let part = &parts[number];
         let part_text = part.text(text);
         let (mut root, _) = DeTable::parse_recoverable(&part_text);
-        migrate((file, text), root.get_mut(), part, &mut FirstDiagnostics::default());
+        migrate(text, root.get_mut(), part, &mut FirstDiagnostics::default());
         for Problem { mut path, subject, found: finding, help } in problems {
             if let [list, index, ..] = path.as_mut_slice()
                 && list == "object"
@@ -102,13 +93,7 @@ pub(crate) fn locate(
                 *index = number.saturating_sub(part.first_object).to_string();
             }
             let at = part.in_file(span(root.get_ref(), &path).start);
-            found.add(at, || Diagnostic {
-                file: file.to_string(),
-                line_column: None,
-                subject,
-                found: finding,
-                help,
-            });
+            found.add(at, || Diagnostic { subject, found: finding, help, ..Diagnostic::default() });
         }
     }
 }

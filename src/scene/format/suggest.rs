@@ -1,5 +1,7 @@
 //! Suggestions for mistyped words ("Did you mean"): the nearest known word.
 
+use crate::value::truncated;
+
 /// Returns the word of `words` most similar to `given`. Returns `None` if `given` is unlikely to be
 /// that word with typing errors.
 pub(crate) fn nearest<'a>(
@@ -16,27 +18,18 @@ pub(crate) fn nearest<'a>(
     (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
-/// Returns the Damerau-Levenshtein distance (optimal string alignment) of `a` and `b`, ignoring
-/// case: the smallest number of insertions, deletions, replacements and transpositions of adjacent
-/// characters that turn `a` into `b`.
+/// Returns the question ` Did you mean "word"?` with the word of `words` most similar to `given`,
+/// or an empty string if `given` is unlikely to be one of them.
+pub(crate) fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
+    let word = nearest(given, words).map(truncated);
+    word.map_or(String::new(), |word| format!(" Did you mean \"{word}\"?"))
+}
+
+/// Returns the optimal string alignment distance of `a` and `b`, ignoring case: the smallest number
+/// of insertions, deletions, replacements and transpositions of adjacent characters that turn `a`
+/// into `b`.
 fn distance(a: &str, b: &str) -> usize {
-    let [a, b]: [Vec<char>; 2] = [a, b].map(|s| s.to_lowercase().chars().collect());
-    let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
-    for i in 0..=a.len() {
-        for j in 0..=b.len() {
-            rows[i][j] = if i == 0 || j == 0 {
-                i + j
-            } else {
-                let replace = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
-                let mut least = replace.min(rows[i - 1][j] + 1).min(rows[i][j - 1] + 1);
-                if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                    least = least.min(rows[i - 2][j - 2] + 1);
-                }
-                least
-            };
-        }
-    }
-    rows[a.len()][b.len()]
+    strsim::osa_distance(&a.to_lowercase(), &b.to_lowercase())
 }
 
 #[cfg(test)]
