@@ -3,7 +3,7 @@
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
+use crate::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -159,10 +159,40 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
 /// they can hit the emitter.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns the distance by which lights with a size are moved off the surfaces that they touch; see
-/// [`Emitter::new`].
+/// Returns the height of points on emissive objects above the surface, and the distance by which
+/// lights with a size are moved off the finite surfaces that they touch.
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
+}
+
+/// Largest distance by which a light is moved if it is a sphere or if its centre is on no surface.
+/// The unit is its radius or shorter side.
+const MAX_LIFT: f64 = 1e-4;
+
+/// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
+/// touches; see [`Emitter::new`]. Infinite surfaces are not part of the scene's extent, so that the
+/// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
+/// own coordinates then counts as well.
+fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
+    let lift = emitter_lift::<S>(geometry);
+    let Some(surface) = light.surface() else { return lift };
+    let center = surface.center() - geometry.origin;
+    let largest = center.abs().max_element() + surface.radius();
+    let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
+    let max_lift = MAX_LIFT * surface.thickness();
+    // A sphere touches a flat surface at a single point, which is too small to see.
+    if matches!(surface, EmitterSurface::Sphere(_)) {
+        return lift.min(max_lift);
+    }
+    let lift_on = |form: &Form| {
+        let lift = if form.bounds().is_some() { lift } else { lift_on_infinite };
+        if lift <= max_lift && form.bounds().is_some() {
+            return None;
+        }
+        form.clearance(center).filter(|distance| *distance <= lift).map(|_| lift)
+    };
+    let lifts = geometry.forms.iter().filter_map(lift_on);
+    lifts.fold(lift.min(max_lift), f64::max)
 }
 
 /// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
@@ -208,7 +238,9 @@ impl<S: Float> CompiledLights<S> {
         let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let scales = groups.scales::<S>(scene, (geometry.origin, lift), &distances);
+        let emitter =
+            |light: &Light| Emitter::new(light, geometry.origin, light_lift::<S>(geometry, light));
+        let scales = groups.scales::<S>(scene, geometry.origin, emitter, &distances);
         let emitting = groups.lights(scene);
         let delta_light = |light: &Light| {
             let delta = DeltaLight::new(light, geometry.origin)?;
@@ -220,7 +252,6 @@ impl<S: Float> CompiledLights<S> {
         };
         let mut sources = light_sources(scene, &emitting, delta_light);
         let choice = LightChoice::take(&mut sources);
-        let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let start = start_region(scene, camera);
