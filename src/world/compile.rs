@@ -12,6 +12,7 @@ use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
+use crate::world::emissive_sheets::{Emits, move_off_surfaces};
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -125,6 +126,31 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     /// Returns the materials of the parts of object number `object`.
     fn of_parts(&self, object: usize) -> Vec<&'a Material> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
+    }
+
+    /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
+    /// of the camera. Returns `None` if there are none.
+    fn move_emissive_sheets(
+        &self,
+        geometry: &RecenteredGeometry,
+        eye: DVec3,
+    ) -> Option<RecenteredGeometry> {
+        let emits = |materials: &Vec<u32>| {
+            let emissive = |index: &&u32| self.materials[**index as usize].emits();
+            match materials.iter().find(emissive) {
+                Some(index) if self.materials[*index as usize].two_sided => Emits::BothSides,
+                Some(_) => Emits::Front,
+                None => Emits::Nothing,
+            }
+        };
+        let emits: Vec<Emits> = self.of_object.iter().map(emits).collect();
+        if emits.iter().all(|emits| *emits == Emits::Nothing) {
+            return None;
+        }
+        let transmits = |index: &u32| self.bsdfs[*index as usize].transmission.is_some();
+        let of_object = self.of_object.iter();
+        let transmits: Vec<bool> = of_object.map(|list| list.iter().any(transmits)).collect();
+        move_off_surfaces(geometry, (&emits, &transmits), eye, emitter_lift::<S>(geometry))
     }
 
     /// Returns `true` if some material reflects light that arrives directly from lights.
@@ -388,6 +414,8 @@ impl<L: SimdFloat> World<L> {
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
+        let moved = materials.move_emissive_sheets(recentered, camera.eye());
+        let recentered = moved.as_ref().unwrap_or(recentered);
         let geometry = Aggregate::accelerated(&recentered.forms, scene.trace.acceleration);
         let primitives = geometry.sources();
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
