@@ -65,13 +65,12 @@ impl<S: Float> Emitter<S> {
     /// if the light has no size or no direction.
     ///
     /// Rounding could hide an emitter that touches an object. The surface is therefore lifted by
-    /// `lift`, but at most by 1e-4 of its radius or shorter side. A flat emitter moves in the
-    /// direction that its emitting side faces. A sphere grows and keeps its power.
+    /// `lift`. A flat emitter moves in the direction that its emitting side faces. A sphere grows
+    /// and keeps its power.
     pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
         let surface = light.surface()?;
         let frame = surface.frame()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
-        let lift = lift.min(1e-4 * surface.thickness());
         let mut radiance = match light.unit {
             LightUnit::Radiance => 1.0,
             LightUnit::Power => 1.0 / (PI * surface.area()),

@@ -87,6 +87,26 @@ impl CanonicalShape for CsgSolid {
 }
 
 impl CsgSolid {
+    /// Returns `true` if the bounding boxes of the parts show that the solid has no points, as the
+    /// intersection of solids that are apart.
+    pub fn is_empty(&self) -> bool {
+        self.is_empty_tree(&self.tree)
+    }
+
+    fn is_empty_tree(&self, tree: &CsgTree) -> bool {
+        match tree {
+            CsgTree::Part(_) => false,
+            CsgTree::Union(list) => list.iter().all(|tree| self.is_empty_tree(tree)),
+            CsgTree::Intersection(list) => {
+                let boxes = || list.iter().filter_map(|tree| self.bounds_of(tree));
+                let low = boxes().map(|(low, _)| low).fold(DVec3::NEG_INFINITY, DVec3::max);
+                let high = boxes().map(|(_, high)| high).fold(DVec3::INFINITY, DVec3::min);
+                low.cmpgt(high).any() || list.iter().any(|tree| self.is_empty_tree(tree))
+            }
+            CsgTree::Difference(list) => list.first().is_some_and(|tree| self.is_empty_tree(tree)),
+        }
+    }
+
     fn bounds_of(&self, tree: &CsgTree) -> Option<Bounds> {
         match tree {
             CsgTree::Part(i) => self.parts[*i].bounds(),

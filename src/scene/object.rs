@@ -64,3 +64,35 @@ impl Object {
         checks.and(moved).errors()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::Scene;
+
+    /// Checks that a transform of an empty compound, such as an intersection of disjoint spheres, is
+    /// valid. A compound of small spheres has points and can be too small.
+    #[test]
+    fn compound_without_points_is_not_too_small() {
+        let ball = |x: f64, radius: f64| {
+            format!("{{ shape.sphere = {{ center = [{x:?}, 1, 1], radius = {radius:?} }} }}")
+        };
+        let fault = |shape: &str| {
+            let text = format!("[[object]]\nshape.{shape}\ntransform = [{{ scale = 2.0 }}]\n");
+            Scene::parse(&text, "test").err().map(|error| error.to_string())
+        };
+        let two = |operation: &str, a: String, b: String| format!("{operation}.of = [{a}, {b}]");
+        let apart = two("intersection", ball(-1.0, 0.5), ball(1.0, 0.5));
+        let nested = format!("{{ shape.{apart} }}");
+        for shape in [
+            apart.clone(),
+            two("union", nested.clone(), nested.clone()),
+            two("difference", nested.clone(), ball(1.0, 0.5)),
+            two("intersection", ball(-1.0, 2.0), nested),
+        ] {
+            assert_eq!(fault(&shape), None, "{shape}");
+        }
+        // Both spheres contain their common centre.
+        let tiny = two("intersection", ball(1.0, 1e-20), ball(1.0, 0.5));
+        assert!(fault(&tiny).is_some_and(|message| message.contains("too small")), "{tiny}");
+    }
+}

@@ -126,8 +126,8 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
 
 /// Returns an error if the composition of `steps` is not usable for `shape`, otherwise `None`.
 /// There are four errors: the composition flattens the shape, stretches it out of range, moves it
-/// beyond the largest coordinate, or makes it too small for its distance from the origin. Each
-/// single step must be valid.
+/// beyond the largest coordinate, or makes it too small for its distance from the origin. A
+/// compound without points is never too small. Each single step must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;
@@ -143,7 +143,9 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
     let form = shape.form().transformed(&map);
     let (max_coordinate, extent) = match (&form, form.bounds()) {
         (_, Some((low, high))) => {
-            (low.abs().max(high.abs()).max_element(), (high - low).max_element())
+            let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
+            let size = if is_empty { f64::INFINITY } else { (high - low).max_element() };
+            (low.abs().max(high.abs()).max_element(), size)
         }
         (Form::Plane(PlaneForm { offset, .. }), None) => (offset.abs(), f64::INFINITY),
         (_, None) => (0.0, f64::INFINITY),

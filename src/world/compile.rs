@@ -3,7 +3,7 @@
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
+use crate::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -12,6 +12,7 @@ use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
+use crate::world::emissive_sheets::{Emits, move_off_surfaces};
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -127,6 +128,31 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
 
+    /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
+    /// of the camera. Returns `None` if there are none.
+    fn move_emissive_sheets(
+        &self,
+        geometry: &RecenteredGeometry,
+        eye: DVec3,
+    ) -> Option<RecenteredGeometry> {
+        let emits = |materials: &Vec<u32>| {
+            let emissive = |index: &&u32| self.materials[**index as usize].emits();
+            match materials.iter().find(emissive) {
+                Some(index) if self.materials[*index as usize].two_sided => Emits::BothSides,
+                Some(_) => Emits::Front,
+                None => Emits::Nothing,
+            }
+        };
+        let emits: Vec<Emits> = self.of_object.iter().map(emits).collect();
+        if emits.iter().all(|emits| *emits == Emits::Nothing) {
+            return None;
+        }
+        let transmits = |index: &u32| self.bsdfs[*index as usize].transmission.is_some();
+        let of_object = self.of_object.iter();
+        let transmits: Vec<bool> = of_object.map(|list| list.iter().any(transmits)).collect();
+        move_off_surfaces(geometry, (&emits, &transmits), eye, emitter_lift::<S>(geometry))
+    }
+
     /// Returns `true` if some material reflects light that arrives directly from lights.
     fn has_direct(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
@@ -159,10 +185,40 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
 /// they can hit the emitter.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns the distance by which lights with a size are moved off the surfaces that they touch; see
-/// [`Emitter::new`].
+/// Returns the height of points on emissive objects above the surface, and the distance by which
+/// lights with a size are moved off the finite surfaces that they touch.
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
+}
+
+/// Largest distance by which a light is moved if it is a sphere or if its centre is on no surface.
+/// The unit is its radius or shorter side.
+const MAX_LIFT: f64 = 1e-4;
+
+/// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
+/// touches; see [`Emitter::new`]. Infinite surfaces are not part of the scene's extent, so that the
+/// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
+/// own coordinates then counts as well.
+fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
+    let lift = emitter_lift::<S>(geometry);
+    let Some(surface) = light.surface() else { return lift };
+    let center = surface.center() - geometry.origin;
+    let largest = center.abs().max_element() + surface.radius();
+    let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
+    let max_lift = MAX_LIFT * surface.thickness();
+    // A sphere touches a flat surface at a single point, which is too small to see.
+    if matches!(surface, EmitterSurface::Sphere(_)) {
+        return lift.min(max_lift);
+    }
+    let lift_on = |form: &Form| {
+        let lift = if form.bounds().is_some() { lift } else { lift_on_infinite };
+        if lift <= max_lift && form.bounds().is_some() {
+            return None;
+        }
+        form.clearance(center).filter(|distance| *distance <= lift).map(|_| lift)
+    };
+    let lifts = geometry.forms.iter().filter_map(lift_on);
+    lifts.fold(lift.min(max_lift), f64::max)
 }
 
 /// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
@@ -208,7 +264,9 @@ impl<S: Float> CompiledLights<S> {
         let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let scales = groups.scales::<S>(scene, (geometry.origin, lift), &distances);
+        let emitter =
+            |light: &Light| Emitter::new(light, geometry.origin, light_lift::<S>(geometry, light));
+        let scales = groups.scales::<S>(scene, geometry.origin, emitter, &distances);
         let emitting = groups.lights(scene);
         let delta_light = |light: &Light| {
             let delta = DeltaLight::new(light, geometry.origin)?;
@@ -220,7 +278,6 @@ impl<S: Float> CompiledLights<S> {
         };
         let mut sources = light_sources(scene, &emitting, delta_light);
         let choice = LightChoice::take(&mut sources);
-        let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let start = start_region(scene, camera);
@@ -357,6 +414,8 @@ impl<L: SimdFloat> World<L> {
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
+        let moved = materials.move_emissive_sheets(recentered, camera.eye());
+        let recentered = moved.as_ref().unwrap_or(recentered);
         let geometry = Aggregate::accelerated(&recentered.forms, scene.trace.acceleration);
         let primitives = geometry.sources();
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();

@@ -209,12 +209,13 @@ impl LightGroups {
 
     /// Returns the scale of each light group: the number of integer steps per unit of radiance in
     /// the film, a power of two. It is derived from the group's [`RadianceRange`]. `origin` is the
-    /// point in scene coordinates that becomes the origin of the compiled geometry. `lift` is the
-    /// height by which emitters are moved off surfaces.
+    /// point in scene coordinates that becomes the origin of the compiled geometry. `emitter` compiles
+    /// a light with a size; it returns `None` for other lights.
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
-        (origin, lift): (DVec3, f64),
+        origin: DVec3,
+        emitter: impl Fn(&Light) -> Option<Emitter<S>>,
         distances: &SceneDistances,
     ) -> Vec<f64> {
         let range_of_light = |i: usize| {
@@ -222,7 +223,7 @@ impl LightGroups {
             if let Some(environment) = EnvironmentLight::new(light) {
                 return Some(distances.environment(environment.map(), light.visible));
             }
-            if let Some(emitter) = Emitter::<S>::new(light, origin, lift) {
+            if let Some(emitter) = emitter(light) {
                 return Some(distances.emitter(&emitter, light.visible));
             }
             Some(distances.light(&DeltaLight::<S>::new(light, origin)?))

@@ -4,6 +4,7 @@ mod any_world;
 mod clearance;
 mod compile;
 mod culling;
+mod emissive_sheets;
 mod integrator;
 mod light_choice;
 mod light_groups;

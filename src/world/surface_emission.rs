@@ -34,7 +34,7 @@ const MAX_TRIANGLES: usize = 1 << 16;
 /// Largest distance behind the surface of a touching object (an object that touches an emissive
 /// one) at which points of the emissive object count as covered by the touching object. The unit is
 /// the height of the sampled points above the emissive surface.
-const CONTACT_LIFTS: f64 = 4.0;
+pub(super) const CONTACT_LIFTS: f64 = 4.0;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object
 /// cannot be sampled, so that only rays find the emission.
@@ -264,7 +264,7 @@ fn surface_of(form: &Form) -> Option<ObjectSurface> {
         Form::ConvexPolyhedron(form) => {
             Some(ObjectSurface::ConvexTriangles(triangles_of_polyhedron(form)))
         }
-        Form::Mesh(form) => Some(ObjectSurface::Triangles(triangles_of_mesh(form))),
+        Form::Mesh(form) => Some(ObjectSurface::Triangles(triangles_of_mesh(form, 1).collect())),
         _ => None,
     }
 }
@@ -288,7 +288,7 @@ fn surface_of_parallelogram(form: &ParallelogramForm) -> ObjectSurface {
 }
 
 /// Returns the faces of a polyhedron as triangles, counter-clockwise as seen from outside.
-fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
+pub(super) fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
     let slack = 1e-6 * form.thickness();
     let mut triangles = Vec::new();
     for face in &form.faces {
@@ -310,15 +310,18 @@ fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
     triangles
 }
 
-/// Returns the triangles of the mesh in scene coordinates, counter-clockwise as seen from their
-/// front.
-fn triangles_of_mesh(form: &MeshForm) -> Vec<[DVec3; 3]> {
+/// Returns triangles of the mesh in scene coordinates, counter-clockwise as seen from their front:
+/// all if `step` is 1, otherwise each `step`-th.
+pub(super) fn triangles_of_mesh(
+    form: &MeshForm,
+    step: usize,
+) -> impl Iterator<Item = [DVec3; 3]> + '_ {
     let mesh = form.mesh.mesh();
     let mirrored = form.scene_from_mesh.matrix3.determinant() < 0.0;
     let corner = |i: u32| {
         let position = mesh.positions[i as usize].map(f64::from);
         form.scene_from_mesh.transform_point3(DVec3::from(position))
     };
-    let triangle = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] }.map(corner);
-    mesh.triangles.iter().map(triangle).collect()
+    let in_order = move |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+    mesh.triangles.iter().step_by(step).map(move |triangle| in_order(triangle).map(corner))
 }

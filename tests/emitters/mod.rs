@@ -5,4 +5,5 @@ mod irradiance;
 mod many;
 mod mirrors;
 mod objects;
+mod on_surfaces;
 pub(crate) mod setup;

@@ -11,12 +11,12 @@ use zerkalo::scene::Scene;
 
 /// Allowed relative rounding errors in single and double precision. They arise because sampled
 /// points are lifted off the emitter and rays start above the receiver.
-const ROUNDING: [f64; 2] = [1e-4, 1e-9];
+pub const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
 /// Returns the scene of a camera that looks at a receiver at the origin. `white` is the text of the
 /// receiver's material. `rest` is the text of further objects; they may have the materials `lamp`
 /// (black and emissive), `front` (the same, one-sided) and `black`.
-fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
+pub fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
     scene(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
@@ -33,15 +33,15 @@ fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
     ))
 }
 
-const MATT: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
+pub const MATT: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
 
-fn object(material: &str, shape: &str) -> String {
+pub fn object(material: &str, shape: &str) -> String {
     format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
 }
 
 /// Returns a horizontal rectangle that faces down: its description as a shape or a light, and its
 /// corners.
-fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
+pub fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     let corner = |x: f64, z: f64| center + DVec3::new(x * width, 0.0, z * depth);
     let text = format!(
         "rectangle = {{ center = {}, size = [{width:?}, {depth:?}], normal = [0.0, -1.0, 0.0], \
@@ -63,7 +63,7 @@ fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
 }
 
 /// Writes `polygons` to an OBJ file. Returns the description of the shape that uses the file.
-fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
+pub fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("emissive-objects");
     fs::create_dir_all(&folder).unwrap();
     let path = folder.join(format!("{name}.obj"));
@@ -231,7 +231,7 @@ fn back_of_a_flat_emissive_object_follows_two_sided() {
 
 /// Checks that the mean radiances of the scenes `a` and `b`, each over `count` samples, differ by
 /// no more than chance explains.
-fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
+pub fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
     for (precision, rounding) in ["single", "double"].into_iter().zip(ROUNDING) {
         let mean = |scene: &Scene, seed| match precision {
             "single" => radiance::<Single>(scene, count, seed),
