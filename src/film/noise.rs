@@ -56,8 +56,7 @@ impl Mse {
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
-    /// Adds `weight` times `other`.
-    pub(crate) fn add(&mut self, weight: f64, other: Self) {
+    fn add(&mut self, weight: f64, other: Self) {
         self.linear += weight * other.linear;
         self.codes += weight * other.codes;
     }

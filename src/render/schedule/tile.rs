@@ -6,7 +6,7 @@ use crate::render::wave::JobReport;
 
 /// Largest number of doublings of a tile's sample count over which the slope of its error is
 /// fitted.
-const DOUBLINGS: u32 = 3;
+pub(super) const DOUBLINGS: u32 = 3;
 
 /// Sample counts and noise estimates of one tile.
 #[derive(Clone, Debug)]
@@ -95,26 +95,17 @@ impl Tile {
         })
     }
 
-    /// Returns the latest noise estimate of the tile, but with mean squared errors that are means
-    /// over several estimates: the latest one and those from at least an eighth of its samples.
-    /// Earlier estimates are first scaled to the present sample count, as [`USUAL_SLOPE`] predicts.
-    /// Estimates at doubled sample counts are nearly independent of each other, so that the mean is
-    /// less uncertain than the latest estimate. Returns `None` before the first estimate.
-    pub fn pooled_estimate(&self) -> Option<TileNoise> {
+    /// Returns the noise estimate that the tile had before its latest `doublings` doublings of the
+    /// sample count, scaled to the present sample count as [`USUAL_SLOPE`] predicts. Returns the
+    /// oldest estimate, scaled, if there were fewer doublings, and `None` if there is no estimate.
+    pub fn earlier_estimate(&self, doublings: usize) -> Option<TileNoise> {
         let latest = self.error?;
-        let (mut pooled, mut weight) = (latest, 1.0);
-        let is_recent = |e: &&TileNoise| e.samples >= latest.samples / 8 && **e != latest;
-        for earlier in self.history.iter().filter(is_recent) {
-            let growth = f64::from(latest.samples) / f64::from(earlier.samples);
-            let factor = growth.powf(-2.0 * USUAL_SLOPE);
-            pooled.reported.add(factor, earlier.reported);
-            pooled.allocation.add(factor, earlier.allocation);
-            weight += 1.0;
-        }
-        for mse in [&mut pooled.reported, &mut pooled.allocation] {
-            *mse = Mse { linear: mse.linear / weight, codes: mse.codes / weight };
-        }
-        Some(pooled)
+        let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
+        let growth = f64::from(latest.samples) / f64::from(earlier.samples);
+        let factor = growth.powf(-2.0 * USUAL_SLOPE);
+        let scaled = |mse: Mse| Mse { linear: factor * mse.linear, codes: factor * mse.codes };
+        let (reported, allocation) = (scaled(earlier.reported), scaled(earlier.allocation));
+        Some(TileNoise { reported, allocation, ..latest })
     }
 
     /// Returns two noise estimates: the one before and the one after the latest doubling of the
