@@ -1,9 +1,10 @@
-//! Choice of lights at a surface point, in scenes with many point lights.
+//! Choice of lights at a surface point, in scenes with many point or spot lights.
 //!
-//! The lights are divided into sets of four to eight lights. At each surface a path chooses one
-//! set, all with the same probability, and traces shadow rays to its lights. A stratum is a group
-//! of lights that are close to each other: consecutive lights in the order of a Morton curve. A set
-//! holds at most one light of each stratum, so that its lights are spread over the scene.
+//! The lights are divided into sets of four to eight lights. Sets of spot lights are larger,
+//! because most surfaces are outside of most cones. At each surface a path chooses one set, all
+//! with the same probability, and traces shadow rays to its lights. A stratum is a group of lights
+//! that are close to each other: consecutive lights in the order of a Morton curve. A set holds at
+//! most one light of each stratum, so that its lights are spread over the scene.
 //!
 //! The number of sets is a power of two, because successive samples of a pixel are stratified over
 //! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
@@ -15,7 +16,7 @@
 //! [`LightGroups`](crate::world::LightGroups).
 
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
-use crate::light::DeltaLight;
+use crate::light::{DeltaLight, Light, SpotCone, spot_factor};
 use crate::primitive::BoundingSphere;
 use crate::value::sort_by_number;
 use crate::world::world::DeltaSource;
@@ -24,19 +25,19 @@ use std::f64::consts::PI;
 
 /// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
 /// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
-/// methods.
+/// methods. A spot light counts as a part of a light; see [`ManyLights`].
 pub(super) const MIN_LIGHTS: usize = 16;
 
-/// Smallest number of lights in a set. A set holds the lights to which a path traces shadow rays at
-/// one surface.
+/// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
+/// path traces shadow rays at one surface.
 const MIN_SET: usize = 4;
 
 /// Weight of the variance that all lights have in common; see [`bright_lights`]. With a weight of
 /// 1, eight strong lights of 64 in the mirror room take 2.3 times as many rays.
 const COMMON_VARIANCE: f64 = 0.25;
 
-/// Largest number of bright point lights that every path asks although the scene has many point
-/// lights; see [`bright_lights`].
+/// Largest number of bright lights that every path asks although the scene has many lights; see
+/// [`bright_lights`].
 const MAX_BRIGHT: usize = 16;
 
 /// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
@@ -71,9 +72,20 @@ struct Stratum<S> {
     /// The tracer multiplies the samples of the light by its emission. A set without a light of the
     /// stratum has the emission 1.
     emission: [Table<S>; 3],
+    /// Cones of the stratum's lights. `None` if all of them emit equally in all directions.
+    cones: Option<Cones<S>>,
 }
 
-/// Point lights of a scene, of which each path chooses a few at each surface.
+/// Cones of the lights of a stratum (spatial group of lights). The cone of a point light contains
+/// all directions. The fields are those of [`SpotCone`], for the stratum's light in each set (the
+/// lights to which one path traces shadow rays).
+struct Cones<S> {
+    axis: [Table<S>; 3],
+    outer: Table<S>,
+    scale: Table<S>,
+}
+
+/// Point and spot lights of a scene, of which each path chooses a few at each surface.
 pub(super) struct LightChoice<S> {
     /// Index of the light group that all lights of this choice share.
     pub group: usize,
@@ -90,27 +102,40 @@ pub(super) struct ChosenSets<'a, S> {
 }
 
 impl<S: Float> LightChoice<S> {
-    /// Removes from `sources` the lights among which paths choose: point lights that emit in all
-    /// directions and are not on a surface, except for those that are much brighter than the
-    /// others. Returns `None`, and removes nothing, if there are fewer than `MIN_LIGHTS` of them.
-    /// `extent` is the largest absolute coordinate of the scene's shapes and camera.
-    pub fn take(sources: &mut Vec<DeltaSource<S>>, extent: f64) -> Option<Self> {
-        let is_point = |source: &DeltaSource<S>| {
-            matches!(source.light.light, DeltaLight::Point { cone: None, .. })
-                && source.light.on_surface.is_none()
+    /// Removes from `sources` the lights among which paths choose: point and spot lights that are
+    /// not on a surface, except for those that are much brighter than the others. Lights of a kind
+    /// (point or spot) remain if the scene does not have `many` of this kind, or if fewer than
+    /// `MIN_LIGHTS` of them are not on a surface. Returns `None`, and removes nothing, if no lights
+    /// are left to choose from. `extent` is the largest absolute coordinate of the scene's shapes
+    /// and camera.
+    pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
+        let of_kind = |is_spot: bool, is_many: bool| {
+            let is_kind = |source: &DeltaSource<S>| match &source.light.light {
+                DeltaLight::Point { cone, .. } => {
+                    cone.is_some() == is_spot && source.light.on_surface.is_none()
+                }
+                DeltaLight::Directional { .. } => false,
+            };
+            let lights: Vec<usize> = (0..sources.len()).filter(|i| is_kind(&sources[*i])).collect();
+            if is_many && lights.len() >= MIN_LIGHTS { lights } else { Vec::new() }
         };
-        let points: Vec<usize> = (0..sources.len()).filter(|i| is_point(&sources[*i])).collect();
-        if points.len() < MIN_LIGHTS {
+        let mut candidates = [of_kind(false, many.points), of_kind(true, many.spots)].concat();
+        if candidates.is_empty() {
             return None;
         }
-        let sets = 1 << (points.len() / MIN_SET).ilog2();
-        let powers = powers(points.iter().map(|i| &sources[*i]), extent);
+        candidates.sort_unstable();
+        let shares = candidates.iter().map(|i| match &sources[*i].light.light {
+            DeltaLight::Point { cone: Some(cone), .. } => share(cone.outer.to_f64()),
+            _ => 1.0,
+        });
+        let sets = 1 << (shares.sum::<f64>() as usize / MIN_SET).max(1).ilog2();
+        let powers = powers(candidates.iter().map(|i| &sources[*i]), extent);
         let mut is_chosen = vec![false; sources.len()];
-        for i in &points {
+        for i in &candidates {
             is_chosen[*i] = true;
         }
         for bright in bright_lights(&powers, sets) {
-            is_chosen[points[bright]] = false;
+            is_chosen[candidates[bright]] = false;
         }
         let mut is_chosen = is_chosen.into_iter();
         let (mut chosen, others): (Vec<_>, Vec<_>) =
@@ -205,7 +230,31 @@ impl<S: Float> Stratum<S> {
             positions: [0, 1, 2].map(coordinate),
             constant: Table::new(lights.iter().map(constant), 0.0, sets),
             emission: [0, 1, 2].map(emission),
+            cones: Cones::new(lights, sets),
         }
+    }
+}
+
+impl<S: Float> Cones<S> {
+    /// Creates the cones of the `lights` of a stratum (spatial group of lights), at most one for
+    /// each of `sets` sets. Returns `None` if all lights emit equally in all directions.
+    fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
+        let cone = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { cone, .. } => cone,
+            DeltaLight::Directional { .. } => None,
+        };
+        lights.iter().find_map(cone)?;
+        let all: SpotCone<S> = SpotCone::of_all_directions();
+        let cones: Vec<SpotCone<S>> =
+            lights.iter().map(|light| cone(light).unwrap_or(all)).collect();
+        let table = |value: &dyn Fn(&SpotCone<S>) -> S| {
+            Table::new(cones.iter().map(value), value(&all).to_f64(), sets)
+        };
+        Some(Self {
+            axis: [0, 1, 2].map(|i| table(&move |cone| cone.axis[i])),
+            outer: table(&|cone| cone.outer),
+            scale: table(&|cone| cone.scale),
+        })
     }
 }
 
@@ -236,6 +285,17 @@ impl<S: Float> ChosenSets<'_, S> {
         L::select(constant.gt(L::zero()), constant, falling) * count
     }
 
+    /// Returns the factor, 0..=1, of the intensity of each lane's chosen light in the stratum
+    /// number `stratum` (a spatial group of lights): that of its cone in the direction `wi`, a unit
+    /// vector from the surface point to the light. Returns `None` if no light of the stratum has a
+    /// cone.
+    #[inline(always)]
+    pub fn cone<L: SimdFloat<Scalar = S>>(&self, stratum: usize, wi: Vec3<L>) -> Option<L> {
+        let Cones { axis, outer, scale } = self.choice.strata[stratum].cones.as_ref()?;
+        let (outer, scale) = (outer.gather(&self.sets), scale.gather(&self.sets));
+        Some(spot_factor(wi, self.gather(axis), outer, scale))
+    }
+
     /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
     /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
     /// multiply the lights' samples by an emission.
@@ -243,6 +303,43 @@ impl<S: Float> ChosenSets<'_, S> {
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].emission)
     }
+}
+
+/// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
+/// of such a kind share one light group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ManyLights {
+    /// `true` if the scene has `MIN_LIGHTS` point lights or more.
+    points: bool,
+    /// `true` if the cones of the scene's spot lights have together at least the solid angle of
+    /// `MIN_LIGHTS` hemispheres. A spot light costs rays at surfaces in its cone only. If the cones
+    /// are narrow, few surfaces are in many of them, and all spots together cost few rays.
+    spots: bool,
+}
+
+impl ManyLights {
+    /// Counts `lights`, which are those that change the picture.
+    pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
+        let (mut points, mut spots) = (0, 0.0);
+        for light in lights {
+            points += usize::from(light.point.is_some());
+            if let Some(spot) = &light.spot {
+                spots += share(1.0 - spot.outer_angle.to_radians().cos());
+            }
+        }
+        Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
+    }
+
+    /// Returns `true` if the scene has many lights of the kind of `light`.
+    pub fn includes(&self, light: &Light) -> bool {
+        self.points && light.point.is_some() || self.spots && light.spot.is_some()
+    }
+}
+
+/// Returns the solid angle of a cone in hemispheres, at most 1. It is approximately the share of
+/// the surfaces that a spot light with this cone illuminates. `outer` is [`SpotCone::outer`].
+fn share(outer: f64) -> f64 {
+    outer.min(1.0)
 }
 
 /// Returns the position of a light; the origin for a directional light.
@@ -273,13 +370,13 @@ fn powers<'a, S: Float>(
 /// divided into `sets`, of which a path chooses one per surface. `powers` are the powers of all
 /// lights: red, green and blue.
 ///
-/// The bright lights are the brightest k. The number k has the smallest product of variance and
-/// cost, at most [`MAX_BRIGHT`]. The cost is the number of rays per surface: one that arrives, one
-/// to each bright light, and those to the lights of a set. The variance has three parts. The first
-/// is common to all lights, because it depends on the place of the surface only: the squared sum of
-/// all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared powers of the bright
-/// lights. The third is that sum for the other lights, times the number of sets, because only one
-/// of so many samples asks a light of a set.
+/// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
+/// smallest product of variance and cost. The cost is the number of rays per surface: one that
+/// arrives, one to each bright light, and those to the lights of a set. The variance has three
+/// parts. The first is common to all lights, because it depends on the place of the surface only:
+/// the squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
+/// powers of the bright lights. The third is that sum for the other lights, times the number of
+/// sets, because only one of so many samples asks a light of a set.
 ///
 /// Of lights with similar powers none is bright, because the squared sum outweighs the rest. Of a
 /// strong light and many weak ones the strong light is bright.

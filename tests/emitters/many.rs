@@ -92,6 +92,60 @@ fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
     check(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
+/// Returns the text of a spot light at `position` with the axis `axis`, and the radiance of the
+/// receiver that it causes. The cone has a soft edge from 20 to 80 degrees.
+fn spot(position: DVec3, axis: DVec3) -> (String, f64) {
+    let [inner, outer] = [20.0_f64, 80.0];
+    let text = format!(
+        "[[light]]\nspot = {{ position = {}, direction = {}, inner_angle = {inner:?}, \
+         outer_angle = {outer:?} }}\nfalloff = \"inverse-square\"\n",
+        array(position),
+        array(axis)
+    );
+    let [low, high] = [outer, inner].map(|angle| angle.to_radians().cos());
+    let cosine = axis.dot(-position) / (axis.length() * position.length());
+    let t = ((cosine - low) / (high - low)).clamp(0.0, 1.0);
+    (text, t * t * (3.0 - 2.0 * t) * expected(1, position))
+}
+
+/// Checks scenes of spot lights, and of spot and point lights together. Each path samples only a
+/// few of them. About half of the spots do not light the receiver.
+#[test]
+fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
+    let mut numbers = Numbers::new(47);
+    let mut cases = Vec::new();
+    for (points, spots) in [(0, 20), (0, 33), (0, 600), (CHOSEN, 20), (3, 64), (100, 29)] {
+        let points = positions(points, &mut numbers);
+        let mut text = receiver_text(&points, |_| 1.0);
+        let mut sum: f64 = points.iter().enumerate().map(|(i, light)| expected(i, *light)).sum();
+        for position in positions(spots, &mut numbers) {
+            let axis = numbers.in_cube(1.0) - position.normalize();
+            let (spot, radiance) = spot(position, axis);
+            text += &spot;
+            sum += radiance;
+        }
+        cases.push((format!("{} points, {spots} spots", points.len()), scene(&text), sum));
+    }
+    check(&cases, 1 << 16, [2e-4, 1e-9]);
+}
+
+/// Checks that each path samples all spots unless their cones have together the solid angle of
+/// [`CHOSEN`] hemispheres, even if it samples only a few of the points. The spots then have light
+/// groups of their own, without noise.
+#[test]
+fn few_spots_among_many_points_are_all_asked() {
+    let lights = positions(CHOSEN, &mut Numbers::new(3));
+    // A cone of 80 degrees has 0.826 times the solid angle of a hemisphere.
+    for (spots, is_chosen) in [(19, false), (20, true)] {
+        let mut text = receiver_text(&lights, |_| 1e-30);
+        for position in positions(spots, &mut Numbers::new(4)) {
+            text += &spot(position, -position).0;
+        }
+        let (_, error) = radiance::<Double>(&scene(&text), 64, 1);
+        assert_eq!(error > 1e-6, is_chosen, "{spots} spots: {error}");
+    }
+}
+
 /// Returns the mean number of samples per pixel with which the picture of a room with a ball has
 /// an RMSE of half an 8-bit level. `lights` are the intensities of its lights.
 fn samples_to_half_a_level(lights: &[f64]) -> f64 {
