@@ -45,22 +45,30 @@ const SHARP: f64 = 1e30;
 #[derive(Clone, Copy, Debug)]
 pub struct SpotCone<S> {
     /// Unit vector from lit points on the cone's axis towards the light.
-    axis: [S; 3],
+    pub axis: [S; 3],
     /// Value of s = 1 - cos(angle to the axis) at the outer cone.
-    outer: S,
-    /// 1 / (s_outer - s_inner), at most [`SHARP`], where s = 1 - cos(angle to the axis).
-    scale: S,
+    pub outer: S,
+    /// 1 / (s_outer - s_inner), at most `SHARP`, where s = 1 - cos(angle to the axis).
+    pub scale: S,
 }
 
+/// Value of [`SpotCone::outer`] for a cone that contains all directions. Rounding may give s =
+/// 1 - cos(angle to the axis) a value above 2, its exact maximum, so the limit is larger.
+const ALL_DIRECTIONS: f64 = 3.0;
+
 impl<S: Float> SpotCone<S> {
+    /// Returns the cone of a light that emits equally in all directions. Its factor is exactly 1.
+    pub fn of_all_directions() -> Self {
+        let axis = [0.0, 1.0, 0.0].map(S::from_f64);
+        Self { axis, outer: S::from_f64(ALL_DIRECTIONS), scale: S::from_f64(SHARP) }
+    }
+
     fn new(spot: &Spot) -> Option<Self> {
         let axis = -unit(spot.direction)?;
         let one_minus_cos = |degrees: f64| 2.0 * (0.5 * degrees).to_radians().sin().powi(2);
         let (inner, mut outer) = (one_minus_cos(spot.inner_angle), one_minus_cos(spot.outer_angle));
         if spot.inner_angle == 180.0 {
-            // The cone contains all directions. Rounding may give s a value above 2, its exact
-            // maximum, so the limit is larger.
-            outer = 3.0;
+            outer = ALL_DIRECTIONS;
         }
         let scale = (outer - inner).max(0.0).recip().min(SHARP);
         Some(Self {
@@ -74,10 +82,19 @@ impl<S: Float> SpotCone<S> {
     /// vector from each point to the light.
     #[inline(always)]
     fn factor<L: SimdFloat<Scalar = S>>(&self, wi: Vec3<L>) -> L {
-        let s = (wi - Vec3::splat(self.axis)).length_squared() * L::from_f64(0.5);
-        let t = ((L::splat(self.outer) - s) * L::splat(self.scale)).max(L::zero()).min(L::one());
-        t * t * (L::from_f64(3.0) - (t + t))
+        let Self { axis, outer, scale } = *self;
+        spot_factor(wi, Vec3::splat(axis), L::splat(outer), L::splat(scale))
     }
+}
+
+/// Returns the factor of a spot's intensity, 0..=1, at surface points. Each lane has a spot of its
+/// own; `axis`, `outer` and `scale` are the fields of its [`SpotCone`]. `wi` is the unit vector
+/// from each point to its light.
+#[inline(always)]
+pub fn spot_factor<L: SimdFloat>(wi: Vec3<L>, axis: Vec3<L>, outer: L, scale: L) -> L {
+    let s = (wi - axis).length_squared() * L::from_f64(0.5);
+    let t = ((outer - s) * scale).max(L::zero()).min(L::one());
+    t * t * (L::from_f64(3.0) - (t + t))
 }
 
 /// Light that arrives at surface points from a light of unit strength, one point per lane.

@@ -7,7 +7,7 @@ mod environment;
 mod object_emitter;
 
 pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
-pub use delta::{DeltaLight, LightSample, SpotCone};
+pub use delta::{DeltaLight, LightSample, SpotCone, spot_factor};
 pub use emitter::{Emitter, EmitterSample};
 pub use environment::{Environment, EnvironmentLight, EnvironmentSample};
 pub use object_emitter::{ObjectEmitter, ObjectSurface};

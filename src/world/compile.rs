@@ -277,7 +277,7 @@ impl<S: Float> CompiledLights<S> {
             Some(ShadowRayTarget { light: delta, on_surface })
         };
         let mut sources = light_sources(scene, &emitting, delta_light);
-        let choice = LightChoice::take(&mut sources);
+        let choice = LightChoice::take(&mut sources, &groups.many, geometry.extent);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let start = start_region(scene, camera);

@@ -1,20 +1,23 @@
-//! Choice of lights at a surface point, in scenes with many point lights.
+//! Choice of lights at a surface point, in scenes with many point or spot lights.
 //!
-//! The lights are divided into sets of four to eight lights. At each surface a path chooses one
-//! set, all with the same probability, and traces shadow rays to its lights. A stratum is a group
-//! of lights that are close to each other: consecutive lights in the order of a Morton curve. A set
-//! holds at most one light of each stratum, so that its lights are spread over the scene.
+//! The lights are divided into sets of four to eight lights. Sets of spot lights are larger,
+//! because most surfaces are outside of most cones. At each surface a path chooses one set, all
+//! with the same probability, and traces shadow rays to its lights. A stratum is a group of lights
+//! that are close to each other: consecutive lights in the order of a Morton curve. A set holds at
+//! most one light of each stratum, so that its lights are spread over the scene.
 //!
 //! The number of sets is a power of two, because successive samples of a pixel are stratified over
 //! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
 //! every light once. If n were no power of two, the noise would be several times as large.
 //!
-//! The probabilities depend neither on the intensities of the lights nor on the surface point. All
-//! lights are in one light group, see [`LightGroups`](crate::world::LightGroups).
+//! The probabilities depend neither on the intensities of the lights nor on the surface point.
+//! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
+//! from every surface. All lights are in one light group, see
+//! [`LightGroups`](crate::world::LightGroups).
 
 use crate::bvh::morton_code;
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
-use crate::light::DeltaLight;
+use crate::light::{DeltaLight, Light, SpotCone, spot_factor};
 use crate::primitive::BoundingSphere;
 use crate::value::sort_by_number;
 use crate::world::world::DeltaSource;
@@ -23,12 +26,20 @@ use std::f64::consts::PI;
 
 /// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
 /// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
-/// methods.
+/// methods. A spot light counts as a part of a light; see [`ManyLights`].
 pub(super) const MIN_LIGHTS: usize = 16;
 
-/// Smallest number of lights in a set. A set holds the lights to which a path traces shadow rays at
-/// one surface.
+/// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
+/// path traces shadow rays at one surface.
 const MIN_SET: usize = 4;
+
+/// Weight of the variance that all lights have in common; see [`bright_lights`]. With a weight of
+/// 1, eight strong lights of 64 in the mirror room take 2.3 times as many rays.
+const COMMON_VARIANCE: f64 = 0.25;
+
+/// Largest number of bright lights that every path asks although the scene has many lights; see
+/// [`bright_lights`].
+const MAX_BRIGHT: usize = 16;
 
 /// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
 /// lookup in 16 elements is one instruction.
@@ -62,9 +73,20 @@ struct Stratum<S> {
     /// The tracer multiplies the samples of the light by its emission. A set without a light of the
     /// stratum has the emission 1.
     emission: [Table<S>; 3],
+    /// Cones of the stratum's lights. `None` if all of them emit equally in all directions.
+    cones: Option<Cones<S>>,
 }
 
-/// Point lights of a scene, of which each path chooses a few at each surface.
+/// Cones of the lights of a stratum (spatial group of lights). The cone of a point light contains
+/// all directions. The fields are those of [`SpotCone`], for the stratum's light in each set (the
+/// lights to which one path traces shadow rays).
+struct Cones<S> {
+    axis: [Table<S>; 3],
+    outer: Table<S>,
+    scale: Table<S>,
+}
+
+/// Point and spot lights of a scene, of which each path chooses a few at each surface.
 pub(super) struct LightChoice<S> {
     /// Index of the light group that all lights of this choice share.
     pub group: usize,
@@ -81,18 +103,44 @@ pub(super) struct ChosenSets<'a, S> {
 }
 
 impl<S: Float> LightChoice<S> {
-    /// Removes from `sources` the lights among which paths choose: point lights that emit in all
-    /// directions and are not on a surface. Returns `None`, and removes nothing, if there are fewer
-    /// than `MIN_LIGHTS` of them.
-    pub fn take(sources: &mut Vec<DeltaSource<S>>) -> Option<Self> {
-        let is_point = |source: &DeltaSource<S>| {
-            matches!(source.light.light, DeltaLight::Point { cone: None, .. })
-                && source.light.on_surface.is_none()
+    /// Removes from `sources` the lights among which paths choose: point and spot lights that are
+    /// not on a surface, except for those that are much brighter than the others. Lights of a kind
+    /// (point or spot) remain if the scene does not have `many` of this kind, or if fewer than
+    /// `MIN_LIGHTS` of them are not on a surface. Returns `None`, and removes nothing, if no lights
+    /// are left to choose from. `extent` is the largest absolute coordinate of the scene's shapes
+    /// and camera.
+    pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
+        let of_kind = |is_spot: bool, is_many: bool| {
+            let is_kind = |source: &DeltaSource<S>| match &source.light.light {
+                DeltaLight::Point { cone, .. } => {
+                    cone.is_some() == is_spot && source.light.on_surface.is_none()
+                }
+                DeltaLight::Directional { .. } => false,
+            };
+            let lights: Vec<usize> = (0..sources.len()).filter(|i| is_kind(&sources[*i])).collect();
+            if is_many && lights.len() >= MIN_LIGHTS { lights } else { Vec::new() }
         };
-        if sources.iter().filter(|source| is_point(source)).count() < MIN_LIGHTS {
+        let mut candidates = [of_kind(false, many.points), of_kind(true, many.spots)].concat();
+        if candidates.is_empty() {
             return None;
         }
-        let (mut chosen, others): (Vec<_>, Vec<_>) = sources.drain(..).partition(is_point);
+        candidates.sort_unstable();
+        let shares = candidates.iter().map(|i| match &sources[*i].light.light {
+            DeltaLight::Point { cone: Some(cone), .. } => share(cone.outer.to_f64()),
+            _ => 1.0,
+        });
+        let sets = 1 << (shares.sum::<f64>() as usize / MIN_SET).max(1).ilog2();
+        let powers = powers(candidates.iter().map(|i| &sources[*i]), extent);
+        let mut is_chosen = vec![false; sources.len()];
+        for i in &candidates {
+            is_chosen[*i] = true;
+        }
+        for bright in bright_lights(&powers, sets) {
+            is_chosen[candidates[bright]] = false;
+        }
+        let mut is_chosen = is_chosen.into_iter();
+        let (mut chosen, others): (Vec<_>, Vec<_>) =
+            sources.drain(..).partition(|_| is_chosen.next() == Some(true));
         *sources = others;
         let low = chosen.iter().map(place).reduce(DVec3::min)?;
         let high = chosen.iter().map(place).reduce(DVec3::max)?;
@@ -100,7 +148,6 @@ impl<S: Float> LightChoice<S> {
 
         let group = chosen[0].group;
         assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");
-        let sets = 1 << (chosen.len() / MIN_SET).ilog2();
         let strata = chosen.chunks(sets).map(|lights| Stratum::new(lights, sets)).collect();
         Some(Self { group, sets, strata })
     }
@@ -184,7 +231,31 @@ impl<S: Float> Stratum<S> {
             positions: [0, 1, 2].map(coordinate),
             constant: Table::new(lights.iter().map(constant), 0.0, sets),
             emission: [0, 1, 2].map(emission),
+            cones: Cones::new(lights, sets),
         }
+    }
+}
+
+impl<S: Float> Cones<S> {
+    /// Creates the cones of the `lights` of a stratum (spatial group of lights), at most one for
+    /// each of `sets` sets. Returns `None` if all lights emit equally in all directions.
+    fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
+        let cone = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { cone, .. } => cone,
+            DeltaLight::Directional { .. } => None,
+        };
+        lights.iter().find_map(cone)?;
+        let all: SpotCone<S> = SpotCone::of_all_directions();
+        let cones: Vec<SpotCone<S>> =
+            lights.iter().map(|light| cone(light).unwrap_or(all)).collect();
+        let table = |value: &dyn Fn(&SpotCone<S>) -> S| {
+            Table::new(cones.iter().map(value), value(&all).to_f64(), sets)
+        };
+        Some(Self {
+            axis: [0, 1, 2].map(|i| table(&move |cone| cone.axis[i])),
+            outer: table(&|cone| cone.outer),
+            scale: table(&|cone| cone.scale),
+        })
     }
 }
 
@@ -215,6 +286,17 @@ impl<S: Float> ChosenSets<'_, S> {
         L::select(constant.gt(L::zero()), constant, falling) * count
     }
 
+    /// Returns the factor, 0..=1, of the intensity of each lane's chosen light in the stratum
+    /// number `stratum` (a spatial group of lights): that of its cone in the direction `wi`, a unit
+    /// vector from the surface point to the light. Returns `None` if no light of the stratum has a
+    /// cone.
+    #[inline(always)]
+    pub fn cone<L: SimdFloat<Scalar = S>>(&self, stratum: usize, wi: Vec3<L>) -> Option<L> {
+        let Cones { axis, outer, scale } = self.choice.strata[stratum].cones.as_ref()?;
+        let (outer, scale) = (outer.gather(&self.sets), scale.gather(&self.sets));
+        Some(spot_factor(wi, self.gather(axis), outer, scale))
+    }
+
     /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
     /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
     /// multiply the lights' samples by an emission.
@@ -224,9 +306,102 @@ impl<S: Float> ChosenSets<'_, S> {
     }
 }
 
+/// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
+/// of such a kind share one light group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ManyLights {
+    /// `true` if the scene has `MIN_LIGHTS` point lights or more.
+    points: bool,
+    /// `true` if the cones of the scene's spot lights have together at least the solid angle of
+    /// `MIN_LIGHTS` hemispheres. A spot light costs rays at surfaces in its cone only. If the cones
+    /// are narrow, few surfaces are in many of them, and all spots together cost few rays.
+    spots: bool,
+}
+
+impl ManyLights {
+    /// Counts `lights`, which are those that change the picture.
+    pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
+        let (mut points, mut spots) = (0, 0.0);
+        for light in lights {
+            points += usize::from(light.point.is_some());
+            if let Some(spot) = &light.spot {
+                spots += share(1.0 - spot.outer_angle.to_radians().cos());
+            }
+        }
+        Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
+    }
+
+    /// Returns `true` if the scene has many lights of the kind of `light`.
+    pub fn includes(&self, light: &Light) -> bool {
+        self.points && light.point.is_some() || self.spots && light.spot.is_some()
+    }
+}
+
+/// Returns the solid angle of a cone in hemispheres, at most 1. It is approximately the share of
+/// the surfaces that a spot light with this cone illuminates. `outer` is [`SpotCone::outer`].
+fn share(outer: f64) -> f64 {
+    outer.min(1.0)
+}
+
 /// Returns the position of a light; the origin for a directional light.
 fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
     source.light.light.position().unwrap_or_default()
+}
+
+/// Returns the power of each light in arbitrary units: red, green and blue. Lights whose irradiance
+/// does not depend on the distance are compared with the others at the mean distance of the lights
+/// from the scene's centre, which is the origin. This distance is at least `extent`.
+fn powers<'a, S: Float>(
+    lights: impl Iterator<Item = &'a DeltaSource<S>> + Clone,
+    extent: f64,
+) -> Vec<DVec3> {
+    let distances = lights.clone().map(|light| place(light).length().max(extent));
+    let mean = distances.sum::<f64>() / lights.clone().count().max(1) as f64;
+    let power = |light: &DeltaSource<S>| {
+        let emission = light.emission.map_or(DVec3::ONE, |e| DVec3::from(e.map(S::to_f64)));
+        match light.light.light.is_inverse_square() {
+            true => emission,
+            false => emission * (PI * mean * mean),
+        }
+    };
+    lights.map(power).collect()
+}
+
+/// Returns the indices of the bright lights: those that every path asks. The other lights are
+/// divided into `sets`, of which a path chooses one per surface. `powers` are the powers of all
+/// lights: red, green and blue.
+///
+/// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
+/// smallest product of variance and cost. The cost is the number of rays per surface: one that
+/// arrives, one to each bright light, and those to the lights of a set. The variance has three
+/// parts. The first is common to all lights, because it depends on the place of the surface only:
+/// the squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
+/// powers of the bright lights. The third is that sum for the other lights, times the number of
+/// sets, because only one of so many samples asks a light of a set.
+///
+/// Of lights with similar powers none is bright, because the squared sum outweighs the rest. Of a
+/// strong light and many weak ones the strong light is bright.
+fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
+    let largest = powers.iter().map(|power| power.max_element()).fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Vec::new();
+    }
+    // Scaled powers, whose squares neither overflow nor vanish.
+    let powers: Vec<DVec3> = powers.iter().map(|power| *power / largest).collect();
+    let squares: Vec<f64> = powers.iter().map(|power| power.length_squared()).collect();
+    let mut order: Vec<usize> = (0..powers.len()).collect();
+    order.sort_by(|a, b| squares[*b].total_cmp(&squares[*a]));
+    let common = COMMON_VARIANCE * powers.iter().sum::<DVec3>().length_squared();
+    let effort = |k: usize| {
+        let sum = |lights: &[usize]| lights.iter().map(|i| squares[*i]).sum::<f64>();
+        let (bright, others) = order.split_at(k);
+        let cost = 1.0 + k as f64 + others.len() as f64 / sets as f64;
+        (common + sum(bright) + sets as f64 * sum(others)) * cost
+    };
+    let efforts: Vec<f64> = (0..=MAX_BRIGHT.min(powers.len() - 1)).map(effort).collect();
+    let best = (0..efforts.len()).reduce(|a, b| if efforts[b] < efforts[a] { b } else { a });
+    order.truncate(best.unwrap_or(0));
+    order
 }
 
 /// Returns the value that all `items` have. Returns `None` if they differ or if there are none.
@@ -249,4 +424,59 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
 fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
     let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
     morton_code(((point - low) / extent).to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the number of sets that `count` lights are divided into.
+    fn sets(count: usize) -> usize {
+        1 << (count / MIN_SET).ilog2()
+    }
+
+    fn bright(powers: &[f64]) -> Vec<usize> {
+        let powers: Vec<DVec3> = powers.iter().map(|power| DVec3::splat(*power)).collect();
+        bright_lights(&powers, sets(powers.len()))
+    }
+
+    #[test]
+    fn no_light_of_similar_ones_is_bright() {
+        for count in MIN_LIGHTS..=300 {
+            for power in [1e-300, 0.3, 1e300] {
+                assert!(bright(&vec![power; count]).is_empty(), "{count} of {power}");
+            }
+            let powers: Vec<f64> = (0..count).map(|i| 1.0 + 0.5 * (i as f64).sin()).collect();
+            assert!(bright(&powers).is_empty(), "{count}");
+        }
+        assert!(bright(&[0.0; 20]).is_empty());
+    }
+
+    #[test]
+    fn a_few_strong_lights_among_weak_ones_are_bright() {
+        for count in [MIN_LIGHTS, 64, 1000] {
+            for weak in [1e-30, 1e-6, 1e-3] {
+                let mut powers = vec![weak; count];
+                powers[5] = 0.7;
+                assert_eq!(bright(&powers), [5], "{count} of {weak}");
+                powers[count - 1] = 0.9;
+                assert_eq!(bright(&powers), [count - 1, 5], "{count} of {weak}");
+            }
+        }
+        // Powers in different channels are compared by their sizes.
+        let mut powers = vec![DVec3::X * 1e-3; 64];
+        powers[7] = DVec3::Z;
+        assert_eq!(bright_lights(&powers, sets(64)), [7]);
+    }
+
+    #[test]
+    fn few_of_very_different_lights_are_bright() {
+        for count in [MIN_LIGHTS, 64, 1000] {
+            for ratio in [0.5_f64, 0.9, 0.99] {
+                let powers: Vec<f64> = (0..count).map(|i| ratio.powi(i as i32)).collect();
+                let bright = bright(&powers).len();
+                assert!(bright <= MAX_BRIGHT, "{bright} of {count}, ratio {ratio}");
+            }
+        }
+    }
 }

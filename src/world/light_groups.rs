@@ -8,7 +8,7 @@ use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
 use crate::material::Material;
 use crate::scene::{Object, Scene};
 use crate::value::Color;
-use crate::world::light_choice::MIN_LIGHTS;
+use crate::world::light_choice::ManyLights;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
@@ -74,13 +74,15 @@ pub struct LightGroups {
     pub(super) lit: bool,
     /// `true` if some surface reflects ambient light.
     pub(super) ambient: bool,
+    /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
+    pub(super) many: ManyLights,
 }
 
 impl LightGroups {
     /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
     /// materials share one group. Otherwise each has a group of its own, with two exceptions that
-    /// share the last group: the point lights of a scene with `MIN_LIGHTS` or more of them, and the
-    /// lights and materials beyond the largest number of groups.
+    /// share the last group: the lights of a kind (point or spot) of which the scene has many (see
+    /// `ManyLights`), and the lights and materials beyond the largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -95,12 +97,11 @@ impl LightGroups {
         }
         let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
         emitting.retain(|i| contributes(&scene.lights[*i], lit));
-        let is_point = |i: &usize| scene.lights[*i].point.is_some();
         // Many point lights share one group, because separate sums for seven of them would take a
-        // quarter of the rendering time.
-        let is_shared = emitting.iter().filter(|i| is_point(i)).count() >= MIN_LIGHTS;
+        // quarter of the rendering time. So do many spot lights.
+        let many = ManyLights::new(emitting.iter().map(|i| &scene.lights[*i]));
         let (shared, separate): (Vec<_>, Vec<_>) =
-            emitting.into_iter().partition(|i| is_shared && is_point(i));
+            emitting.into_iter().partition(|i| many.includes(&scene.lights[*i]));
         let [mut shared, mut separate] = [shared, separate]
             .map(|lights| lights.into_iter().map(LightGroupSource::Light).collect::<Vec<_>>());
         separate.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
@@ -121,7 +122,7 @@ impl LightGroups {
             // The film needs at least one group, even for a black picture.
             members.push(LightGroupSource::Background);
         }
-        Self { members, lit, ambient }
+        Self { members, lit, ambient, many }
     }
 
     /// Returns the number of light groups that would remain if all lights and emissive materials
@@ -294,6 +295,7 @@ pub(super) fn contributes(light: &Light, lit: bool) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::light_choice::MIN_LIGHTS;
 
     const LIGHTS: &str = "
         [ambient]
@@ -451,6 +453,26 @@ mod tests {
 
         let shared = LightGroupSource::Shared(lights(0..MIN_LIGHTS));
         assert_eq!(members(MIN_LIGHTS), [LightGroupSource::Light(MIN_LIGHTS), lamp, shared]);
+    }
+
+    #[test]
+    fn many_spot_lights_share_a_group() {
+        let point = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let spot = "[[light]]\nspot = { position = [0.0, 3.0, 0.0], direction = [0.0, -1.0, 0.0], \
+                    inner_angle = 20.0, outer_angle = 100.0 }\n";
+        let members = |points: usize, spots: usize| {
+            let scene = scene(&(point.repeat(points) + &spot.repeat(spots) + GLOWING));
+            LightGroups::new(&scene, (true, false), false).members
+        };
+        let lights = |range: std::ops::Range<usize>| {
+            LightGroupSource::Shared(range.map(LightGroupSource::Light).collect())
+        };
+        let lamp = LightGroupSource::Material("lamp".to_string());
+        let single = LightGroupSource::Light;
+        let many = MIN_LIGHTS;
+        assert_eq!(members(1, many), [single(0), lamp.clone(), lights(1..many + 1)]);
+        assert_eq!(members(many, 1), [single(many), lamp.clone(), lights(0..many)]);
+        assert_eq!(members(many, many), [lamp, lights(0..2 * many)]);
     }
 
     #[test]

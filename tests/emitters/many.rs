@@ -4,10 +4,13 @@
 use crate::common::Numbers;
 use crate::common::normal::two_sided_z;
 use crate::emitters::setup::{array, check, mean_and_error, radiance, samples, scene};
+use crate::support::{begin, pool, settings, trace};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, Single};
+use zerkalo::render::schedule::{Step, Stop, StoppedBy};
 use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
 
 /// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;
@@ -25,10 +28,12 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
 /// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit
 /// intensity. Every third light has no falloff.
 fn receiver(lights: &[DVec3]) -> Scene {
-    scene(&receiver_text(lights))
+    scene(&receiver_text(lights, |_| 1.0))
 }
 
-fn receiver_text(lights: &[DVec3]) -> String {
+/// Returns the text of the scene of [`receiver`], in which light `i` has the intensity
+/// `intensity(i)`.
+fn receiver_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
     let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
          view_angle.vertical = 0.1\n\
@@ -39,8 +44,9 @@ fn receiver_text(lights: &[DVec3]) -> String {
     for (i, position) in lights.iter().enumerate() {
         let falloff = if i.is_multiple_of(3) { "none" } else { "inverse-square" };
         text += &format!(
-            "[[light]]\npoint = {{ position = {} }}\nfalloff = \"{falloff}\"\n",
-            array(*position)
+            "[[light]]\npoint = {{ position = {} }}\nfalloff = \"{falloff}\"\nintensity = {:?}\n",
+            array(*position),
+            intensity(i)
         );
     }
     text
@@ -64,6 +70,135 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
     check(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
+/// Checks lights of very different intensities: the brightest are sampled by all paths, and each
+/// path samples a few of the others.
+#[test]
+fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
+    let mut numbers = Numbers::new(31);
+    let mut cases = Vec::new();
+    for count in [CHOSEN, 33, 64, 1000] {
+        for bright in [1, 3, 9] {
+            let lights = positions(count, &mut numbers);
+            let intensity = |i: usize| match i % (count / bright) == 1 {
+                true => 40.0,
+                false => 0.002 * (1 + i % 50) as f64,
+            };
+            let light = |(i, position): (usize, &DVec3)| intensity(i) * expected(i, *position);
+            let sum = lights.iter().enumerate().map(light).sum();
+            let scene = scene(&receiver_text(&lights, intensity));
+            cases.push((format!("{count} lights, {bright} of them bright"), scene, sum));
+        }
+    }
+    check(&cases, 1 << 15, [1e-4, 1e-9]);
+}
+
+/// Returns the text of a spot light at `position` with the axis `axis`, and the radiance of the
+/// receiver that it causes. The cone has a soft edge from 20 to 80 degrees.
+fn spot(position: DVec3, axis: DVec3) -> (String, f64) {
+    let [inner, outer] = [20.0_f64, 80.0];
+    let text = format!(
+        "[[light]]\nspot = {{ position = {}, direction = {}, inner_angle = {inner:?}, \
+         outer_angle = {outer:?} }}\nfalloff = \"inverse-square\"\n",
+        array(position),
+        array(axis)
+    );
+    let [low, high] = [outer, inner].map(|angle| angle.to_radians().cos());
+    let cosine = axis.dot(-position) / (axis.length() * position.length());
+    let t = ((cosine - low) / (high - low)).clamp(0.0, 1.0);
+    (text, t * t * (3.0 - 2.0 * t) * expected(1, position))
+}
+
+/// Checks scenes of spot lights, and of spot and point lights together. Each path samples only a
+/// few of them. About half of the spots do not light the receiver.
+#[test]
+fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
+    let mut numbers = Numbers::new(47);
+    let mut cases = Vec::new();
+    for (points, spots) in [(0, 20), (0, 33), (0, 600), (CHOSEN, 20), (3, 64), (100, 29)] {
+        let points = positions(points, &mut numbers);
+        let mut text = receiver_text(&points, |_| 1.0);
+        let mut sum: f64 = points.iter().enumerate().map(|(i, light)| expected(i, *light)).sum();
+        for position in positions(spots, &mut numbers) {
+            let axis = numbers.in_cube(1.0) - position.normalize();
+            let (spot, radiance) = spot(position, axis);
+            text += &spot;
+            sum += radiance;
+        }
+        cases.push((format!("{} points, {spots} spots", points.len()), scene(&text), sum));
+    }
+    check(&cases, 1 << 16, [2e-4, 1e-9]);
+}
+
+/// Checks that each path samples all spots unless their cones have together the solid angle of
+/// [`CHOSEN`] hemispheres, even if it samples only a few of the points. The spots then have light
+/// groups of their own, without noise.
+#[test]
+fn few_spots_among_many_points_are_all_asked() {
+    let lights = positions(CHOSEN, &mut Numbers::new(3));
+    // A cone of 80 degrees has 0.826 times the solid angle of a hemisphere.
+    for (spots, is_chosen) in [(19, false), (20, true)] {
+        let mut text = receiver_text(&lights, |_| 1e-30);
+        for position in positions(spots, &mut Numbers::new(4)) {
+            text += &spot(position, -position).0;
+        }
+        let (_, error) = radiance::<Double>(&scene(&text), 64, 1);
+        assert_eq!(error > 1e-6, is_chosen, "{spots} spots: {error}");
+    }
+}
+
+/// Returns the mean number of samples per pixel with which the picture of a room with a ball has
+/// an RMSE of half an 8-bit level. `lights` are the intensities of its lights.
+fn samples_to_half_a_level(lights: &[f64]) -> f64 {
+    let mut numbers = Numbers::new(5);
+    let mut text = "[film]\nsize = [96, 72]\n\
+         [camera]\neye = [0.0, 3.0, 7.0]\ntarget = [0.0, 0.5, 0.0]\nview_angle.vertical = 40.0\n\
+         [materials.white]\ncolor = [0.8, 0.8, 0.8]\n\
+         [[object]]\nmaterial = \"white\"\n\
+         shape.platform = { center = [0.0, 0.0, 0.0], size = [10.0, 10.0] }\n\
+         [[object]]\nmaterial = \"white\"\n\
+         shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }\n"
+        .to_string();
+    for (i, intensity) in lights.iter().enumerate() {
+        let position = match i {
+            0 => DVec3::new(2.0, 4.0, 3.0),
+            _ => numbers.in_cube(4.0) * DVec3::new(1.0, 0.25, 1.0) + 3.0 * DVec3::Y,
+        };
+        let position = array(position);
+        text += &format!("[[light]]\npoint = {{ position = {position} }}\nfalloff = \"none\"\n");
+        text += &format!("intensity = {intensity:?}\n");
+    }
+    let mut rendering = begin(&scene(&text), 4, Precision::Auto);
+    let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+    let mut schedule = rendering.schedule(settings(true, 0, stop));
+    let pool = pool(2);
+    loop {
+        match schedule.next(0.0) {
+            Step::Finished(reason) => {
+                assert_eq!(reason, StoppedBy::Noise);
+                return schedule.spp().mean;
+            }
+            Step::Trace(wave) => {
+                let report = trace(&mut rendering, &wave, &pool);
+                schedule.complete(&wave, &report);
+            }
+        }
+    }
+}
+
+/// Checks that weak lights beside a strong one do not multiply the number of samples. Without
+/// bright lights, which all paths sample, 64 lights would take ten times and 1000 lights a hundred
+/// times as many samples as one.
+#[test]
+fn weak_lights_hardly_change_the_number_of_samples() {
+    let one = samples_to_half_a_level(&[0.7]);
+    for (count, limit) in [(CHOSEN, 2.0), (64, 2.0), (1000, 2.0)] {
+        let mut lights = vec![1e-6; count];
+        lights[0] = 0.7;
+        let many = samples_to_half_a_level(&lights);
+        assert!(many <= limit * one, "{count} lights: {many} samples, one light: {one}");
+    }
+}
+
 /// Checks many point lights of which each path samples only a few. The lights share one light
 /// group, whose mean radiance is right. A spot light beside them has a group of its own.
 #[test]
@@ -71,7 +206,7 @@ fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
     let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
                 inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
-    let scene = scene(&(receiver_text(&lights) + spot));
+    let scene = scene(&(receiver_text(&lights, |_| 1.0) + spot));
     let count = 1 << 16;
     let mut sums: Vec<(f64, f64)> = Vec::new();
     samples::<Single>(&scene, count, 5, |groups| {

@@ -42,6 +42,10 @@ pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
         if !SIMPLE && world.smooth {
             lit = lit & interaction.geometric.dot(wi).gt(L::zero());
         }
+        let cone = lights.cone(stratum, wi);
+        if let Some(factor) = cone {
+            lit = lit & factor.gt(L::zero());
+        }
         if lit.none() {
             continue;
         }
@@ -66,6 +70,9 @@ pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
         }
         let mut value = path.throughput.component_mul(value);
         value = value * lights.irradiance(stratum, inverse);
+        if let Some(factor) = cone {
+            value = value * factor;
+        }
         if let Some(left) = media.and_then(|media| media.transmittance(distance)) {
             value = value.component_mul(left);
         }
