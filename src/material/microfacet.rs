@@ -1,10 +1,10 @@
 //! Microfacet distributions, Beckmann and GGX, and their masking by V-cavities or by Smith's model.
-//! The formulas of the density D and the sampling of visible normals are in `sampling/warp.rs`.
+//! The maps from the unit square to visible normals are in `sampling/warp.rs`.
 
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::Masking;
 use crate::sampling::warp;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_PI, PI};
 
 /// Smallest alpha of a microfacet distribution. A reflection lobe of smaller alpha is treated as a
 /// mirror. Highlights of smaller alpha are computed with this value.
@@ -117,9 +117,9 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
     fn density(&self, tan2: L) -> L {
         let inverse_alpha2 = L::splat(self.inverse_alpha2);
         if self.ggx {
-            warp::ggx_d(tan2, inverse_alpha2)
+            ggx_d(tan2, inverse_alpha2)
         } else {
-            warp::beckmann_d(tan2, inverse_alpha2)
+            beckmann_d(tan2, inverse_alpha2)
         }
     }
 
@@ -189,4 +189,23 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
         beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(grazing)
     }
+}
+
+/// Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
+/// `tan2` is the squared tangent of the angle to the surface normal, with 1 / cos^2 = 1 + tan2.
+/// `inverse_alpha2` is 1 / alpha^2.
+#[inline(always)]
+fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
+    let secant2 = tan2 + L::one();
+    (-(tan2 * inverse_alpha2)).exp()
+        * (secant2 * secant2)
+        * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
+}
+
+/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2), with the parameters of
+/// [`beckmann_d`].
+#[inline(always)]
+fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
+    let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
+    ratio * ratio * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }

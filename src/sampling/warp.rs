@@ -377,25 +377,6 @@ pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -
     Vec3::new(x * alpha, y * alpha, chord * cos_a).normalize()
 }
 
-/// Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
-/// `tan2` is the squared tangent of the angle to the surface normal, with 1 / cos^2 = 1 + tan2.
-/// `inverse_alpha2` is 1 / alpha^2.
-#[inline(always)]
-pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
-    let secant2 = tan2 + L::one();
-    (-(tan2 * inverse_alpha2)).exp()
-        * (secant2 * secant2)
-        * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
-}
-
-/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2), with the parameters of
-/// [`beckmann_d`].
-#[inline(always)]
-pub fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
-    let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
-    ratio * ratio * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

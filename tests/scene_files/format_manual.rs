@@ -51,15 +51,21 @@ and every key with a default may be left out. Unknown keys are errors.
   of a common face, such as a box in the corner of a larger one, the transparent one lies outside the
   opaque one, and of transparent ones the one listed last. An open transparent surface on an opaque
   one is in front of it on either side; of two, the one listed last. Which of two coincident opaque
-  surfaces is visible depends on rounding, but not on `acceleration`, number of threads or SIMD
-  width. To decide it, move one of them by a thousandth of its size, or make one compound of both,
-  which shows the part listed first. From outside, contact of two opaque solids is hidden; an eye inside
-  of one of them sees it. In the same way rounding decides on which side an eye is that lies exactly on
-  a surface.
+  surfaces is visible, unless one of them is flat and emits light, depends on rounding, but not on
+  `acceleration`, number of threads or SIMD width. To decide it, move one of them by a thousandth of its
+  size, or make one compound of both, which shows the part listed first. From outside, contact of two
+  opaque solids is hidden; an eye inside of one of them sees it. In the same way rounding decides on
+  which side an eye is that lies exactly on a surface.
 - A light on a surface, within rounding, acts as a light at a vanishing distance from it, on the side
   of the lit point. So a light on the ceiling lights all of the room; the surface itself stays dark.
   A solid occludes what is behind it. An open surface (plane, platform, rectangle) has no inside, so
   that a light on it lights both sides: to light one, move the light off it.
+- A flat object with `emission` (rectangle, platform, plane, flat mesh) on an opaque surface without
+  emission, within rounding, acts as one at a vanishing distance from it: it is visible and hides that
+  surface. If its material has `two_sided = false`, it is in front of the surface on the side that emits.
+  Otherwise it is outside of a solid, or inside if the eye is inside of the solid. On an open surface,
+  which has no inside, it is on the side of the eye, and the surface hides it from the other side: to
+  light both, use two objects.
 - A sphere, rectangle or disk light is a radiating surface without a body: rays pass through it, it
   casts no shadow, and it vanishes when it is switched off. An object behind or inside it is its
   housing; on an object's surface it shines outwards. Camera and reflected rays see it unless `visible
@@ -74,7 +80,8 @@ and every key with a default may be left out. Unknown keys are errors.
   sides of a flat object emit, and the inside of a solid; otherwise the front alone. The materials have
   light groups as lights have: `emission` and `emission_color` of a scene in progress change without
   new samples, to 0 and back. Beyond eight lights and emissive materials the last ones share a group.
-  Sixteen point lights or more share one group.
+  Sixteen point lights or more share one group. Spots do if their cones have together the solid angle
+  of 16 hemispheres or more.
 - Matt surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
   boxes, cubes, prisms, pyramids and meshes of up to 65536 triangles from points sampled on them, as
   that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,
