@@ -46,16 +46,16 @@ impl BinaryNode {
     }
 }
 
-/// Returns the index of the sibling of the node with index `node`, which is not the root. Siblings
-/// are neighbours in the list of nodes. The first of them has an odd index, because the root has
-/// index 0.
+/// Returns the index of the sibling of the node with index `node`, which must not be the root.
+/// Siblings are neighbours in the list of nodes. The first of them has an odd index, because the
+/// root has index 0.
 pub fn sibling(node: usize) -> usize {
     ((node - 1) ^ 1) + 1
 }
 
 /// Binary bounding volume hierarchy.
 pub struct BinaryBvh {
-    /// Nodes of the tree. The first one is the root. The nodes near the root have the next indices.
+    /// Nodes of the tree. The root is the first node; the nodes near the root follow it.
     pub nodes: Vec<BinaryNode>,
     /// Indices of the primitives, sorted by leaf.
     pub order: Vec<u32>,
@@ -76,9 +76,9 @@ impl BinaryBvh {
         order
     }
 
-    /// Merges the leaves of subtrees with at most `in_leaf` primitives wherever this does not
-    /// increase the cost by the surface area heuristic. `traversal_cost` is the cost of a node
-    /// visit, divided by the cost of a primitive's intersection test.
+    /// Merges the leaves of each subtree with at most `in_leaf` primitives into one leaf, unless
+    /// this increases the cost of the tree by the surface area heuristic. `traversal_cost` is the
+    /// cost of a node visit, divided by the cost of a primitive's intersection test.
     pub fn merge_leaves(&mut self, in_leaf: u32, traversal_cost: f32) {
         let mut counts = vec![0; self.nodes.len()];
         let mut costs = vec![0.0; self.nodes.len()];

@@ -57,7 +57,7 @@ pub struct Bvh8 {
 /// Effort of a BVH build. A higher effort takes longer and gives a tree with faster traversal.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Window in which the bottom-up clustering of the build searches for the nearest node.
+    /// Window in which the bottom-up clustering searches for the nearest node of each node.
     pub window: SearchWindow,
     /// Share of the binary BVH's nodes, 0 to 1, that reinsertion may move before small leaves are
     /// merged.
@@ -71,16 +71,16 @@ pub struct BuildQuality {
 }
 
 impl BuildQuality {
-    /// Build settings for a BVH of a million primitives or more. The build takes less time and the
-    /// ray queries take more time than with [`BuildQuality::MEDIUM`].
+    /// Build settings for a BVH of a million primitives or more. Compared with
+    /// [`BuildQuality::MEDIUM`], the build takes less time and the ray queries take more time.
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
         second_reinsertion: 0.0,
         traversal_cost: 3.0,
     };
-    /// Build settings for primitives whose intersection tests take much time. The build takes more
-    /// time and the ray queries take less time than with [`BuildQuality::FAST`].
+    /// Build settings for primitives whose intersection tests take much time. Compared with
+    /// [`BuildQuality::FAST`], the build takes more time and the ray queries take less time.
     pub const MEDIUM: Self = Self {
         window: SearchWindow { narrow_passes: 3, distance: 14 },
         reinsertion: 0.05,

@@ -37,9 +37,9 @@ pub struct SearchWindow {
 /// node, and the index of the nearest node.
 type Nearest = (f32, u32);
 
-/// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one, by
-/// clustering. Each leaf has one primitive. `window` limits the search for the nearest node. Also
-/// returns the number of passes.
+/// Builds a binary BVH by clustering, and returns it with the number of clustering passes. `bounds`
+/// are the bounding boxes of the primitives, at least one. Each leaf has one primitive. `window`
+/// limits the search for the nearest node.
 pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> (BinaryBvh, usize) {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);

@@ -33,7 +33,7 @@ impl<L: SimdFloat> SlabPacket<L> {
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
-    /// Returns the mask of rays that enter child box `i` of `node` at a distance of at most
+    /// Returns the mask of rays that enter the box of child `i` of `node` at a distance of at most
     /// `limit`.
     #[inline(always)]
     fn enters_child(&self, node: &Bvh8Node, i: usize, limit: L) -> L::Mask {
@@ -160,9 +160,9 @@ pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children. The number at
-/// position `part * WIDTH` is loaded into the first lane. If `WIDTH` is greater than 8, the numbers
-/// are repeated from the start.
+/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children, one for each child.
+/// The number at position `part * WIDTH` is loaded into the first lane. If `WIDTH` is greater than
+/// 8, the numbers are repeated from the start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))

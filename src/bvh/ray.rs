@@ -53,8 +53,8 @@ impl<L: SimdFloat> Hit<L> {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces the distance, the primitive id and the triangle id in the lanes of the mask
-    /// `lanes`.
+    /// Replaces the distance, the primitive id and the triangle id of the hits in the lanes of the
+    /// mask `lanes`.
     #[inline(always)]
     pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);

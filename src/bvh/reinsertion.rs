@@ -56,8 +56,8 @@ impl<'a> LinkedTree<'a> {
         }
     }
 
-    /// Moves the subtree `from`, which becomes the sibling of the node `to`. The node `to` is
-    /// neither in the subtree nor its sibling or parent.
+    /// Moves the subtree `from`, which becomes the sibling of the node `to`. The node `to` must be
+    /// neither in the subtree nor its present sibling or parent.
     fn reinsert(&mut self, from: usize, to: usize) {
         let (free, parent) = (sibling(from), self.parents[from] as usize);
         // The sibling takes the place of the parent, and `to` the former place of the sibling. The
@@ -138,8 +138,8 @@ impl Search {
         self.visits_left > 0
     }
 
-    /// Returns the best move of the subtree `node`, which is not the root. Returns `None` if no
-    /// move saves surface area, or if the limit of node visits is reached.
+    /// Returns the best move of the subtree `node`, which must not be the root. Returns `None` if
+    /// no move saves surface area, or if the limit of node visits is reached.
     fn best_reinsertion(&mut self, tree: &LinkedTree, node: usize) -> Option<Reinsertion> {
         let nodes = &*tree.nodes;
         let area = |aabb: &Aabb| aabb.half_area();

@@ -203,7 +203,8 @@ pub trait SimdFloat:
     fn splat(x: Self::Scalar) -> Self;
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
-    /// Returns `table[indices[i]]` in each lane `i`. Each index is less than the length of `table`.
+    /// Returns `table[indices[i]]` in each lane `i`. Each index must be less than the length of
+    /// `table`.
     fn gather(table: &[Self::Scalar], indices: &[u32; MAX_WIDTH]) -> Self;
     /// Returns the number in lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
@@ -238,7 +239,7 @@ pub trait SimdFloat:
     fn abs(self) -> Self;
     /// Returns the square root of each lane; NaN for negative numbers.
     fn sqrt(self) -> Self;
-    /// Returns the sine and the cosine of each lane, an angle in radians.
+    /// Returns the sine and the cosine of the angle in each lane, in radians.
     fn sin_cos(self) -> (Self, Self);
     /// Returns the angle of the point (`x`, `self`) from the x axis in each lane, in radians from
     /// -pi to pi.
@@ -289,11 +290,11 @@ pub trait SimdFloat:
     fn to_unit(bits: Self::SimdU32) -> Self;
 
     /// Returns the sum of `round(lane * scale)` over all lanes. Each lane is rounded separately, so
-    /// that the sum is the same for every number of lanes in a vector. `scale` is a power of two,
-    /// and `|lane * scale|` is at most 2^49.
+    /// that the sum is the same for every number of lanes in a vector. `scale` must be a power of
+    /// two, and `|lane * scale|` at most 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
     /// Returns `round(lane * scale)` of each lane as an integer; array elements beyond the last
-    /// lane are zero. `|lane * scale|` is at most 2^49.
+    /// lane are zero. `|lane * scale|` must be at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
@@ -314,7 +315,7 @@ pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mas
 /// of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Rounds `x` to the nearest integer, ties to even. `|x|` is below 2^51.
+/// Rounds `x` to the nearest integer, ties to even. `|x|` must be below 2^51.
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
     ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)

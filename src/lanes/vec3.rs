@@ -51,7 +51,7 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
     }
-    /// Returns the dot product, lane by lane.
+    /// Returns the dot product with `other`, lane by lane.
     #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))

@@ -48,7 +48,8 @@ pub struct SpotCone<S> {
     pub axis: [S; 3],
     /// Value of s = 1 - cos(angle to the axis) at the outer cone.
     pub outer: S,
-    /// 1 / (s_outer - s_inner), at most `SHARP`, where s = 1 - cos(angle to the axis).
+    /// Reciprocal width of the cone's soft edge: 1 / (s_outer - s_inner), at most `SHARP`, where s
+    /// = 1 - cos(angle to the axis).
     pub scale: S,
 }
 
@@ -57,7 +58,8 @@ pub struct SpotCone<S> {
 const ALL_DIRECTIONS: f64 = 3.0;
 
 impl<S: Float> SpotCone<S> {
-    /// Returns the cone of a light that emits equally in all directions. Its factor is exactly 1.
+    /// Returns the cone of a light that emits equally in all directions. The cone's factor of the
+    /// intensity is exactly 1.
     pub fn of_all_directions() -> Self {
         let axis = [0.0, 1.0, 0.0].map(S::from_f64);
         Self { axis, outer: S::from_f64(ALL_DIRECTIONS), scale: S::from_f64(SHARP) }

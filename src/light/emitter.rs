@@ -32,8 +32,8 @@ enum Surface<S> {
 }
 
 /// Emitter: a light of finite size, compiled for the kernels. It emits white light of intensity 1.
-/// Colour and intensity are applied later, by the weights of its light group (lights with sums of
-/// their own in the film).
+/// Colour and intensity are applied later, by the weights of its light group (the lights that share
+/// sums in the film).
 #[derive(Clone, Copy, Debug)]
 pub struct Emitter<S> {
     surface: Surface<S>,
@@ -123,7 +123,7 @@ impl<S: Float> Emitter<S> {
     }
 
     /// Returns the distance at which each ray hits the side that emits light; the largest finite
-    /// number for rays that miss it. `direction` is a unit vector.
+    /// number for rays that miss it. `direction` must be of unit length.
     #[inline(always)]
     pub fn hit<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, direction: Vec3<L>) -> L {
         let to_center = Vec3::splat(self.center) - origin;
@@ -275,10 +275,11 @@ fn plane_hit<L: SimdFloat>(
     (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])
 }
 
-/// Returns the density \[1/sr\] of directions to uniform points of a flat surface at `distance`:
-/// distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the surface along
-/// its normal, relative to the receiver. It is negative if the receiver is in front of the surface.
-/// Otherwise the density is zero.
+/// Returns the density \[1/sr\] of the directions to a flat surface on which points are sampled
+/// uniformly: distance^2 / (area cos(angle to the normal)). `distance` is the distance of the
+/// surface in the sampled direction. `height` is the coordinate of the surface along its normal,
+/// relative to the receiver. It is negative if the receiver is in front of the surface. Otherwise
+/// the density is zero.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);

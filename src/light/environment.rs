@@ -67,7 +67,7 @@ impl Environment {
         self.file().and_then(|_| self.map.fault())
     }
 
-    /// Returns an image of the gradient. It has one column, because the radiance depends on the
+    /// Returns an image of the gradient, with a single column, because the radiance depends on the
     /// elevation alone.
     fn gradient(&self) -> RadianceMap {
         let row = |row: u32| {

@@ -562,7 +562,7 @@ mod tests {
         halves.collect()
     }
 
-    /// Returns the points from which the tests sample the surfaces of [`surfaces`].
+    /// Returns the receiver points for which the tests sample the surfaces of [`surfaces`].
     fn points() -> Vec<DVec3> {
         let points = [[0.1, 0.2, 1.5], [0.3, -0.1, -0.8], [2.0, 0.1, 0.2], [0.25, 0.2, 0.05]];
         [points.map(DVec3::from).into(), vec![DVec3::new(40.0, 30.0, 20.0)]].concat()

@@ -67,7 +67,8 @@ pub struct Transmission<S> {
     pub index: S,
     /// Absorption coefficients [1 / scene unit] inside of the solid; 0 absorbs nothing.
     pub absorption: [S; 3],
-    /// Distribution of the transmitted rays about the refracted direction; `Mirror` is clear glass.
+    /// Distribution of the transmitted rays about the refracted direction. With `Mirror`, all of
+    /// them have the refracted direction, as in clear glass.
     pub lobe: ReflectionLobe<S>,
     /// `true` if Fresnel's equations split the light between reflection and transmission; `false`
     /// if k_r and k_t alone are the weights.
@@ -83,17 +84,17 @@ pub struct Bsdf<S> {
     pub diffuse: [S; 3],
     /// Model of highlights, which are the reflections of lights in the surface.
     pub specular: SpecularModel<S>,
-    /// Reflection coefficient k_r and the distribution of reflected rays; `None` if nothing is
-    /// reflected.
+    /// Reflection coefficient k_r, and the distribution of reflected rays; `None` if the material
+    /// reflects no rays.
     pub reflection: Option<(S, ReflectionLobe<S>)>,
     /// Transmission through the surface; `None` if the material is opaque.
     pub transmission: Option<Transmission<S>>,
-    /// Fresnel reflectance of the microfacets in a highlight. The Phong model of highlights ignores
-    /// it.
+    /// Fresnel reflectance of the microfacets in a highlight. Highlights by Phong's model do not
+    /// use it.
     pub highlight_fresnel: Reflectance<S>,
     /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
     /// reflectance is computed at each intersection because it depends on the medium on the other
-    /// side.
+    /// side of the surface.
     pub reflection_fresnel: Reflectance<S>,
     /// `true` if the surface has a diffuse part or highlights, so that it reflects light that
     /// arrives directly from lights.
@@ -170,12 +171,13 @@ impl<S: Float> Bsdf<S> {
     }
 }
 
-/// Sampled direction of a reflected ray, and the factor of its radiance.
+/// Direction of a sampled reflected ray, and the factor by which its radiance is multiplied.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample<L> {
     /// Unit direction of the reflected ray.
     pub direction: Vec3<L>,
-    /// Factor of the radiance from `direction`; zero if nothing is reflected from there.
+    /// Factor by which the radiance from `direction` is multiplied; zero if nothing is reflected
+    /// from there.
     pub weight: Vec3<L>,
 }
 

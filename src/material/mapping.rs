@@ -47,17 +47,17 @@ const POINT_ROUNDINGS: f64 = 16.0;
 /// number 1.
 const ANGLE_ROUNDINGS: f64 = 64.0;
 
-/// Texture coordinates (u, v) of a point, and their gradients by position in texture space. One
-/// unit of u or v is one repetition of the image.
+/// Texture coordinates (u, v) of a point, and their gradients with respect to the position in
+/// texture space. One unit of u or v is one repetition of the image.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
     /// Texture coordinate u, which grows to the right in the image.
     pub u: L,
     /// Texture coordinate v, which grows upwards in the image.
     pub v: L,
-    /// Gradient of the texture coordinate u by position in texture space.
+    /// Gradient of the texture coordinate u with respect to the position in texture space.
     pub grad_u: Vec3<L>,
-    /// Gradient of the texture coordinate v by position in texture space.
+    /// Gradient of the texture coordinate v with respect to the position in texture space.
     pub grad_v: Vec3<L>,
 }
 

@@ -26,13 +26,13 @@ pub struct Interface<L: SimdFloat> {
 /// Weights of reflected and transmitted rays at the boundary of two media.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor of the radiance along the reflected ray, whose direction comes from the BSDF's
-    /// reflection lobe.
+    /// Factor by which the radiance along the reflected ray is multiplied. The ray's direction
+    /// comes from the BSDF's reflection lobe.
     pub reflected: L,
-    /// Factor of the radiance along the transmitted ray.
+    /// Factor by which the radiance along the transmitted ray is multiplied.
     pub transmitted: L,
-    /// Factor of the radiance along the mirror reflection that replaces the transmitted ray in
-    /// total internal reflection.
+    /// Factor by which the radiance along a mirror reflection is multiplied. This reflection
+    /// replaces the transmitted ray in total internal reflection.
     pub tir: L,
 }
 
@@ -64,7 +64,8 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// Returns two reflectances of the boundary: for s polarisation and for p polarisation.
+    /// Returns two values: the reflectance of the boundary for s polarisation, and that for p
+    /// polarisation.
     #[inline(always)]
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;

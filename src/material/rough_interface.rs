@@ -43,12 +43,11 @@ impl<L: SimdFloat> InterfaceMedia<L> {
 pub struct InterfaceSample<L> {
     /// Unit direction of the reflected ray.
     pub reflected: Vec3<L>,
-    /// Factor of the radiance that arrives along the reflected ray, from the direction `reflected`.
+    /// Factor by which the radiance that arrives from the direction `reflected` is multiplied.
     pub reflected_weight: Vec3<L>,
     /// Unit direction of the transmitted ray.
     pub transmitted: Vec3<L>,
-    /// Factor of the radiance that arrives along the transmitted ray, from the direction
-    /// `transmitted`.
+    /// Factor by which the radiance that arrives from the direction `transmitted` is multiplied.
     pub transmitted_weight: L,
 }
 

@@ -140,8 +140,8 @@ impl BumpMap {
         Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
     }
 
-    /// Returns two values: the derivatives of the bump map's height by u and by v, in scene units
-    /// per repetition, in the lanes whose bits are set in `bits`.
+    /// Returns two values: the derivatives of the bump map's height with respect to u and v, in
+    /// scene units per repetition, in the lanes whose bits are set in `bits`.
     ///
     /// Central differences of the heights at the pixels are interpolated bilinearly, so that the
     /// result is continuous. The exact derivatives of bilinearly interpolated heights would jump at

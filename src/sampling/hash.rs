@@ -34,8 +34,8 @@ pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// Computes the first part of [`owen`], which does not depend on the seed. Its result can be reused
-/// for equal points with different seeds.
+/// Computes the first part of [`owen`], which does not depend on the seed. The result can be reused
+/// for the same `x` with other seeds.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))

@@ -57,8 +57,8 @@ const MAX_JOINT_LOBES: u32 = 2;
 /// of its pixels, with k from 0 to log2 of the widest packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Random positions that the camera rays of a picture use: in the pixel, on the lens, or both. Each
-/// position takes two dimensions of a sample's Sobol point, starting with dimension 0.
+/// Flags for the random positions that the camera rays of a picture use: in the pixel and on the
+/// lens. Each position takes two dimensions of a sample's Sobol point, starting with dimension 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraDimensions {
     /// `true` if samples are distributed over the area of their pixel.
@@ -126,8 +126,8 @@ impl<L: SimdFloat> Sampler<L> {
     }
 
     /// Creates a block of samples: the Sobol points of the sample indices `first..first + count`,
-    /// for packets of `WIDTH / count` pixels. Lane i has index `first + i % count`. `count` is a
-    /// power of two, at most `WIDTH`, and `first` a multiple of it.
+    /// for packets of `WIDTH / count` pixels. Lane i has index `first + i % count`. `count` must be
+    /// a power of two, at most `WIDTH`, and `first` a multiple of `count`.
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
@@ -172,12 +172,12 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     }
 }
 
-/// Number of sampled directions for which each segment of a path has random numbers of its own. A
-/// segment has them for equally many choices between reflection and transmission. Diffuse bounces
-/// divide a path into segments.
+/// Largest number of sampled directions in a segment of a path, and largest number of its choices
+/// between reflection and transmission. Up to these numbers, each segment has random numbers of its
+/// own. Diffuse bounces divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
-/// First number of the random choices for reservoir sampling, which selects the hit at which a
+/// Number of the first random choice for reservoir sampling, which selects the hit at which a
 /// diffuse bounce starts. Smaller numbers belong to choices between reflection and transmission.
 const RESERVOIR: u32 = 1 << 31;
 
@@ -220,8 +220,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a random number in [0, 1) for candidate `number` of a reservoir. The reservoir
-    /// selects the hit at which the path continues with a diffuse bounce.
+    /// Returns a random number in [0, 1) for the candidate with the number `number` of a reservoir.
+    /// The reservoir selects the hit at which the path continues with a diffuse bounce.
     #[inline(always)]
     pub fn reservoir_1d(&self, number: u32) -> L {
         self.padded_choice(RESERVOIR + self.first_choice + number)
@@ -259,9 +259,9 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         self.pair_2d(bounce, hash_scalar(light + 1))
     }
 
-    /// Returns a random number in [0, 1) for the random choice of a point light at the surface that
-    /// a path hits after `bounce` reflections. It uses a dimension of [`Self::light_2d`] with a
-    /// scrambling of its own.
+    /// Returns a random number in [0, 1) for the choice of a set of point and spot lights, at the
+    /// surface that a path hits after `bounce` reflections. It uses a dimension of
+    /// [`Self::light_2d`] with a scrambling of its own.
     #[inline(always)]
     pub fn light_choice_1d(&self, bounce: u32) -> L {
         self.light_2d(bounce, u32::MAX - 1).0

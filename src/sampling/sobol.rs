@@ -22,8 +22,8 @@ use crate::sampling::hash::hash_scalar;
 pub const DIMENSIONS: usize = 8;
 
 /// First columns of the bit matrices `M_1`, `M_2` and `M_3`, which permute the indices of the Sobol
-/// points in dimensions 2 to 7. They were found by a search. Each number is a column; its bit r is
-/// row r.
+/// points in dimensions 2 to 7, one matrix for each pair of dimensions. They were found by a
+/// search. Each number is a column; its bit r is row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],

@@ -52,7 +52,7 @@ macro_rules! dispatch {
 }
 
 impl AnyWorld {
-    /// Compiles `scene`, which has no validation errors, with the given options.
+    /// Compiles `scene`, which must have no validation errors, with the given options.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
         let geometry = RecenteredGeometry::new(scene);
         let single = match options.precision {
@@ -128,8 +128,8 @@ impl AnyWorld {
         dispatch!(self, world => &world.inventory)
     }
 
-    /// Returns one sentence for each limit of the scene that ends paths early, such as `max_depth`.
-    /// Each sentence gives an upper bound of the light that is lost.
+    /// Returns one sentence for each setting of the scene that ends paths early, such as
+    /// `max_depth`. Each sentence gives an upper bound of the light that is lost.
     pub fn biases(&self) -> Vec<String> {
         dispatch!(self, world => world.truncation_biases.clone())
     }

@@ -63,8 +63,8 @@ mod tests {
         near(rectangle, [0.0, 0.0, 1.5], 0.5);
     }
 
-    /// Checks the clearance of stretched shapes (needles and sheets) against the distance to many
-    /// points on their surfaces.
+    /// Checks that the clearance of stretched shapes (needles and sheets) matches the smallest of
+    /// the distances to many points on their surfaces.
     #[test]
     fn clearance_of_stretched_shapes_matches_sampled_distance() {
         let shapes = [

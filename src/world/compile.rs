@@ -129,7 +129,7 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 
     /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
-    /// of the camera. Returns `None` if there are none.
+    /// of the camera. Returns `None` if no object is moved.
     fn move_emissive_sheets(
         &self,
         geometry: &RecenteredGeometry,
@@ -185,14 +185,14 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
 /// they can hit the emitter.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns the height of points on emissive objects above the surface, and the distance by which
-/// lights with a size are moved off the finite surfaces that they touch.
+/// Returns a distance that serves two purposes. Points are sampled at this height above emissive
+/// objects. Lights with a size are moved by this distance off the finite surfaces that they touch.
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Largest distance by which a light is moved if it is a sphere or if its centre is on no surface.
-/// The unit is its radius or shorter side.
+/// Largest distance by which a sphere light, or a light whose centre is on no surface, is moved off
+/// the surfaces that it touches. The unit is the light's radius or shorter side.
 const MAX_LIFT: f64 = 1e-4;
 
 /// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
@@ -399,7 +399,7 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Compiles `scene`, which has no validation errors.
+    /// Compiles `scene`, which must have no validation errors.
     pub fn new(scene: &Scene) -> Self {
         Self::compile(scene, &RecenteredGeometry::new(scene), false)
     }

@@ -3,12 +3,12 @@
 //!
 //! Rounding would decide which of two coincident surfaces a ray hits, and points sampled on the
 //! emissive sheet could be behind the opaque surface. Compilation therefore moves the sheet off the
-//! surface by a few rounding errors. The picture is the limit of a vanishing gap, both for rays that
-//! hit the sheet and for points sampled on it.
+//! surface by a few rounding errors. The picture is the limit of a vanishing gap, both for rays
+//! that hit the sheet and for points sampled on it.
 //!
-//! The sheet moves to the side on which it shows. A one-sided sheet moves to its front. A two-sided
-//! sheet on a solid moves outside, or inside if the eye is inside of the solid. A two-sided sheet on
-//! an open surface, which has no inside, moves to the side of the eye.
+//! The sheet moves to the side on which it is visible. A one-sided sheet moves to its front. A
+//! two-sided sheet on a solid moves outside, or inside if the eye is inside of the solid. A
+//! two-sided sheet on an open surface, which has no inside, moves to the side of the eye.
 
 use crate::bvh::Ray;
 use crate::lanes::{SimdFloat, Vec3};
@@ -21,21 +21,22 @@ use std::collections::HashMap;
 use std::slice;
 
 /// Distance between an emissive sheet and the surface off which it is moved. The unit is the height
-/// of sampled points above the sheet. Points sampled on both sides of the sheet are in front of the
-/// surface, by more than the distance up to which the surface would count as covering them.
+/// of sampled points above the sheet. At this distance the surface does not count as covering the
+/// points that are sampled on either side of the sheet (see [`CONTACT_LIFTS`]).
 const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
 
-/// Number of points along each side of a triangle at which contact is tested.
+/// Number of test points for contact along each side of a triangle.
 const POINTS_PER_SIDE: u32 = 12;
 
-/// Largest number of triangles of a form on which several points are tested for contact. On each
-/// triangle of a form with more triangles one point is tested.
+/// Largest number of triangles of a form for which contact is tested at several points of each
+/// triangle. In forms with more triangles, it is tested at one point of each.
 const MAX_DETAILED: usize = 12;
 
-/// Largest number of triangles of a mesh on which points are tested for contact.
+/// Largest number of triangles of a mesh that are tested for contact.
 const MAX_POINTS: usize = 1024;
 
-/// Smallest cosine of the angle between a sheet and a surface on which it lies.
+/// Smallest cosine of the angle between the normals of a sheet and of a surface on which it can
+/// lie.
 const MIN_COSINE: f64 = 0.999_999;
 
 /// Sides on which an object emits light.
@@ -46,9 +47,10 @@ pub(super) enum Emits {
     BothSides,
 }
 
-/// Moves emissive sheets off the opaque surfaces on which they lie. `emits` and `transmits` have an
-/// entry for each object. `eye` is the position of the camera. `lift` is the height of sampled
-/// points above emissive surfaces. Returns `None` if no sheet lies on a surface.
+/// Moves emissive sheets off the opaque surfaces on which they lie. For each object, `emits` holds
+/// the sides that emit light, and `transmits` is `true` if it transmits light. `eye` is the
+/// position of the camera. `lift` is the height of sampled points above emissive surfaces. Returns
+/// `None` if no sheet is moved.
 pub(super) fn move_off_surfaces(
     geometry: &RecenteredGeometry,
     (emits, transmits): (&[Emits], &[bool]),
@@ -152,14 +154,14 @@ impl Sheet {
 
 /// Contact of an emissive sheet with a surface on which it lies.
 struct Contact {
-    /// Side of the sheet on which it shows: 1 for the front, -1 for the back.
+    /// Side on which the sheet is visible: 1 for the front, -1 for the back.
     side: f64,
     /// Height of the sheet above the surface, along the normal of the sheet; negative if the sheet
     /// is below the surface.
     height: f64,
 }
 
-/// Objects of a scene, each compiled alone when it is needed.
+/// Objects of a scene. Each is compiled by itself, at its first use.
 struct CompiledObjects<'a> {
     forms: &'a [Form],
     aggregates: HashMap<usize, Aggregate<f64>>,
@@ -182,8 +184,9 @@ impl CompiledObjects<'_> {
         Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
     }
 
-    /// Finds the contact of a sheet, which is the object number `object`, with the object `carrier`.
-    /// Returns `None` if the sheet does not lie on it at any of the tested points.
+    /// Finds the contact of the emissive object number `object`, whose sheet is `sheet`, with the
+    /// object `carrier`. Returns `None` if the sheet does not lie on `carrier` at any of the tested
+    /// points.
     fn contact(
         &mut self,
         (object, sheet): (usize, &Sheet),
@@ -223,8 +226,8 @@ impl CompiledObjects<'_> {
     }
 }
 
-/// Returns `true` if `sheet` may lie on the form `carrier`, with a distance of up to `reach`: if the
-/// form may have a flat face in the plane of the sheet.
+/// Returns `true` if `sheet` may lie on the form `carrier`: if the form may have a flat face in the
+/// plane of the sheet. The two planes may be up to `reach` apart.
 fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
     let is_parallel = |normal: DVec3| normal.dot(sheet.plane.normal).abs() >= MIN_COSINE;
     // Angles below that of `MIN_COSINE` displace the edge of the sheet by 0.2 % of its radius.

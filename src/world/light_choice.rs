@@ -33,12 +33,13 @@ pub(super) const MIN_LIGHTS: usize = 16;
 /// path traces shadow rays at one surface.
 const MIN_SET: usize = 4;
 
-/// Weight of the variance that all lights have in common; see [`bright_lights`]. With a weight of
-/// 1, eight strong lights of 64 in the mirror room take 2.3 times as many rays.
+/// Weight of the part of the variance that all lights have in common, relative to the other parts;
+/// see [`bright_lights`]. With a weight of 1, the mirror room with eight strong lights out of 64
+/// needs 2.3 times as many rays as with this weight.
 const COMMON_VARIANCE: f64 = 0.25;
 
-/// Largest number of bright lights that every path asks although the scene has many lights; see
-/// [`bright_lights`].
+/// Largest number of bright lights; see [`bright_lights`]. Paths trace shadow rays to all bright
+/// lights at each surface, although they choose among the other lights.
 const MAX_BRIGHT: usize = 16;
 
 /// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
@@ -367,9 +368,9 @@ fn powers<'a, S: Float>(
     lights.map(power).collect()
 }
 
-/// Returns the indices of the bright lights: those that every path asks. The other lights are
-/// divided into `sets`, of which a path chooses one per surface. `powers` are the powers of all
-/// lights: red, green and blue.
+/// Returns the indices of the bright lights: those to which every path traces shadow rays at each
+/// surface. The other lights are divided into `sets`, of which a path chooses one per surface.
+/// `powers` are the powers of all lights: red, green and blue.
 ///
 /// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
 /// smallest product of variance and cost. The cost is the number of rays per surface: one that
@@ -377,10 +378,10 @@ fn powers<'a, S: Float>(
 /// parts. The first is common to all lights, because it depends on the place of the surface only:
 /// the squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
 /// powers of the bright lights. The third is that sum for the other lights, times the number of
-/// sets, because only one of so many samples asks a light of a set.
+/// sets, because a path reaches only one of the sets.
 ///
-/// Of lights with similar powers none is bright, because the squared sum outweighs the rest. Of a
-/// strong light and many weak ones the strong light is bright.
+/// If all lights have similar powers, none is bright, because the squared sum outweighs the rest.
+/// Among one strong light and many weak ones, the strong light is bright.
 fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
     let largest = powers.iter().map(|power| power.max_element()).fold(0.0, f64::max);
     if !(largest > 0.0 && largest.is_finite()) {

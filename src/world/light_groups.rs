@@ -209,9 +209,9 @@ impl LightGroups {
     }
 
     /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two. It is derived from the group's [`RadianceRange`]. `origin` is the
-    /// point in scene coordinates that becomes the origin of the compiled geometry. `emitter` compiles
-    /// a light with a size; it returns `None` for other lights.
+    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`]. `origin`
+    /// is the point in scene coordinates that becomes the origin of the compiled geometry.
+    /// `emitter` compiles a light with a size; it returns `None` for other lights.
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
@@ -280,7 +280,7 @@ pub(super) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
-/// Returns `true` if the light is on and not black.
+/// Returns `true` if the light is on and its emission is not black.
 pub(super) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }

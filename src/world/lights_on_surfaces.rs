@@ -11,8 +11,8 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Largest distance from a surface at which a point light is treated as on the surface. The unit is
-/// the rounding error of the largest coordinate.
+/// Largest distance from a surface at which a point light counts as located on the surface. The
+/// unit is the rounding error of the largest coordinate.
 const ON: f64 = 8.0;
 
 /// Height above a light's surface at which shadow rays to the light end, in rounding errors of the

@@ -1,6 +1,6 @@
 //! Block of pixels: values that are the same for all samples of a pixel, computed once per tile.
 //! They are the pixel's coordinates, the key of its random numbers, and the vector from the eye to
-//! its corner.
+//! its upper left corner.
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
@@ -20,8 +20,8 @@ pub(super) struct PixelBlock<S> {
     y: [u32; MAX_BLOCK_PIXELS],
     /// Key of each pixel's random numbers, see [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
-    /// Vectors from the eye to the pixels' corners on the plane at unit distance: the x coordinates
-    /// of all pixels, then y, then z.
+    /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: the x
+    /// coordinates of all pixels, then y, then z.
     corner_directions: [[S; MAX_BLOCK_PIXELS]; 3],
 }
 
@@ -74,16 +74,16 @@ impl<S: Float> PixelBlock<S> {
     }
 
     /// Returns two values for pixel `i`: the key of its random numbers, and the vector from the eye
-    /// to the pixel's corner. Both are the same in all lanes.
+    /// to the pixel's upper left corner. Both are the same in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
     /// Returns two values for each lane: the key of its pixel's random numbers, and the vector from
-    /// the eye to the pixel's corner. The lanes hold the `WIDTH / COUNT` pixels of the block from
-    /// `first` on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a
-    /// multiple of `WIDTH / COUNT`.
+    /// the eye to the pixel's upper left corner. The lanes hold the `WIDTH / COUNT` pixels of the
+    /// block from `first` on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` must be a power
+    /// of two, and `first` a multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,

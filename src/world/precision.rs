@@ -17,31 +17,31 @@ use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Largest ratio of scene extent to the thickness of an object in single precision. At this ratio
-/// the ray offset is 1/128 of the thickness.
+/// Limit of single precision: the largest permitted ratio of scene extent to the thickness of an
+/// object. At this ratio the ray offset is 1/128 of the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// Largest ratio of scene extent to the width of a gap between objects in single precision. At this
-/// ratio the gap is eight ray offsets wide.
+/// Limit of single precision: the largest permitted ratio of scene extent to the width of a gap
+/// between objects. At this ratio the gap is eight ray offsets wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// Largest ratio, in single precision, of scene extent to the side of a pixel's footprint on the
-/// object closest to the eye. At this ratio the side is 32 ray offsets.
+/// Limit of single precision: the largest permitted ratio of scene extent to the side of a pixel's
+/// footprint on the object closest to the eye. At this ratio the side is 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which the eye may be closer to flat objects than to curved ones in single precision.
+/// Factor by which flat objects may be closer to the eye than curved ones, for single precision.
 /// Flat objects have smaller errors: a hit point is moved back to the plane almost exactly, and the
 /// normal is constant.
 const FLAT: f64 = 8.0;
 
-/// Largest ratio of scene extent to the distance of a light from objects in single precision. At
-/// this ratio the ray offset is 1/512 of the distance, and the direction to the light is wrong by
-/// 1/512 radians.
+/// Limit of single precision: the largest permitted ratio of scene extent to the distance of a
+/// light from objects. At this ratio the ray offset is 1/512 of the distance, and the direction to
+/// the light is wrong by 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
-/// Smallest angle between the rays of neighbouring pixels \[radians\] in single precision: 64 times
-/// the rounding error of a direction. A lens with the radius r, focused at the distance d, raises
-/// this limit by the factor 1 + r / d.
+/// Limit of single precision: the smallest permitted angle between the rays of neighbouring pixels
+/// \[radians\], which is 64 times the rounding error of a direction. A lens with the radius r,
+/// focused at the distance d, raises this limit by the factor 1 + r / d.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
 /// Smallest width of a gap, as a fraction of the scene extent, at which two surfaces are separate:
@@ -49,8 +49,8 @@ const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 /// coordinates, are treated as coincident.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// Largest number of pairs of objects that are searched for gaps, to limit the time. Further pairs
-/// are treated as pairs without a gap.
+/// Largest number of pairs of objects that are searched for gaps, to limit the time of the search.
+/// Further pairs count as pairs without a gap.
 const MOST_PAIRS: usize = 1 << 20;
 
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.

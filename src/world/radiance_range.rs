@@ -189,8 +189,8 @@ pub(super) struct SceneDistances<'a> {
     faintest: f64,
     /// Largest factor by which all mirrors of a path together multiply light; at least 1.
     gain: f64,
-    /// Smallest distance between a light and the scene's centre for the typical irradiance. If the
-    /// light is nearer, its irradiance at this distance is typical.
+    /// Lower limit of the distance between a light and the scene's centre in the computation of the
+    /// typical radiance: a nearer light counts as if it were at this distance.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -248,7 +248,7 @@ impl<'a> SceneDistances<'a> {
     }
 
     /// Returns the smallest and the largest factors by which objects of the scene reflect direct
-    /// light; all are 1 if no object reflects any.
+    /// light; all factors are 1 if no object reflects direct light.
     fn response(&self) -> Response {
         let all = self.responses.iter().flatten().copied().reduce(Response::or);
         all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 })

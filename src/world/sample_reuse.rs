@@ -14,10 +14,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`: only the
-    /// weights of the light groups have to change. `self` are the light groups of `compiled`. The
-    /// scenes may differ in names, in unused materials, in the largest number of samples per pixel
-    /// of glossy tiles, and in the emission of sources that have a group of their own.
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`, so that only
+    /// the weights of the light groups have to change. `self` are the light groups of `compiled`.
+    /// The scenes may differ in names, in unused materials, in the largest number of samples per
+    /// pixel of glossy tiles, and in the emission of sources that have a group of their own.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,

@@ -51,7 +51,7 @@ pub(super) struct SurfaceEmission<S> {
     /// nothing.
     source_of: Vec<Option<u32>>,
     /// For each sampled object, the objects that touch it. An entry has two values: the id of the
-    /// touching object's first primitive, and `true` if that object is flat.
+    /// touching object's first primitive, and a flag that is `true` if that object is flat.
     touching: Vec<Vec<(u32, bool)>>,
     /// Height of points that are sampled on an emissive object above its surface.
     lift: S,
@@ -107,9 +107,10 @@ impl<S: Float> SurfaceEmission<S> {
         Self { sources, sampled, source_of, touching, lift: S::from_f64(lift) }
     }
 
-    /// Returns the lanes of `lanes` whose sampled points on emitter number `index` are behind the
-    /// surface of an object that touches the emitter. `ray` are the shadow rays to the points, and
-    /// `distance` is the distance of the points along them.
+    /// Returns those of `lanes` in which another object covers the point that was sampled on
+    /// emitter number `index`: the point is behind the surface of an object that touches the
+    /// emitter. `ray` are the shadow rays to the points, and `distance` is the distance of the
+    /// points along them.
     #[inline(always)]
     pub fn covered<L: SimdFloat<Scalar = S>>(
         &self,
@@ -231,8 +232,8 @@ fn touching_objects(
     objects.iter().map(|(form, ..)| touching.get(form).cloned().unwrap_or_default()).collect()
 }
 
-/// Returns the material of the object with the number `object`, which is no compound. Returns
-/// `None` if the scene does not define the material.
+/// Returns the material of the object with the number `object`, which must not be a compound.
+/// Returns `None` if the scene does not define the material.
 fn material_of(scene: &Scene, object: usize) -> Option<&Material> {
     scene.materials.get(&scene.objects[object].material)
 }

@@ -1,4 +1,4 @@
-//! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only by these
+//! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only from these
 //! functions.
 
 use crate::bvh::Ray;
@@ -26,10 +26,10 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     /// Creates the tracer of `pixels`. `replicate` is 0 for replicate A, 1 for replicate B; each
     /// has half of the samples. `pixels` has at most
     /// [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) pairs of column and row. All pixels
-    /// must be in the rectangle of the raster with corner `origin` and size `extent`, because
-    /// culling uses this rectangle. Returns `None` if all samples in the rectangle are black: no
-    /// camera ray can hit a primitive, no light with a size and no environment is visible, and the
-    /// background is black.
+    /// must be in the rectangle of the raster with the upper left corner `origin` and the size
+    /// `extent`, because culling uses this rectangle. Returns `None` if all samples in the
+    /// rectangle are black: no camera ray can hit a primitive, no light with a size and no
+    /// environment is visible, and the background is black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -74,7 +74,8 @@ pub struct TileTracer<'a, L: SimdFloat> {
 
 impl<L: SimdFloat> TileTracer<'_, L> {
     /// Traces the samples `first..first + WIDTH` of every pixel and passes the radiance of each
-    /// packet to `sink`. A packet holds samples of one pixel. `first` is a multiple of `WIDTH`.
+    /// packet to `sink`. A packet holds samples of one pixel. `first` must be a multiple of
+    /// `WIDTH`.
     #[inline(always)]
     pub fn radiance(
         &mut self,
@@ -97,8 +98,8 @@ impl<L: SimdFloat> TileTracer<'_, L> {
 
     /// Traces the samples `first..first + COUNT` of every pixel and passes the radiance of each
     /// packet to `sink`. A packet holds samples of `WIDTH / COUNT` pixels; its pixel `i` occupies
-    /// the `COUNT` lanes from `i * COUNT` on. `COUNT` is a power of two below `WIDTH`, and `first`
-    /// is a multiple of `COUNT`.
+    /// the `COUNT` lanes from `i * COUNT` on. `COUNT` must be a power of two below `WIDTH`, and
+    /// `first` a multiple of `COUNT`.
     #[inline(always)]
     pub fn radiance_shared<const COUNT: usize>(
         &mut self,
@@ -148,10 +149,10 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     }
 }
 
-/// Pixels and sample indices in the lanes of a traced packet.
+/// Traced packet: the pixel and the sample index of each of its lanes.
 pub struct TracedPacket<'a, S> {
     block: &'a PixelBlock<S>,
-    /// Pixels of the packet, as indices into the list of pixels of the tracer.
+    /// Range of the packet's pixels in the list of the tracer's pixels.
     pub pixels: Range<usize>,
     first: u32,
     samples_per_pixel: usize,

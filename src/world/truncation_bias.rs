@@ -133,7 +133,7 @@ impl Reach {
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
     }
 
-    /// Returns the sum of [`Self::weight`] over `n` and all larger numbers of surfaces; infinite if
+    /// Returns the sum of [`Self::weight`] over all numbers of surfaces from `n` on; infinite if
     /// the sum may have no bound.
     fn from(&self, n: u32) -> f64 {
         let sum = self.weight(n) + self.weight(n.saturating_add(1));

@@ -79,12 +79,12 @@ pub struct World<L: SimdFloat> {
     /// `true` for each primitive that rays hit only from outside: a convex solid in which no camera
     /// ray starts and no transmitted ray runs.
     pub(super) outside_only: Vec<bool>,
-    /// Index of the BSDF of each primitive in `bsdfs`, the world's list of BSDFs.
+    /// For each primitive, the index of its BSDF in `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<DeltaSource<L::Scalar>>,
-    /// Point lights of which paths choose a few at each hit; `sources` holds the others. `None` if
-    /// shadow rays go to all lights.
+    /// Point and spot lights of which paths choose a few at each hit; `sources` holds the other
+    /// lights without a size. `None` if shadow rays go to all lights.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
     /// Lights with a size, and their light groups.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
@@ -131,10 +131,11 @@ pub struct World<L: SimdFloat> {
     pub(super) group_names: Vec<String>,
     /// Scale of each light group: the number of integer steps per unit of radiance in the film.
     pub(super) scales: Vec<f64>,
-    /// `true` if samples are distributed over the area of their pixel instead of its centre.
+    /// `true` if samples are distributed over the area of their pixel; `false` if they are at its
+    /// centre.
     pub(super) jitter: bool,
     pub(super) inventory: String,
-    /// One sentence for each limit of the scene that ends paths early, with an upper bound of the
+    /// One sentence for each setting of the scene that ends paths early, with an upper bound of the
     /// light that is lost.
     pub(super) truncation_biases: Vec<String>,
 }
@@ -151,8 +152,8 @@ impl<L: SimdFloat> World<L> {
         &self.scales
     }
 
-    /// Returns `true` if samples are distributed over the area of their pixel instead of its
-    /// centre.
+    /// Returns `true` if samples are distributed over the area of their pixel, and `false` if they
+    /// are at its centre.
     pub fn jitter(&self) -> bool {
         self.jitter
     }
@@ -174,9 +175,9 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
-    /// those that can occlude shadow rays from the hit points of these camera rays. The rectangle
-    /// has the corner `origin` and the size `extent` \[pixels\]. Returns `None` if rays must be
-    /// tested against all primitives.
+    /// those that can occlude shadow rays from the hit points of these camera rays. `origin` is the
+    /// upper left corner of the rectangle, and `extent` its size \[pixels\]. Returns `None` if rays
+    /// must be tested against all primitives.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],
@@ -191,8 +192,8 @@ impl<L: SimdFloat> World<L> {
         self.all_candidates.occluders.len()
     }
 
-    /// Returns the position, in the lists of possible occluders, of the first stratum (spatial
-    /// group) of the lights among which paths choose.
+    /// Returns the index of the first stratum (spatial group of the lights among which paths
+    /// choose) in the lists of possible occluders.
     #[inline(always)]
     pub(super) fn first_stratum(&self) -> usize {
         self.sources.len() + self.emitters.len() + self.emission.counts()[0]
@@ -213,7 +214,7 @@ impl<L: SimdFloat> World<L> {
             && !self.environments.iter().any(|source| source.visible)
     }
 
-    /// Traces one packet of paths from the camera, and overwrites them. Lanes outside of `active`
+    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside of `active`
     /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
     /// their hit points are tested against; `None` means all primitives.
     #[inline(always)]

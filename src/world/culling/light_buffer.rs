@@ -21,11 +21,12 @@ const NO_ITEM: u32 = u32::MAX;
 /// light.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
-    /// Number of rows of cells on a face of the light's projection; the number of columns is the
-    /// same.
+    /// Number of rows of cells on each face of the light's projection, equal to the number of
+    /// columns.
     side: usize,
-    /// Largest coordinate of the occluders and the light. Rays that start at a larger coordinate
-    /// traverse the BVH, because their rounding errors exceed the margin of the occluders' bounds.
+    /// Largest absolute coordinate of the occluders and the light. Rays whose origin has a larger
+    /// coordinate traverse the BVH, because their rounding errors exceed the margin of the
+    /// occluders' bounds.
     max_coordinate: S,
     /// Cells (ranges of directions from the light) of all faces of the light's projection, face by
     /// face and row by row.
@@ -37,14 +38,12 @@ pub(crate) struct LightBuffer<S> {
 
 #[derive(Clone, Copy)]
 struct Cell<S> {
-    /// Position of the first occluder of the cell (a range of directions from the light) in the
-    /// light buffer's list of entries.
+    /// Index of the cell's first possible occluder in [`LightBuffer::entries`].
     first: u32,
-    /// Position after the last occluder of the cell (a range of directions from the light) in the
-    /// light buffer's list of entries.
+    /// Index after the cell's last possible occluder in [`LightBuffer::entries`].
     end: u32,
     /// Depth (see [`Entry::near`]) up to which the cell's list of possible occluders is complete.
-    /// Shadow rays from greater depths traverse the BVH.
+    /// Shadow rays that start at greater depths traverse the BVH.
     complete_to: S,
 }
 
@@ -66,9 +65,9 @@ struct Entry<S> {
     /// Id of the primitive if it cannot occlude shadow rays that start on its own outside;
     /// [`NO_ITEM`] if it can.
     exempt_item: u32,
-    /// Smallest depth of the primitive. The depth of a point is its distance from a point light.
-    /// For a directional light it is the coordinate of the point along the direction in which the
-    /// light travels, with 0 at the origin.
+    /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
+    /// a point light. For a directional light it is the coordinate of the point along the direction
+    /// in which the light travels, with 0 at the origin.
     near: S,
 }
 

@@ -130,9 +130,9 @@ impl<S: Float> ProjectedBounds<S> {
     }
 }
 
-/// Returns the smallest and the largest quotient x / z of those points of a sphere that have z > 0.
-/// `x` and `z` are the coordinates of the sphere's centre. Returns `None` if no point of the sphere
-/// has z > 0.
+/// Returns the smallest and the largest quotient x / z over the points of a sphere that have z > 0.
+/// The parameters `x` and `z` are the coordinates of the sphere's centre. Returns `None` if no
+/// point of the sphere has z > 0.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {

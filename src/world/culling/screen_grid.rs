@@ -70,8 +70,8 @@ impl ScreenBounds {
         out
     }
 
-    /// Returns `true` if the projected bounds overlap the rectangle of the raster with corner
-    /// `origin` and size `extent` \[pixels\].
+    /// Returns `true` if the projected bounds overlap a rectangle of the raster \[pixels\].
+    /// `origin` is its upper left corner, `extent` its size.
     pub fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
         (0..2).all(|axis| {
             let begin = origin[axis] as f64;
@@ -80,8 +80,8 @@ impl ScreenBounds {
     }
 }
 
-/// Side of a cell of the screen grid \[pixels\]. A cell is a square of pixels with one list of
-/// candidate primitives.
+/// Side of a cell of the screen grid \[pixels\]. A cell is a square of pixels that share one list
+/// of candidate primitives.
 const CELL_PX: usize = 16;
 
 /// Largest number of candidate primitives in a cell (a square of pixels) of the screen grid. Camera
@@ -128,10 +128,10 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the ids of the primitives that camera rays through the rectangle with corner
-    /// `origin` and size `extent` \[pixels\] can hit, in ascending order. Returns `None` if there
-    /// are more than [`MAX_PER_CELL`] of them, or if a cell that the rectangle overlaps has more
-    /// than that.
+    /// Returns the ids of the primitives that camera rays through a rectangle of the picture can
+    /// hit, in ascending order. `origin` is its upper left corner and `extent` its size \[pixels\].
+    /// Returns `None` if there are more than [`MAX_PER_CELL`] such primitives, or if a cell that
+    /// the rectangle overlaps has more than that.
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

@@ -10,8 +10,8 @@ use crate::primitive::{
 use crate::world::culling::light_buffer::{LightBuffer, Occluder};
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 
-/// Candidates of some camera rays and of the shadow rays from their hit points. Candidates are the
-/// primitives that rays must be tested against.
+/// Candidates of a group of camera rays, such as those through a tile, and of the shadow rays from
+/// their hit points. Candidates are the primitives that rays must be tested against.
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
@@ -41,16 +41,16 @@ pub(crate) enum CullingMode {
     /// Looks up the candidate lists of the screen cells that the tile overlaps. The primitives are
     /// in a BVH.
     ScreenGrid(ScreenGrid),
-    /// No culling: all primitives are candidates. Rays may still find their hits by bounding boxes
-    /// or a BVH.
+    /// No culling: all primitives are candidates. Those in a BVH are still found by traversal of
+    /// the BVH.
     Off,
 }
 
 impl CullingMode {
     /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
     /// those that can occlude shadow rays from the hit points of these camera rays. `lights` is the
-    /// number of light sources. The rectangle has the corner `origin` and the size `extent`
-    /// \[pixels\]. Returns `None` if rays must be tested against all primitives.
+    /// number of light sources. `origin` is the upper left corner of the rectangle, and `extent`
+    /// its size \[pixels\]. Returns `None` if rays must be tested against all primitives.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -158,7 +158,8 @@ impl FrustumCuller {
     }
 
     /// Returns the candidate primitives of the camera rays inside `frustum`, and of the shadow rays
-    /// from their hit points. If `frustum` is `None`, camera rays are not restricted.
+    /// from their hit points. If `frustum` is `None`, all primitives are candidates of the camera
+    /// rays.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,

@@ -11,10 +11,10 @@ use crate::world::light_choice::LightChoice;
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds an estimate of the light that surfaces reflect from all lights in `choice` to `out`.
-/// `bounce` is the number of earlier surfaces of the path. `occluders` holds, for each stratum of
-/// lights (spatial group of lights), the primitives that may occlude it. `media` are the media of
-/// the paths; `None` in worlds without transmission.
+/// Adds to `out` an estimate of the radiance that surfaces reflect in the light of all lights in
+/// `choice`. `bounce` is the number of earlier surfaces of the path. `occluders` holds, for each
+/// stratum of lights (spatial group of lights), the primitives that may occlude it. `media` are the
+/// media of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

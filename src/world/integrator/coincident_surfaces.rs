@@ -48,13 +48,14 @@ enum SurfaceKind {
     Sheet,
 }
 
-/// Entry in the list of contacts of a primitive: another primitive that may touch it.
+/// Contact of a primitive, in the list of its contacts: another primitive that may touch it.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
     /// Id of the touching primitive. For a compound, the id of its first part.
     item: u32,
-    /// Distance \[scene units\] within which surfaces of the two primitives count as coincident. It
-    /// is larger at points with larger rounding errors; see [`Contact::tie`].
+    /// Distance \[scene units\] within which the surfaces of a primitive and of the one that
+    /// touches it count as coincident. It is larger at points with larger rounding errors; see
+    /// [`Contact::tie`].
     tie: S,
     /// Lowest corner of the touching primitive's bounding box; infinite along axes on which it is
     /// unbounded.
@@ -70,9 +71,9 @@ impl<S: Float> Contact<S> {
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the distance within which surfaces of the two primitives count as coincident: the
-    /// larger of the field `tie` and the parameter `rounding`. The parameter is the result of the
-    /// function [`rounding`] for the points that are tested.
+    /// Returns the distance within which the surfaces of a primitive and of the one that touches it
+    /// count as coincident: the larger of the field `tie` and the parameter `rounding`. The
+    /// parameter is the result of the function [`rounding`] for the points that are tested.
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
@@ -134,8 +135,8 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub item: L,
     pub triangle: L,
     pub layer: L,
-    /// Distance from the surface at which leaving rays start, so that they start beyond all
-    /// coincident surfaces.
+    /// Distance between the surface and the origins of rays that leave it. It is so large that the
+    /// origins are beyond all coincident surfaces.
     pub offset: L,
 }
 

@@ -10,10 +10,10 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds to the radiance in `out` the ambient light and the light of `world.sources` (lights without
-/// a size) that surfaces reflect. Ambient light approximates indirect light. Lanes in `bouncing`
-/// get no ambient light, because their diffuse bounces compute the indirect light. `media` are the
-/// media of the paths; `None` in worlds without transmission.
+/// Adds to `out` the radiance that surfaces reflect in ambient light and in the light of
+/// `world.sources` (lights without a size). Ambient light approximates indirect light. Lanes in
+/// `bouncing` get no ambient light, because their diffuse bounces compute the indirect light.
+/// `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -33,10 +33,10 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
     L::one() / (ratio * ratio + L::one())
 }
 
-/// Adds to `out` the radiance of the visible lights with a size that the rays of `lanes` reach
-/// before the distance `t_max`. If `t_max` is the largest finite number, the ray hits no surface,
-/// and the radiance of the visible environments is added, too. `media` are the media of the paths;
-/// `None` in worlds without transmission.
+/// Adds to `out` the radiance, weighted for multiple importance sampling, of the visible area
+/// lights that the rays of `lanes` hit before the distance `t_max`. A ray whose `t_max` is the
+/// largest finite number hits no surface; for such rays the radiance of the visible environments is
+/// added, too. `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
@@ -70,7 +70,8 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Adds to `out` the radiance that emissive surfaces emit at the hit points of `path`.
+/// Adds to `out` the radiance, weighted for multiple importance sampling, that emissive surfaces
+/// emit at the hit points of `path`.
 #[inline(never)]
 pub(crate) fn surface_emission<L: SimdFloat>(
     world: &World<L>,
@@ -102,9 +103,9 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
     pub share: L,
 }
 
-/// Adds the light of all emitters (lights with a size, emissive objects, environments) that
-/// surfaces reflect. `bounce` is the number of earlier surfaces of the path. `media` are the media
-/// of the paths; `None` in worlds without transmission.
+/// Adds to `out` the radiance that surfaces reflect in the light of all emitters: lights with a
+/// size, emissive objects, environments. `bounce` is the number of earlier surfaces of the path.
+/// `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,

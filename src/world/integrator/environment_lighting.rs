@@ -24,9 +24,10 @@ use std::f64::consts::FRAC_1_PI;
 /// numbers are independent. The salts of emitters are smaller than this one.
 pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
-/// Adds the radiance of the visible environments to `out`, in `lanes`, whose rays hit no surface.
-/// `transmittance` is the fraction of light that the medium around the rays lets through. If it is
-/// `None`, the medium lets all light through.
+/// Adds the radiance of the visible environments, weighted for multiple importance sampling, to
+/// `out`. The rays of `lanes` must hit no surface; other lanes are unchanged. `transmittance` is
+/// the fraction of light that the medium around the rays lets through. If it is `None`, the medium
+/// lets all light through.
 pub(crate) fn visible_environments<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
@@ -49,9 +50,9 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     }
 }
 
-/// Adds the light of all environments that surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path. `glossy` selects lanes with a glossy lobe, which samples directions with a
-/// finite density; mirrors do not.
+/// Adds to `out` the radiance that surfaces reflect in the light of all environments. `bounce` is
+/// the number of earlier surfaces of the path. `glossy` selects lanes with a glossy lobe, which
+/// samples directions with a finite density; mirrors do not.
 #[inline(never)]
 pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,

@@ -24,9 +24,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::world::World;
 
-/// Density \[1/sr\] of diffuse bounces in multiple importance sampling. It is so small that samples
-/// of points on emitters get the full weight. The radiance of environments is not added to rays of
-/// this density.
+/// Density \[1/sr\] that multiple importance sampling assumes for rays of diffuse bounces. It is so
+/// small that samples of points on emitters get the full weight. The radiance of environments is
+/// not added to rays of this density.
 pub(crate) const NO_DENSITY: f64 = 1e-30;
 
 /// Limits of indirect diffuse light in a scene: the largest number of bounces, and whether caustics

@@ -15,7 +15,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub geometric: Vec3<L>,
     /// Hit points of the packet's rays.
     pub point: Vec3<L>,
-    /// Distance from the hit point, along the geometric normal, at which secondary rays start.
+    /// Distance between the hit point and the origins of secondary rays, along the geometric
+    /// normal.
     pub offset: L,
     /// Lanes whose rays hit the front of the primitive: the side to which the normal of the
     /// primitive itself points.
@@ -151,7 +152,8 @@ fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     interaction
 }
 
-/// Computes the surface properties at the hits of `lanes`, which all hit the primitive `item`.
+/// Computes the surface properties at the hits of `lanes`, which must all be hits on the primitive
+/// `item`.
 #[inline(always)]
 fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -104,8 +104,8 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
     }
 }
 
-/// Adds the light of all visible emitters and environments that rough interfaces reflect and
-/// transmit. `bounce` is the number of earlier surfaces of the path.
+/// Adds to `out` the radiance that rough interfaces reflect and transmit in the light of all
+/// visible emitters and environments. `bounce` is the number of earlier surfaces of the path.
 #[inline(never)]
 pub(crate) fn interface_lighting<L: SimdFloat>(
     world: &World<L>,

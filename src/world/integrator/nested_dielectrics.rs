@@ -244,8 +244,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces; `None` if there are no lanes. `media`
-    /// are the media of the rays. `thin_index` is the index of refraction of thin surfaces.
+    /// Returns the hits of `lanes`, which must be hits on transmissive surfaces. Returns `None` if
+    /// `lanes` is empty. `media` are the media of the rays. `thin_index` is the index of refraction
+    /// of thin surfaces.
     #[inline(never)]
     pub fn cross(
         &self,
@@ -288,8 +289,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
 }
 
 /// Returns the fraction of light that is left after `distance`: exp(-coefficient x distance) for
-/// each channel. `absorption` has the absorption coefficients of the solids by priority. `priority`
-/// selects the solid of each lane.
+/// each channel. `absorption` has the absorption coefficients of the solids, indexed by priority.
+/// `priority` is that of each lane's solid.
 #[inline(never)]
 fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
     let of = |lane| absorption[priority.lane(lane).to_f64() as usize];

@@ -113,8 +113,8 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
 
 /// Replaces the rays of `path` by reflected rays, with directions sampled from the reflection
 /// lobes. `bounce` is the number of earlier reflections. The density of the directions is computed
-/// only if `emitters` is `true`. Returns the lanes whose new throughput is at least
-/// [`min_weight`](World::min_weight).
+/// only if `emitters` is `true`. Returns the lanes whose paths continue: their new throughput is at
+/// least [`min_weight`](World::min_weight).
 #[inline(always)]
 pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

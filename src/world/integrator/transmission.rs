@@ -374,8 +374,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         coincident_lanes.any().then_some(coincident)
     }
 
-    /// Returns the transmissive surfaces among the hits of `lanes`. Returns `None` if there are
-    /// none.
+    /// Returns the hits of `lanes` on transmissive surfaces. Returns `None` if no lane hits such a
+    /// surface.
     fn interface_hit(
         &self,
         interaction: &SurfaceInteraction<L>,
@@ -420,8 +420,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         ReflectingLobes { lanes: followed.and_not(interface_hit.suppressed), share }
     }
 
-    /// Samples the reflected and transmitted directions at the hit points of `path`. In at least
-    /// one lane the surface transmits. `bounce` is the number of surfaces that the path has hit
+    /// Samples the reflected and transmitted directions at the hit points of `path`. The surface
+    /// must transmit in at least one lane. `bounce` is the number of surfaces that the path has hit
     /// before.
     fn split_directions(
         &self,
@@ -519,8 +519,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         directions
     }
 
-    /// Samples the reflected and transmitted directions of `lanes`, whose surfaces are rough, with
-    /// the random numbers `uv`, and stores them in `directions`.
+    /// Samples the reflected and transmitted directions of `lanes`, whose surfaces must be rough,
+    /// with the random numbers `uv`, and stores them in `directions`.
     #[inline(never)]
     fn sample_rough(
         &self,
