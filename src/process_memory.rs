@@ -36,10 +36,10 @@ fn tightest(free: [Option<u64>; 3]) -> Option<Available> {
 /// count: stacks of threads, buffers, fragmentation.
 const RESERVE: u64 = 32 << 20;
 
-/// Checks that `needed` bytes and a reserve of 32 MiB are available. Returns `None` if they are, or
-/// if no memory limit is known. Otherwise returns a phrase with the needed and the available
-/// memory, such as `needs 210 MB of memory, and 88 MB are available (the free memory of this
-/// machine)`.
+/// Compares `needed` bytes plus a reserve of 32 MiB with the available memory. Returns `None` if
+/// they are available, or if no memory limit is known. Otherwise returns a phrase with the needed
+/// and the available memory, such as `needs 210 MB of memory, and 88 MB are available (the free
+/// memory of this machine)`.
 pub fn missing_memory(needed: u64) -> Option<String> {
     let Available { bytes, limit } = available_memory()?;
     let needed = needed.saturating_add(RESERVE);

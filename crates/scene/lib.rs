@@ -1,9 +1,10 @@
-//! zerkalo, part 1 of 4: descriptions of scenes, their files, and the kernels that intersect and shade.
+//! zerkalo, part 1 of 4: descriptions of scenes, their files, and the kernels that intersect and
+//! shade.
 //!
-//! The source is in `src`, one folder per module. The crate is separate so that it compiles beside
-//! the others.
+//! The source is in `src`, one folder per module. The library is divided into several crates so
+//! that they compile in parallel.
 
-// The modules are left out elsewhere, so that this is the only error.
+// On other systems the modules are left out, so that this is the only error.
 #[cfg(not(unix))]
 compile_error!(
     "zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX terminals, signals and file locks."

@@ -118,8 +118,8 @@ impl<T> Cache<T> {
     }
 }
 
-/// Returns the keys of the files to evict. `unused` has the unused files, each as `(time of last
-/// use, memory in bytes, key)`.
+/// Returns the keys of the files to evict. `unused` has the unused files, each as `(number of its
+/// last use, memory in bytes, key)`.
 fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
     sort_by_number(&mut unused, |(last_used, ..)| -(*last_used as i64));
     let mut sum = 0usize;

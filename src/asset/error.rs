@@ -13,7 +13,7 @@ pub enum FileLocation {
     Line(usize),
     /// Offset of the error in the file, in bytes counted from 0.
     Byte(usize),
-    /// Part of the file with this name, such as `vertex 17` or `accessors[3]`.
+    /// Name of the part with the error, such as `vertex 17` or `accessors[3]`.
     Part(String),
 }
 

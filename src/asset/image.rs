@@ -118,8 +118,8 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, at the pixel in column `x` and row `y`, counted from the top, of
-    /// an image that is used as a height map. The numbers of the file are interpreted without sRGB
+    /// Returns the height, 0..=1, that the image has as a height map at the pixel in column `x` and
+    /// row `y`, counted from the top. The numbers of the file are interpreted without sRGB
     /// decoding. The height of a coloured pixel is the mean of its channels.
     ///
     /// # Panics

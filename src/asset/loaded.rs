@@ -21,8 +21,8 @@ impl<T> Default for Loaded<T> {
     }
 }
 
-/// Two values are equal if both are not loaded, or have equal contents or equal errors. Contents in
-/// the same allocation are equal without a comparison of their data.
+/// Two values are equal if neither is loaded, or if both have equal contents or equal errors.
+/// Contents in the same allocation are equal without a comparison of their data.
 impl<T: PartialEq> PartialEq for Loaded<T> {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {

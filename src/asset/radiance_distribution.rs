@@ -193,9 +193,9 @@ mod tests {
     }
 
     /// Checks that a regular grid of 256 x 256 points (u, v) gives stratified directions. The
-    /// number of directions in a row of pixels differs from its expectation by at most 256, which
-    /// is one row of the grid. The number in a pixel that covers r x c points of the grid differs
-    /// from r c by at most r + c + 1.
+    /// number of directions in a row of pixels must differ from its expectation by at most 256,
+    /// which is one row of the grid. The number in a pixel that covers r x c points of the grid
+    /// must differ from r c by at most r + c + 1.
     #[test]
     fn grid_of_numbers_gives_stratified_directions() {
         let n = 256;

@@ -25,7 +25,7 @@ const MAX_MAP_SIDE: u32 = 16_384;
 const MAX_MAP_PIXELS: u64 = 1 << 25;
 
 /// Largest valid radiance of a pixel in an environment image. For comparison: the radiance of the
-/// sun is about 2e9 W/(sr m^2).
+/// sun is about 2e7 W/(sr m^2).
 const MAX_RADIANCE: f32 = 1e15;
 
 /// Decoded image of radiance from all directions, for environment lights. Its values are linear,
@@ -53,7 +53,7 @@ impl RadianceMap {
     }
 
     /// Decodes an environment image file in memory. The format is determined by the first bytes of
-    /// the file. Values of Radiance files are divided by the product of the `EXPOSURE` lines;
+    /// the file. Values of a Radiance HDR file are divided by the product of its `EXPOSURE` lines;
     /// values of PNG and JPEG files are sRGB levels. Negative values are replaced by 0.
     ///
     /// # Errors

@@ -29,8 +29,8 @@ impl Camera {
         [right, right.cross(forward), forward]
     }
 
-    /// Returns half the width and half the height of the picture at unit distance. `aspect` is the
-    /// picture's width divided by its height.
+    /// Returns half the width and half the height of the picture, on the picture plane at unit
+    /// distance from the eye. `aspect` is the picture's width divided by its height.
     pub fn half_size(&self, aspect: f64) -> [f64; 2] {
         let (_, degrees) = self.view_angle.key_degrees();
         let half = (0.5 * degrees).to_radians().tan();

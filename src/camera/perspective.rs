@@ -4,9 +4,9 @@ use crate::camera::{Camera, ViewAngle};
 use crate::lanes::{Float, SimdFloat, Vec3};
 use glam::DVec3;
 
-/// Perspective camera compiled for a film size. Directions of pixel corners are computed in double
-/// precision and then rounded to the precision of the rays. Offsets inside of pixels are computed
-/// in the precision of the rays.
+/// Perspective camera compiled for a film size. The direction to the upper left corner of a pixel
+/// is computed in double precision and then rounded to the precision of the rays. Offsets inside of
+/// pixels are computed in the precision of the rays.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     eye: DVec3,
@@ -20,7 +20,8 @@ pub struct PerspectiveCamera {
     dx_axis: DVec3,
     /// Vector from a pixel to the next one below, on the picture plane at unit distance.
     dy_axis: DVec3,
-    /// Vector from the eye to the picture plane's corner at pixel (0, 0).
+    /// Vector from the eye to the picture's upper left corner, on the picture plane at unit
+    /// distance.
     raster_corner: DVec3,
     near: f64,
     /// Thin lens of the camera; `None` for a pinhole.

@@ -15,8 +15,8 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true), path)
 }
 
-/// Opens the regular file at `path` as [`open_regular`] does, with the access that `options`
-/// permits.
+/// Opens the regular file at `path` as [`open_regular`] does, but with the access that `options`
+/// requests.
 pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     // The type is checked before the file is opened, because opening a device may have side
     // effects.

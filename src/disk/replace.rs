@@ -158,8 +158,8 @@ pub fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
 
-/// Replaces the content of the file at `path` by `bytes`. If the target is not a regular file, or
-/// is an open file of this process such as `/dev/stdout`, appends `bytes` instead.
+/// Replaces the content of the file at `path` by `bytes`. If `path` leads to a pipe, a device, a
+/// socket, or an open file of a process such as `/dev/stdout`, appends `bytes` there instead.
 ///
 /// # Errors
 /// Fails if the file cannot be written; an existing regular file is then unchanged.

@@ -18,9 +18,9 @@ use std::ops::Range;
 /// short list of the primitives that its rays may hit.
 ///
 /// Measured with spheres that fill a ball (`benches/acceleration.rs`): whole pictures with up to 95
-/// primitives render faster by tests one by one than by a BVH. If rays are tested against all
-/// primitives instead of the list of a tile, the BVH is faster from about 50 primitives on for
-/// coherent packets, and from about 300 on for incoherent ones.
+/// primitives render faster without a BVH. If rays are tested against all primitives instead of the
+/// list of a tile, the BVH is faster from about 50 primitives on for coherent packets, and from
+/// about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
@@ -74,8 +74,8 @@ impl<L: SimdFloat> Aggregate<L> {
         Self::accelerated(forms, Acceleration::Auto)
     }
 
-    /// Compiles the canonical forms `forms` to primitives. All bounded primitives are in a BVH if
-    /// `tree` is `true`, and none otherwise.
+    /// Compiles the canonical forms `forms` to primitives. If `tree` is `true`, a BVH holds all
+    /// bounded primitives; otherwise there is no BVH.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
@@ -161,9 +161,9 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns a set of two groups of primitives: `items`, which are in the BVH, and all primitives
-    /// outside of the BVH. Rays are tested against each primitive of the set, without traversal of
-    /// the BVH.
+    /// Returns a set of two groups of primitives: those with the numbers `items`, which must be in
+    /// the BVH, and all primitives outside of the BVH. Rays are tested against each primitive of
+    /// the set, without traversal of the BVH.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -345,8 +345,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the lanes of `wanted` whose ray hits one primitive of the BVH at a distance between
-    /// 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
+    /// Returns the lanes of `wanted` whose ray hits one given primitive of the BVH at a distance
+    /// between 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];

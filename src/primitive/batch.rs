@@ -20,7 +20,7 @@ use std::ops::Range;
 pub struct SurfacePoint<L> {
     /// Hit point, projected onto the surface as exactly as the precision of the lanes allows.
     pub point: Vec3<L>,
-    /// Unit geometric normal: outward for solids, on the front for flat shapes.
+    /// Unit geometric normal. It points out of a solid, and to the front of a flat shape.
     pub normal: Vec3<L>,
     /// Largest magnitude of the coordinates from which the hit point was computed. The rounding
     /// error of the point is a few units in the last place of this value.
@@ -38,8 +38,8 @@ pub struct UvGradients<L> {
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// Returns the offset from the surface at which secondary rays start: a few rounding errors of
-    /// [`SurfacePoint::max_coordinate`].
+    /// Returns the distance from the surface at which secondary rays start: a few rounding errors
+    /// of [`SurfacePoint::max_coordinate`].
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
         self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)

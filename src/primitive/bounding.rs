@@ -228,8 +228,8 @@ impl BoundingVolume {
     }
 
     /// Returns `true` if the object is flat, and a light and all points of the sphere `lit` are on
-    /// the same side of the object's plane. `above` receives this plane as unit normal and offset.
-    /// `above` returns two values: the height of the light above the plane, and the error of this
+    /// the same side of the object's plane. `above` receives this plane as unit normal and offset,
+    /// and returns two values: the height of the light above the plane, and the error of this
     /// height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
@@ -392,8 +392,8 @@ mod tests {
     }
 
     /// Checks the distance between a point and the convex hull of two balls: no interpolated ball
-    /// is nearer to the point. The centre and the radius of an interpolated ball are between those
-    /// of the two balls.
+    /// may be nearer to the point. The centre and the radius of an interpolated ball are between
+    /// those of the two balls.
     #[test]
     fn hull_of_two_balls_holds_every_segment_between_them() {
         let mut random = 7u64;
@@ -494,7 +494,7 @@ mod tests {
     }
 
     /// Checks the bounding ball of the part of a surface in a frustum: all points of the surface
-    /// that are inside of the frustum are inside of the ball.
+    /// inside of the frustum must also be inside of the ball.
     #[test]
     fn clipped_ball_holds_all_visible_points() {
         let mut random = 1u64;

@@ -13,13 +13,13 @@ pub type Bounds = (DVec3, DVec3);
 /// Half-space: the points p with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
-    /// Unit normal of the boundary plane, which points out of the half-space.
+    /// Unit normal of the boundary plane, pointing out of the half-space.
     pub normal: DVec3,
     /// Signed distance of the boundary plane from the origin along `normal`.
     pub offset: f64,
 }
 
-/// Texture mapping of a canonical form that is used if a material does not choose one.
+/// Default texture mapping of a canonical form, used if a material does not choose one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultMapping {
     /// Planar mapping, for flat geometry.
@@ -119,19 +119,19 @@ pub trait CanonicalShape {
     fn thickness(&self) -> f64;
 
     /// Returns a lower bound of the distance between `point` and the surface; `None` if there is no
-    /// surface. It is exact for points close to the surface. For points outside of a box around the
-    /// geometry it may be the distance to the box.
+    /// surface. The bound is 0 on the surface, except for rounding errors. For points outside of a
+    /// box around the geometry it may be the distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`. The
-    /// result has one list for each solid of the geometry that has such a surface.
+    /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`: one
+    /// list for each solid with such a surface. A compound can have several solids.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
     /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
     /// there is none. The unit of t is the length of `direction`.
     fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
-    /// Returns the texture mapping that is used if a material does not choose one.
+    /// Returns the default texture mapping, which is used if a material does not choose one.
     fn default_mapping(&self) -> DefaultMapping;
 
     /// Returns proxies: simplified geometry for the search for narrow gaps between objects. Empty

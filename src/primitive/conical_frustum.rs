@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 
 /// Canonical form of cylinders, cones and tapered cylinders: the image of the solid x^2 + y^2 <=
 /// (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
-/// [`Form::conical_frustum`] creates it for any ratio of the two radii.
+/// [`Form::conical_frustum`] also accepts a top that is wider than the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
     /// Map from the space in which the frustum has base radius 1 and height 1 to the scene.
@@ -336,8 +336,8 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Returns the surface point on the face that is closest to `point`: the lateral surface, the
-    /// base or the cap. It is the face above which `point` has the largest height.
+    /// Returns the surface point on the face closest to `point`: the lateral surface, the base or
+    /// the cap. The closest face is the one above which `point` has the largest height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

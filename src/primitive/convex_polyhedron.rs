@@ -216,8 +216,8 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Returns the surface point on the face that is closest to `point`. It is the face above which
-    /// `point` has the largest height.
+    /// Returns the surface point on the face closest to `point`: the face above which `point` has
+    /// the largest height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);

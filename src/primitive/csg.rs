@@ -232,10 +232,10 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Returns the transition of the compound between the points at the distances `before` and
-    /// `after` along each line: whether each point is inside of the compound, and the surface
-    /// between the two. `spans` has the intervals in which each line is inside of each part of the
-    /// compound. The id of a part is `base` plus its number.
+    /// Returns the transition of each line through the compound's surface between the points at the
+    /// distances `before` and `after`: whether each point is inside of the compound, and the
+    /// surface between the two. `spans` has the intervals in which each line is inside of each part
+    /// of the compound. The id of a part is `base` plus its number.
     fn change<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -412,8 +412,8 @@ impl<S: Float> Compounds<S> {
         occluded
     }
 
-    /// Returns the surface point of a compound's part at `point`. Its normal points out of the
-    /// compound.
+    /// Returns the projection of `point` onto the surface of a compound's part. The normal points
+    /// out of the compound.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -426,7 +426,8 @@ impl<S: Float> Compounds<S> {
         SurfacePoint { normal, ..surface }
     }
 
-    /// Returns the texture coordinates of a compound's part at `point`; `None` if it has none.
+    /// Returns the texture coordinates of a compound's part at `point`; `None` if the part has
+    /// none.
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         part: usize,

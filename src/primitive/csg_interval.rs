@@ -4,9 +4,9 @@
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Lower bound of the cosine of the angle between a line and a surface normal. The tolerance of
-/// coincident faces is divided by this cosine. The bound keeps the tolerance finite for lines
-/// parallel to the surface.
+/// Lower limit of the cosine of the angle between a line and a surface normal; smaller cosines
+/// count as this value. The tolerance of coincident faces is divided by the cosine. The limit keeps
+/// the tolerance finite for lines parallel to the surface.
 const FLATTEST: f64 = 1e-9;
 
 /// End of an interval in which a line is inside of a solid. `t` is the distance of this end along
@@ -108,8 +108,8 @@ pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
-/// Inserts `end` into `ends`, whose first `count` elements are sorted by distance in each lane. The
-/// first `count + 1` elements are then sorted.
+/// Inserts `end` into `ends`. The first `count` elements must be sorted by distance in each lane.
+/// The first `count + 1` elements are then sorted.
 #[inline(always)]
 pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {

@@ -87,8 +87,8 @@ impl CanonicalShape for CsgSolid {
 }
 
 impl CsgSolid {
-    /// Returns `true` if the bounding boxes of the parts show that the solid has no points, as the
-    /// intersection of solids that are apart.
+    /// Returns `true` if the bounding boxes of the parts show that the solid has no points, for
+    /// example an intersection of solids that are apart.
     pub fn is_empty(&self) -> bool {
         self.is_empty_tree(&self.tree)
     }

@@ -82,8 +82,9 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
 }
 
 /// Assumed largest distance between a side of a solid's bounding box and the part of the solid that
-/// touches this side, as a fraction of the box's largest coordinate. The distance is not 0, because
-/// double precision rounds the box and the solid differently far from the origin of the scene file.
+/// touches this side, as a fraction of the box's largest coordinate. Double precision rounds the
+/// box and the solid differently; far from the origin of the scene file, the distance is therefore
+/// not 0.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {

@@ -91,7 +91,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
-        // Infinite or NaN for a parallel ray.
+        // `t` is infinite or NaN for a ray parallel to the plane.
         let t = (L::splat(self.offset) - ray.origin.dot(normal)) / ray.direction.dot(normal);
         Some((t, L::mask(true)))
     }

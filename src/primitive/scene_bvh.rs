@@ -1,5 +1,5 @@
 //! BVH over the primitives of a scene. The rays of a coherent packet traverse it together, those of
-//! other packets one by one.
+//! other packets separately, but interleaved.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
@@ -10,13 +10,13 @@ use crate::primitive::item_box::padded;
 use glam::DVec3;
 
 /// Coherence limit of the scene's BVH: it determines which packets of rays traverse the BVH as a
-/// whole. The rays of other packets traverse it one by one.
+/// whole. The rays of other packets traverse it separately.
 ///
-/// A packet is coherent if two numbers are at most a bound for each of its rays, compared with its
-/// first active ray. The first is the length of the difference of the unit directions. The second
-/// is the largest coordinate of the difference of the origins, divided by the largest extent of the
-/// primitives. The bound is this constant times the number of lanes, divided by the square root of
-/// the number of primitives.
+/// Every active ray of a packet is compared with the first active ray. The packet is coherent if
+/// two numbers are at most a bound in every comparison. The first is the length of the difference
+/// of the unit directions. The second is the largest coordinate of the difference of the origins,
+/// divided by the largest extent of the primitives. The bound is this constant times the number of
+/// lanes, divided by the square root of the number of primitives.
 ///
 /// Measured with spheres inside a large ball and packets of eight rays. A packet is as fast as
 /// single rays if its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000.
@@ -29,11 +29,11 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
     items: Vec<u32>,
-    /// Largest length of the difference between the direction of any ray of a coherent packet and
-    /// that of its first active ray, divided by the number of lanes.
+    /// Bound for coherent packets, divided by the number of lanes: the largest length of the
+    /// difference between the directions of a ray and of the packet's first active ray.
     turn: f64,
-    /// Largest difference, along any axis, between the origin of any ray of a coherent packet and
-    /// that of its first active ray, divided by the number of lanes.
+    /// Bound for coherent packets, divided by the number of lanes: the largest difference, along
+    /// any axis, between the origins of a ray and of the packet's first active ray.
     shift: f64,
 }
 
@@ -71,7 +71,8 @@ impl SceneBvh {
             return;
         }
         // Boxes are enlarged by a few rounding errors of the ray's origin. Otherwise a ray could
-        // miss the box of a primitive that the primitive's own rounded test hits.
+        // miss the box of a primitive although the rounded test of the primitive itself finds a
+        // hit.
         let pad = ray.origin.max_abs() * L::from_f64(4.0 * L::EPSILON);
         let packet = SlabPacket::new(ray, Vec3::new(pad, pad, pad));
         let boxes = &self.boxes;

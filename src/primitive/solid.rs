@@ -16,15 +16,16 @@ pub struct Span<L: SimdFloat> {
     pub enter_cosine: L,
     /// Absolute cosine of the angle between line and surface normal at `leave`.
     pub leave_cosine: L,
-    /// Lanes whose line hits the solid; the other fields are undefined in other lanes.
+    /// Lanes whose line has this interval in the solid; the other fields are undefined in other
+    /// lanes.
     pub meets: L::Mask,
 }
 
 /// Primitive with a closed surface, which encloses a solid. Only such primitives can be parts of a
 /// compound.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
-    /// Intervals in which the lines of a packet are inside of the solid, in ascending order and
-    /// without overlap.
+    /// List of the intervals in which the lines of a packet are inside of the solid, in ascending
+    /// order and without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
     /// Returns the intervals in which the lines of a ray packet are inside of the solid; none if no

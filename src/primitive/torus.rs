@@ -6,9 +6,10 @@
 //! the distance along the line from its point closest to the centre. Half the derivative of h is s
 //! minus rho'(s). The graph of the distance rho(s) from the axis is a hyperbola. The second
 //! derivative of rho is largest at the point closest to the axis, and exceeds 1 between two known
-//! positions. The derivative of h is therefore monotone on three pieces of the line, and has one or
-//! three zeros. Between these positions h is monotone; the positions bracket the zeros of h (after
-//! Yuksel 2022, *High-Performance Polynomial Root Finding for Graphics*).
+//! positions. These two positions divide the line into three pieces on which the derivative of h is
+//! monotone. The derivative therefore has one or three zeros. Between them h is monotone; the zeros
+//! of the derivative bracket the zeros of h (after Yuksel 2022, *High-Performance Polynomial Root
+//! Finding for Graphics*).
 //!
 //! The zeros of h are also the roots of a quartic polynomial. Its coefficients are not used,
 //! because their terms would cancel for thin tubes; h is evaluated from the distance to the ring.
@@ -168,8 +169,9 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Width of the margin around the torus in which intersections are searched, in multiples of the
-/// machine epsilon. Lengths are measured in the space in which the ring has radius 1.
+/// Width of the margin by which the search region for intersections is larger than the torus, in
+/// multiples of the machine epsilon. Lengths are measured in the space in which the ring has radius
+/// 1.
 const ROOM: f64 = 64.0;
 
 /// Largest number of steps of the search for one intersection. Bisection alone needs 54 steps in
@@ -209,7 +211,7 @@ struct Separators<L: SimdFloat> {
 
 impl<L: SimdFloat> UnitLine<L> {
     /// Transforms the lines of rays to the space of the torus. Returns `None` if no line of the
-    /// packet crosses the region around the torus.
+    /// packet crosses the region of the torus (see [`UnitLine::near`]).
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
@@ -337,7 +339,7 @@ impl<L: SimdFloat> UnitLine<L> {
     }
 
     /// Returns the zero of `function` between `low` and `high` in the lanes of `open`. `function`
-    /// returns its value and its derivative. `sign` times the value is negative at `low` and
+    /// returns its value and its derivative. `sign` times the value must be negative at `low` and
     /// positive at `high`.
     ///
     /// The search takes Newton steps. It bisects where Newton's step leaves the bracket or is slow.
@@ -376,7 +378,7 @@ impl<L: SimdFloat> UnitLine<L> {
     }
 
     /// Returns the positions that separate the line's intersections with the torus from each other.
-    /// Only intersections at `start` or beyond count.
+    /// Intersections before the position `start` are ignored.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
@@ -482,7 +484,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
 }
 
 /// Returns the two intervals in which each line is inside of the torus. The second one or both may
-/// be empty. Returns `None` if no line comes near the torus.
+/// be empty. Returns `None` if no line crosses the region of the torus (see [`UnitLine::near`]).
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

@@ -1,8 +1,9 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it one
-//! by one, and each tests eight boxes or triangles at a time. A triangle is tested by the same
-//! operations in both cases. Both therefore find the same triangle at the same distance.
+//! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it
+//! separately, but interleaved; each tests eight boxes or triangles at a time. A triangle is tested
+//! by the same operations in both cases. Both therefore find the same triangle at the same
+//! distance.
 
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
@@ -14,25 +15,24 @@ use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
 /// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
-/// whole. The rays of other packets traverse it one by one.
+/// whole. The rays of other packets traverse it separately.
 ///
-/// A packet is coherent if two numbers are at most a bound for each of its rays, compared with its
-/// first active ray. The first is the length of the difference of the unit directions. The second
-/// is the largest coordinate of the difference of the origins, divided by the size of the mesh. The
-/// bound is this constant times the number of lanes, divided by the square root of the number of
-/// triangles.
+/// Every active ray of a packet is compared with the first active ray. The packet is coherent if
+/// two numbers are at most a bound in every comparison. The first is the length of the difference
+/// of the unit directions. The second is the largest coordinate of the difference of the origins,
+/// divided by the size of the mesh. The bound is this constant times the number of lanes, divided
+/// by the square root of the number of triangles.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four rays, these limits are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Largest bound on the differences between the rays of a coherent packet, divided by the number of
-/// lanes. It replaces the bound from [`COHERENCE_LIMIT`], which is larger for meshes of less than
-/// about 3900 triangles.
+/// Upper limit of the bound that follows from [`COHERENCE_LIMIT`], divided by the number of lanes.
+/// It takes effect for meshes of fewer than about 3900 triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
-/// Closest triangle of a mesh that each ray hits.
+/// Closest hit of each ray with the triangles of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
     /// Distance of the hit in units of the ray direction's length. It is the distance limit of the
@@ -91,11 +91,12 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// the lanes that hit it. Hits have a positive distance, and may be on either side of the
     /// triangle.
     ///
-    /// The corners are projected along the ray onto the plane through the ray's origin. A corner
-    /// has the same projection in all triangles that share it. The area that an edge spans with the
-    /// ray's origin is computed with the exact sign, or as 0. Hence no ray passes between two
-    /// triangles that share an edge or a corner (after Woop, Benthin and Wald 2013, *Watertight
-    /// Ray/Triangle Intersection*, with an orthonormal frame for the shear).
+    /// The corners are projected along the ray onto the plane through the ray's origin
+    /// perpendicular to the ray. A corner has the same projection in all triangles that share it.
+    /// The area that an edge spans with the ray's origin is computed with the exact sign, or as 0.
+    /// Hence no ray passes between two triangles that share an edge or a corner (after Woop,
+    /// Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal frame for
+    /// the shear).
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));

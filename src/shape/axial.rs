@@ -6,8 +6,8 @@ use crate::shape::texture_space::around_axis;
 use crate::value::{ValidationError, Validator, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Returns a conical frustum around the axis from `base` to `top`, which are different points. The
-/// radii at the ends are at least 0 and not both 0.
+/// Returns a conical frustum around the axis from `base` to `top`. The two points must differ. The
+/// radii at the ends must be at least 0 and not both 0.
 pub(super) fn frustum_between(
     base: [f64; 3],
     top: [f64; 3],
@@ -35,9 +35,9 @@ macro_rules! by_axis {
             vec![&mut self.$base, &mut self.$top]
         }
 
-        /// Returns `true` if the solid can represent a rotation about the vertical. A solid with a
-        /// vertical axis can: it is symmetric about the vertical and does not change. Any other
-        /// cannot.
+        /// Returns `true`, without a change, if the axis is vertical: the solid is then symmetric
+        /// about the vertical. Returns `false` for any other axis, because the solid is not
+        /// rotated.
         fn rotate_y(&mut self, _: f64) -> bool {
             self.$base[0] == self.$top[0] && self.$base[2] == self.$top[2]
         }

@@ -216,8 +216,8 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the validation errors of `of`, the parts of a compound. `depth` is its nesting depth: 1
-/// for a compound that is no part of another one.
+/// Returns the validation errors of `of`, the parts of a compound. `depth` is the nesting depth of
+/// the compound: 1 if it is no part of another one.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {

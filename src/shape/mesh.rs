@@ -107,8 +107,8 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Calls `load` with the mesh file that the shape names and stores the result. Does nothing if
-    /// a result is stored already, or the shape names no file.
+    /// Reads the mesh file that the shape names: calls `load` with the file's name and stores the
+    /// result. Does nothing if a result is stored already, or if the shape names no file.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()

@@ -5,9 +5,9 @@ use crate::shape::{EXAMPLES, Shape};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;
 
-/// Checks `normals_at` for rays from all sides. At the point where a ray hits the shape, it returns
-/// a normal that is not perpendicular to the ray. At the origin of the ray it returns none, because
-/// the origin is not on the shape.
+/// Checks `normals_at` for rays from all sides. At the point where a ray hits the shape, it must
+/// return a normal that is not perpendicular to the ray. At the origin of the ray, which is not on
+/// the shape, it must return none.
 #[test]
 fn normals_at_hit_points_face_ray() {
     for (key, _) in EXAMPLES {

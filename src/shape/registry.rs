@@ -48,7 +48,8 @@ pub trait ShapeDesc: Description {
     }
 }
 
-/// Returns the angle `rotation + degrees`, reduced to the range above -180 and at most 180 degrees.
+/// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
+/// than -180 and at most 180 degrees.
 pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
@@ -100,7 +101,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Converts the shape to its canonical form in double precision, before the object's
+            /// Converts the shape to its canonical form in double precision, without the object's
             /// transform. The shape must be valid.
             pub fn form(&self) -> Form {
                 match self {

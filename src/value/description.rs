@@ -13,8 +13,8 @@ pub trait Description {
     /// Keys of this kind of table, in the order of their declaration.
     const FIELDS: &'static [Field];
 
-    /// Checks each value of the table against the range of its key. Callers can add checks that
-    /// involve several keys to the returned validator.
+    /// Returns a validator that has checked each value of the table against the range of its key.
+    /// Callers can add checks that involve several keys.
     fn validator(&self) -> Validator;
 }
 
@@ -25,7 +25,7 @@ pub trait FieldValue {
     const TYPE: ValueType;
 
     /// Returns the validation errors of `self`, the value of the key that `field` describes. The
-    /// key of each error begins with the name of that key.
+    /// dotted key of each error begins with `field.name`.
     fn errors(&self, field: &Field) -> Vec<ValidationError>;
 
     /// Returns `true` if the value stands for an omitted key. Files are then written without the

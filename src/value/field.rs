@@ -27,8 +27,8 @@ pub enum DefaultValue {
     Required,
     /// Default value of the key, given as TOML text.
     Is(&'static str),
-    /// No default value: the key may be omitted. The value is a phrase that describes the result of
-    /// omitting it.
+    /// No default value: the key may be omitted. The variant holds a phrase that describes the
+    /// result of omitting it.
     Without(&'static str),
 }
 
@@ -52,11 +52,11 @@ pub enum ValueType {
     Choice(&'static [Choice]),
     /// Whole number in the given range.
     Whole(NumberRange),
-    /// List of whole numbers. The values are the length of the list and the range of each number.
+    /// List of whole numbers, given by the length of the list and the range of each number.
     Wholes(usize, NumberRange),
     /// Number in the given range.
     Number(NumberRange),
-    /// List of numbers. The values are the length of the list and the range of each number.
+    /// List of numbers, given by the length of the list and the range of each number.
     Numbers(usize, NumberRange),
     /// Direction: three numbers that are not all zero. The vector may have any length.
     Direction,

@@ -30,7 +30,8 @@ pub fn insertion_sort<T>(items: &mut [T], key: impl Fn(&T) -> f64) {
     }
 }
 
-/// Returns a number whose order is that of [`f64::total_cmp`].
+/// Converts `x` to an integer. The integers of two numbers have the order that [`f64::total_cmp`]
+/// gives the numbers.
 pub fn total_order(x: f64) -> i64 {
     let bits = x.to_bits() as i64;
     // The bits of negative numbers ascend with the absolute value.

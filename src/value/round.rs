@@ -33,7 +33,7 @@ pub fn floor_log10(x: f64) -> i32 {
 }
 
 /// Rounds the coordinate `x` to a multiple of 10^(k - 4). 10^k is the largest power of ten that is
-/// at most `scale`, the size of the scene.
+/// at most `scale`, the size of the object or scene.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }

@@ -44,7 +44,7 @@ pub trait TomlValue {
     }
 }
 
-/// Error of the conversion of a value of a scene file to a description.
+/// Error in the conversion of a value of a scene file to a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TomlError(Box<(Range<usize>, String)>);
 
@@ -148,7 +148,7 @@ fn table(entries: &mut dyn Iterator<Item = (&str, &dyn TomlValue)>) -> Value {
     Value::Table(table)
 }
 
-/// Returns the only entry of the table `value` as the index of its key in `names` and its value.
+/// Returns the only entry of the table `value`: the index of its key in `names`, and its value.
 pub(crate) fn only_entry<'a>(
     value: &'a Spanned<DeValue<'a>>,
     names: &[&str],

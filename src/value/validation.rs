@@ -50,7 +50,7 @@ impl Validator {
         Self { fields, errors: Vec::new() }
     }
 
-    /// Checks the value of the key `name`.
+    /// Checks `value`, the value of the key `name`, and collects its validation errors.
     ///
     /// # Panics
     /// Panics if the table has no such key.

@@ -11,14 +11,14 @@ use std::collections::HashMap;
 /// Largest absolute value of a mesh coordinate.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Smallest valid extent of a mesh, the longest side of its bounding box. Products of three
-/// coordinates of this magnitude are not subnormal in single precision.
+/// Smallest valid extent of a mesh (length of the longest side of its bounding box). Products of
+/// three coordinates of this magnitude are not subnormal in single precision.
 const MIN_EXTENT: f64 = 1e-9;
 
-/// Ratio of a mesh's largest absolute coordinate to its extent above which the positions are stored
-/// relative to the centre of the mesh. Below it, they are stored relative to the origin. At this
-/// ratio, single precision resolves the mesh with four bits less than if it were centred at the
-/// origin.
+/// Largest ratio of a mesh's largest absolute coordinate to its extent for which the positions are
+/// stored relative to the origin. Above it, they are stored relative to the centre of the mesh. At
+/// this ratio, single precision resolves the mesh with four bits less than if it were centred at
+/// the origin.
 const MAX_OFFSET: f64 = 16.0;
 
 /// Mesh under construction, to which the parser of a file format adds vertices and triangles.
@@ -54,8 +54,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Reserves memory for the given numbers of further vertices and triangles. The caller has
-    /// checked that the file is long enough for them.
+    /// Reserves memory for the given numbers of further vertices and triangles. The caller must
+    /// check before that the file is long enough for them.
     ///
     /// # Errors
     /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`], or if there is not
@@ -128,8 +128,8 @@ impl<'a> Builder<'a> {
         !self.colors.is_empty()
     }
 
-    /// Sets the linear base colour of the triangles added from now on. Triangles before the first
-    /// call are white.
+    /// Sets the linear base colour of the triangles added from now on. Triangles added before the
+    /// first call are white.
     ///
     /// # Errors
     /// Fails if there are more than 65536 colours.
@@ -338,7 +338,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the texture coordinates of the vertices. Vertices without texture coordinates get
-    /// zero. Returns `None` if the file has none.
+    /// zero. Returns `None` if no vertex has any.
     ///
     /// # Errors
     /// Fails if a texture coordinate is not finite.

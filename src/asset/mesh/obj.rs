@@ -17,7 +17,7 @@ use tobj::{LoadError, LoadOptions, MTLLoadResult};
 /// Largest size of an MTL file in bytes: 16 MiB.
 const MAX_MTL_BYTES: u64 = 16 << 20;
 
-/// Largest number of MTL files of one OBJ file. Further MTL files are ignored.
+/// Largest number of MTL files that are read for one OBJ file. Further MTL files are ignored.
 const MAX_MTL_FILES: usize = 64;
 
 /// Linear colour of triangles without a diffuse colour, in an OBJ file with materials.
