@@ -457,8 +457,8 @@ fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
         .map(|given| Acceleration::from_name(&given).unwrap_or(Acceleration::Auto))
 }
 
-/// Parses a picture size such as `640x480` into width and height. The scene checks their range
-/// later.
+/// Parses a picture size such as `640x480` into width and height. Their range is checked later, by
+/// the validation of the scene.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())

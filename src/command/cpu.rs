@@ -6,12 +6,13 @@
 //! build assumes. This module therefore reads CPUID directly.
 //!
 //! The test works in builds for a named processor, such as x86-64-v3, and was tested under an
-//! emulator of older processors. It may fail in an optimised build for `native`. Such a build also
-//! compiles the standard library for this processor, including code that runs before `main`. This
-//! code may already contain an illegal instruction.
+//! emulator of older processors. The test may fail in an optimised build for `native`, the
+//! processor of the building machine. Such a build also compiles the standard library for this
+//! processor, including code that runs before `main`. This code may already contain an illegal
+//! instruction.
 
-/// Ends the program if the processor lacks a feature for which the program was compiled. The
-/// arguments are the name of each feature, with its register and bit of CPUID.
+/// Ends the program if the processor lacks a feature for which the program was compiled. Each group
+/// of arguments has the name of a feature, and the CPUID register and bit that report it.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// Width of the printed report, in columns of the terminal.
 const COLUMNS: usize = 80;
-/// Width of the left part of the report, which holds the names, in columns of the terminal.
+/// Width of the names at the start of the report's lines, in columns of the terminal.
 const NAME: usize = 17;
 
 pub fn run(rate_requested: bool) -> Result<(), Failure> {
@@ -140,8 +140,8 @@ impl DoctorReport {
         }
     }
 
-    /// Describes the set of colours that the dashboard uses and its source: NO_COLOR, COLORTERM,
-    /// TERM or the terminal's reply.
+    /// Describes the set of colours that the dashboard uses, and the reason for this set: NO_COLOR,
+    /// COLORTERM, TERM or the terminal's reply.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
@@ -237,8 +237,8 @@ impl DoctorReport {
     }
 }
 
-/// Returns a line of the report with `name` and `value`. `value` is wrapped with a hanging indent,
-/// so that no line is longer than [`COLUMNS`].
+/// Returns an entry of the report: `name`, followed by `value`. `value` is wrapped with a hanging
+/// indent, so that no line is longer than [`COLUMNS`].
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))

@@ -127,8 +127,8 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
     Ok(SceneFile::untitled(checkpoint.inputs.scene.clone(), source)?)
 }
 
-/// Opens the scene file at `path`. The inner error means that the file can be read but is not a
-/// valid scene. It holds the path of the file and its errors. The dashboard shows these errors
+/// Opens the scene file at `path`. If the file can be read but is not a valid scene, returns an
+/// inner error: the path of the file and the errors of the scene. The dashboard shows these errors
 /// until the user has corrected the file.
 ///
 /// # Errors

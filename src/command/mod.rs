@@ -146,7 +146,8 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Reads the scene file at `path` and reports the progress of large meshes and images on stderr.
+/// Reads the scene file at `path`. Messages on stderr report the loading of large meshes and
+/// images.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
     Ok(Document::read(path, LoadReporter::new().assets)?)
 }

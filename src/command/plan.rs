@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
 /// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the
-/// pilot traces a third to a half of all rays. The noise that it predicts for the whole render is
-/// within 10 % of the final noise.
+/// pilot traces a third to a half of the rays of the whole render. The noise that it predicts for
+/// the whole render is within 10 % of the final noise.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -113,8 +113,8 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     Ok(part.plan)
 }
 
-/// Plans the samples that are needed in addition to those of the merged film at `path` to reach the
-/// new noise target.
+/// Plans the next round of a divided render: the samples that the merged film at `path` lacks to
+/// reach the noise target of `args`.
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));

@@ -8,8 +8,7 @@ use crate::render::memory_budget::{Regions, check, divide};
 use crate::scene::Scene;
 use crate::world::AnyWorld;
 
-/// Name of the memory limit in messages if `--memory` is the limit: it allows less than the
-/// available memory.
+/// Name of the memory limit in messages if `--memory` allows less memory than is available.
 const OPTION: &str = "--memory";
 
 /// Division of a picture into regions (bands of rows) that fit into the given memory.
@@ -29,8 +28,8 @@ impl Division {
     /// If that film does not fit either, the picture is divided into regions.
     ///
     /// # Errors
-    /// Fails if the smallest regions do not fit. Also fails if a checkpoint is requested and the
-    /// film with a separate contribution of each light does not fit.
+    /// Fails if the smallest regions do not fit. Also fails if the film with a separate
+    /// contribution of each light does not fit, and a checkpoint is requested or resumed.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         // The scene is compiled first, so that the measured memory of the process includes it.
         let world = AnyWorld::compile(scene, &args.precision.world_options());
@@ -89,8 +88,8 @@ impl Division {
 }
 
 /// Returns two values: the number of bytes that the process may use, and the name of the memory
-/// limit for messages. The number is `cap`, the value of `--memory`. If less is available, it is
-/// the available memory plus the resident memory of the process.
+/// limit for messages. The number is the smaller of two: `cap`, the value of `--memory`, and the
+/// sum of the available memory and the resident memory of the process.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {
@@ -101,9 +100,9 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns a function that creates the error about too little memory. Its argument is the least
-/// number of bytes with which the picture can be rendered. `limit` is the name of the memory limit,
-/// and `cap` the number of bytes that it allows.
+/// Returns a function that creates the error about too little memory. The argument of the function
+/// is the least number of bytes with which the picture can be rendered. `limit` is the name of the
+/// memory limit, and `cap` the number of bytes that it allows.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
         // Adds a megabyte, because the resident memory of the program differs by up to a megabyte

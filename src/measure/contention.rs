@@ -24,7 +24,8 @@ impl RunQueueDelay {
         (!all.is_empty()).then_some(Self(all))
     }
 
-    /// Returns the seconds that all threads together have waited since `before` was read.
+    /// Returns the seconds that all threads together have waited between the times at which
+    /// `before` and `self` were read.
     pub fn seconds_since(&self, before: &Self) -> f64 {
         let since = |(thread, now): (&String, &Duration)| {
             now.saturating_sub(before.0.get(thread).copied().unwrap_or_default())

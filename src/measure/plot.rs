@@ -10,8 +10,8 @@ use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
 
-/// Font of the text in plots, so that plots are the same on every machine: Ubuntu Light with the
-/// Latin, Greek and Cyrillic letters, figures and signs alone, without hints.
+/// Font of the text in plots, so that plots are the same on every machine. It is Ubuntu Light,
+/// reduced to Latin, Greek and Cyrillic letters, figures and signs, without hinting.
 const FONT: &[u8] = include_bytes!("font/light.ttf");
 
 /// Width and height of a panel of the plot, in pixels.

@@ -117,8 +117,8 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 
 impl Reference {
     /// Creates a reference from the picture of `film`. The film's two replicates (halves of the
-    /// samples) hold equal numbers of samples; the error of the reference itself is estimated from
-    /// their difference.
+    /// samples) must hold equal numbers of samples; the error of the reference itself is estimated
+    /// from their difference.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
@@ -238,8 +238,8 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns half the difference, in 8-bit levels, between two displayed colours. `a` and `b` are the
-/// colours of the same pixel in two independent pictures.
+/// Returns half the difference between two colours as displayed, in 8-bit levels. `a` and `b` are
+/// the linear colours of the same pixel in two independent pictures.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.codes(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))

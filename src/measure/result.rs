@@ -105,9 +105,9 @@ const MIN_COUNTED: usize = 5;
 const MAX_SPREAD: f64 = 0.05;
 
 /// Half the width of the confidence interval of a median by the sign test. The unit is sqrt(n) / 2
-/// ranks for n values: the number of values above the true median has this standard deviation. It
-/// is within 1.4 standard deviations of its mean in about four of five cases. The factor sqrt 2 is
-/// for the difference of two medians.
+/// ranks for n values, the standard deviation of the number of values above the true median. This
+/// number is within 1.4 standard deviations of its mean in about four of five cases. The factor
+/// sqrt 2 is for the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median of `values`; for an even number of values, the mean of the two in the middle.

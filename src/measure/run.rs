@@ -30,8 +30,8 @@ const WARM_UP_SECONDS: f64 = 0.3;
 const REFERENCE_SHARE: f64 = 0.3;
 /// Largest duration of rendering the reference, as a share of the whole measurement's time.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest duration of the first run of the default settings, as a share of the whole measurement's
-/// time.
+/// Largest duration of the first render with the default settings, as a share of the whole
+/// measurement's time.
 const DEFAULT_TIME: f64 = 0.12;
 /// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
@@ -157,10 +157,10 @@ fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
     Some(Expected { codes, seconds_low, seconds_high })
 }
 
-/// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the targets
-/// and the powers of two from 0.5 to 8 that are at least [`COMPARED_AT`]. The result is the
-/// smallest candidate that the default settings reached within `seconds`; otherwise the largest
-/// candidate that they reached; otherwise the error at the end of their error curve.
+/// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the powers of
+/// two from 0.5 to 8, and the targets that are at least [`COMPARED_AT`]. The result is the smallest
+/// candidate that the default settings reached within `seconds`; otherwise the largest candidate
+/// that they reached; otherwise the error at the end of their error curve.
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|codes| *codes >= COMPARED_AT);

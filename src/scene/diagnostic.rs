@@ -69,7 +69,7 @@ pub(super) struct FirstDiagnostics {
 
 impl FirstDiagnostics {
     /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and
-    /// column. `make` is not called if there are enough diagnostics at smaller offsets.
+    /// column. `make` is not called if the diagnostic is only counted.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -80,8 +80,8 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true` if the diagnostic at the byte offset `at` need not be created, because there
-    /// are enough diagnostics at smaller offsets. It is then only counted.
+    /// Returns `true` if the diagnostic at the byte offset `at` need not be created, because it
+    /// comes after the first [`MAX_REPORTED`] in the file. It is then only counted.
     pub fn skips(&mut self, at: usize) -> bool {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
@@ -107,8 +107,9 @@ impl FirstDiagnostics {
         self.found.is_empty()
     }
 
-    /// Returns `(diagnostics, number)`: the stored diagnostics with the name `file`, lines and
-    /// columns in `text`, sorted by location, and the number of those that were not stored.
+    /// Returns `(diagnostics, number)`: the stored diagnostics, sorted by location, and the number
+    /// of those that were not stored. Each diagnostic has the file name `file`, and its line and
+    /// column in `text`.
     pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);

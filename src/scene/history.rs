@@ -1,4 +1,4 @@
-//! Undo and redo of whole scenes, and coalescing of the steps of a gesture.
+//! Undo and redo of whole scenes, and coalescing of successive edits into one undo step.
 
 use crate::camera::Camera;
 use crate::light::Light;
@@ -12,8 +12,8 @@ const MAX_BYTES: usize = 64 << 20;
 /// Largest number of edits that can be undone.
 const MAX_STEPS: usize = 10_000;
 
-/// Undo history of an editor. Each step has a label. The steps of one gesture (a drag, a held key)
-/// are coalesced into one.
+/// Undo history of an editor. Each step has a label. Edits with the same label during a gesture (a
+/// drag or mode), or by the repeats of a held key, are coalesced into one step.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     /// Scenes to which undo returns, the oldest first: one for each step, as it was before the
@@ -23,8 +23,8 @@ pub struct History {
     /// Scenes to which redo returns: one for each undone step, as it was after the step. The step
     /// to redo next is the last entry.
     future: Vec<HistoryEntry>,
-    /// `true` during a gesture (a drag, a held key): the next step of the gesture is merged with
-    /// the previous step.
+    /// `true` if the next edit may be merged with the previous step: during a gesture (a drag or
+    /// mode) or the repeats of a held key.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -56,9 +56,9 @@ impl History {
     }
 
     /// Makes `scene` the current scene, by a step with the label `label`. `held` is `true` if the
-    /// step belongs to a gesture (a drag, a held key). It is then coalesced with the previous step, if
-    /// that belongs to the same gesture and has the same label. Returns `false`, and records
-    /// nothing, if the scene has not changed.
+    /// step belongs to a gesture (a drag or mode) or to the repeats of a held key. It is then
+    /// coalesced with the previous step, if that has the same label and belongs to the same gesture
+    /// or held key. Returns `false`, and records nothing, if the scene has not changed.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;
@@ -80,7 +80,8 @@ impl History {
         true
     }
 
-    /// Ends a gesture (a drag, a held key): the next step is not merged with its steps.
+    /// Ends a gesture (a drag or mode) or the repeats of a held key: the next step is not merged
+    /// with the previous one.
     pub fn end_gesture(&mut self) {
         self.open = false;
     }

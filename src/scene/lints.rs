@@ -6,13 +6,15 @@ use crate::scene::Scene;
 use crate::scene::validate::Problem;
 use crate::value::{Color, number};
 
-/// Doubtful value: its path in the scene, and a phrase that states it.
+/// Doubtful value: its path in the scene, and a phrase that states the problem, such as
+/// `alpha has no effect here`.
 type Case = (Vec<String>, String);
 
-/// Lint of materials: returns the key of a doubtful value and a phrase that states it.
+/// Lint of materials: returns the key of a doubtful value and a phrase that states the problem.
+/// Returns `None` if the material has no such value.
 type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
 
-/// Lints of materials, each with the help in its warning.
+/// Lints of materials, each with the help text of its warning.
 const MATERIAL_LINTS: [(MaterialLint, &str); 4] = [
     (brighter_than_its_light, "Allowed: the picture is clipped only for display."),
     (
@@ -98,9 +100,9 @@ impl Scene {
 /// Returns a warning if a material may reflect more light than it receives: if the weights of its
 /// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
 /// returns `None`. The warning is `(key, phrase)`: the key that it refers to, and a statement of
-/// the sum. A Cook-Torrance highlight is the mirror reflection of lights, and the reflection is
-/// that of surfaces. Both stand for one physical reflection; only the larger of the two weights is
-/// therefore added.
+/// the sum. A Cook-Torrance highlight is the mirror reflection of lights; the key `reflection` is
+/// the weight of the mirror reflection of surfaces. Both stand for one physical reflection; only
+/// the larger of the two weights is therefore added.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,

@@ -1,8 +1,9 @@
 //! Scene as the user describes it: editable, in double precision, with validation.
 //!
 //! [`Document`] parses and validates a file once; every edit ([`edit::Edit`]) is validated once,
-//! too. The fields of [`Scene`] are public; other code may set them to invalid values without such
-//! an edit. A render session (the rendering thread) therefore validates the scene that it is given.
+//! too. The fields of [`Scene`] are public, so that other code can set them to invalid values
+//! without such an edit. A render session (the rendering thread) therefore validates the scene that
+//! it is given.
 
 mod asset_resolver;
 mod builtin;

@@ -32,7 +32,7 @@ impl Object {
     }
 
     /// Replaces the material name `old` of the object and its parts by `new`. An empty name means
-    /// the default material in an object, and the material of the whole in a part.
+    /// the default material for an object, and the material of the whole compound for a part.
     pub fn rename_material(&mut self, old: &str, new: &str) {
         let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
         for name in names.filter(|name| *name == old) {
@@ -69,8 +69,8 @@ impl Object {
 mod tests {
     use crate::scene::Scene;
 
-    /// Checks that a transform of an empty compound, such as an intersection of disjoint spheres, is
-    /// valid. A compound of small spheres has points and can be too small.
+    /// Checks that an empty compound, such as an intersection of disjoint spheres, may have a
+    /// transform. A compound of tiny size that contains points must be rejected as too small.
     #[test]
     fn compound_without_points_is_not_too_small() {
         let ball = |x: f64, radius: f64| {

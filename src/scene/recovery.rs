@@ -1,10 +1,10 @@
 //! Recovery files: unsaved edits on disk, similar to the swap files of vim.
 //!
-//! The text that saving would write is kept in a hidden file beside the scene. It is replaced
-//! atomically, and removed when the scene is saved or closed deliberately. The process that writes
-//! the file holds a lock on it; the lock ends with the process. An unlocked recovery file is an
-//! orphan of a process that was killed. The lock is taken before the file gets its name, so that
-//! other processes never see the file of a running process unlocked.
+//! The text that saving would write is kept in a hidden file beside the scene. This recovery file
+//! is replaced atomically, and removed when the scene is saved or closed deliberately. The process
+//! that writes the file holds a lock on it; the lock ends with the process. An unlocked recovery
+//! file is an orphan of a process that was killed. The lock is taken before the file gets its name,
+//! so that other processes never see the file of a running process unlocked.
 
 use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
 use crate::scene::format::read::MAX_BYTES;
@@ -42,7 +42,7 @@ pub struct Recovery {
     saved: Option<Saved>,
 }
 
-/// Recovery file that this process has written, and the handle that holds its lock.
+/// Recovery file that this process has written or opened, and the handle that holds its lock.
 #[derive(Debug)]
 struct Saved {
     path: PathBuf,
@@ -345,7 +345,7 @@ fn read(kept: Saved) -> io::Result<Orphan> {
     Ok(Orphan { kept, text, base, written })
 }
 
-/// Returns the recovery files in `folder`.
+/// Returns the paths of the recovery files in `folder`.
 pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");

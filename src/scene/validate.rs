@@ -61,8 +61,8 @@ struct Problems<'a> {
 }
 
 impl Problems<'_> {
-    /// Adds a problem of the value at `path`. `make` returns its phrase and its help; it is called
-    /// only if a further problem can be stored.
+    /// Adds a problem of the value at `path`. `make` returns the phrase and the help of the
+    /// problem; it is called only if a further problem can be stored.
     fn report(&mut self, path: &[&str], make: impl FnOnce() -> (String, String)) {
         if self.found.len() < MAX_REPORTED {
             let (found, help) = make();
@@ -154,9 +154,9 @@ impl Scene {
         (problems.found, problems.more)
     }
 
-    /// Adds at most one problem for each object: a material of the object maps a texture or a bump
-    /// map by texture coordinates (`mapping = "uv"`), and the shape has none. The shapes must be
-    /// valid.
+    /// Adds a problem for each object with a part whose material maps a texture or a bump map by
+    /// texture coordinates (`mapping = "uv"`) but whose shape has no texture coordinates. An object
+    /// with several such parts gets one problem. The shapes must be valid.
     fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

@@ -18,10 +18,10 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Largest relative uncertainty of a measured error, over all measured points, that is due to
-    /// the noise of the reference picture.
+    /// Largest relative uncertainty that the noise of the reference picture causes in a measured
+    /// error. Points of the error curves with too uncertain an error are left out.
     errors_spread: f64,
-    /// Largest relative spread of a time over repeated renders, among all times in the table.
+    /// Largest relative spread of a reported time over the repetitions of its render.
     times_spread: f64,
     /// Largest fraction of the processors' time that other programs used during a measured render.
     /// Null if unknown.

@@ -43,7 +43,7 @@ fn time(seconds: f64) -> String {
 }
 
 /// Returns the number of decimals with which `value` has three significant digits, but at most 2.
-/// `value` is positive.
+/// `value` must be positive.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -73,7 +73,7 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Relative spread of a time over repeated renders above which the printed table warns that the
+/// Relative spread of a time over repeated renders, above which the printed table warns that the
 /// times are unsteady.
 const UNSTEADY: f64 = 0.1;
 /// Fraction of the processors' time that other programs use during a measurement, above which the

@@ -48,9 +48,10 @@ fn fresh_material(scene: &Scene) -> Material {
     Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
 }
 
-/// Adds an object of the kind `kind`. The object rests on the surface in the middle of the camera's
-/// view and is about as large as the objects around it. `material` is the name of an existing
-/// material for the object; `None` creates a new material.
+/// Adds an object of the kind `kind`. The object rests on a surface, as near as possible to the
+/// middle of the camera's view, and is somewhat smaller than most other objects. A plane is put
+/// below all objects. `material` is the name of an existing material for the object; `None` creates
+/// a new material.
 ///
 /// # Errors
 /// Fails if there is no such kind of object, or the scene has no such material.
@@ -145,8 +146,8 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 }
 
 /// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
-/// with fewer lights. At the centre of the scene it is as bright as a light of intensity 1 without
-/// falloff. It is half as bright as that if another light is on.
+/// with fewer lights. It illuminates the centre of the scene as a light of intensity 1 without
+/// falloff does, or half as brightly if another light is on.
 ///
 /// # Errors
 /// Fails if there is no such kind.

@@ -141,7 +141,8 @@ fn rotation(shape: &Shape) -> f64 {
     }
 }
 
-/// Angle of the outer cone of spot lights that are added or converted \[degrees\].
+/// Angle between the axis and the edge of the cone of a spot light that is added or converted
+/// \[degrees\].
 const SPOT_ANGLE: f64 = 30.0;
 
 /// Gives `light`, which has no kind, the kind `name`. Of `position`, `direction` and `radius`, the
@@ -205,10 +206,10 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     ((factor - 1.0).abs() > 1e-3 && factor.is_finite()).then(|| refit(light, factor))
 }
 
-/// Returns the irradiance from `light`, with the intensity 1, at `point` on a surface that faces
-/// the light. A spot light is taken to be aimed at the point, an environment to be white. A light
-/// with a size counts as a light of the same area that is far away. The irradiance is at most that
-/// of a hemisphere of the light's radiance.
+/// Returns the irradiance that `light` would cause with the intensity 1, at `point` on a surface
+/// that faces the light. A spot light is taken to be aimed at the point, an environment to be
+/// white. A light with a size counts as a light of the same area that is far away. The irradiance
+/// is at most that of a hemisphere of the light's radiance.
 fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     let Some(position) = light.position() else { return PI };
     let squared = (DVec3::from_array(position) - point).length_squared();

@@ -326,9 +326,8 @@ fn fine_width(hundredths: i64) -> i64 {
 }
 
 /// Returns the number that is `steps` rungs (round numbers such as 1, 1.1, 1.2) above `x`, or below
-/// it for negative `steps`. `x` is at least 0. Between 0 and `floor` there are no round numbers.
-/// The result is always a round number or an end of `range`; steps up and down therefore undo each
-/// other.
+/// it for negative `steps`. `x` must be at least 0. Between 0 and `floor` there are no rungs. The
+/// result is always a rung or an end of `range`; steps up and down therefore undo each other.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;

@@ -35,8 +35,8 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 
 /// Opens the camera's lens by `stops`; negative stops close it. One stop doubles the area of the
 /// lens. A pinhole opens to a lens whose radius is a fiftieth of the distance from the eye to the
-/// plane in focus. A lens with a given radius becomes a pinhole if it is closed far enough. A
-/// camera without a plane in focus gets one.
+/// plane in focus. A lens that is given by its radius, not by an f-number, becomes a pinhole if it
+/// is closed far enough. A camera without a plane in focus gets one.
 ///
 /// # Errors
 /// Returns the first validation error of the edited scene.

@@ -50,8 +50,8 @@ pub struct Edit {
     /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
     /// one.
     pub subject: Target,
-    /// Short description for the undo history: `move cube`, `radius of ball`. All steps of one
-    /// gesture (a drag, a held key) have the same label.
+    /// Short description for the undo history: `move cube`, `radius of ball`. Successive edits can
+    /// be merged into one undo step only if they have the same label.
     pub label: String,
     /// Sentence about a side effect of the edit; `None` if there is none.
     pub note: Option<String>,

@@ -129,8 +129,8 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
-/// Returns `true` if `part` has only digits, signs, points and `e`. The words `inf` and `nan` are
-/// excluded, because no field accepts them.
+/// Returns `true` if `part` has at least one digit, and apart from digits only signs, points, `e`
+/// and `E`. The words `inf` and `nan` are excluded, because no field accepts them.
 fn digits(part: &str) -> bool {
     part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
         && part.bytes().any(|b| b.is_ascii_digit())

@@ -146,9 +146,9 @@ fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the ground for an object at the point `at`. It is the height of the
-/// highest of the flat objects `floors` below the point, or of the lowest above it if there is none
-/// below. Returns `None` if there is neither.
+/// Returns the height of the ground on the vertical line through the point `at`. It is the height
+/// of the highest of the flat objects `floors` below the point, or of the lowest above it if there
+/// is none below. Returns `None` if there is neither.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))

@@ -29,7 +29,7 @@ pub enum Widget {
     Switch,
     /// Widget for a choice: the value is one of [`Property::words`].
     Choice,
-    /// Widget for the kind of a shape or a light: the value is one of [`Property::words`]. It
+    /// Widget for the kind of a shape or a light: the value is one of [`Property::words`]. The kind
     /// determines which other properties exist.
     Kind,
     /// Widget for a list of transform steps. Typing one of [`Property::words`] appends a step of
@@ -75,8 +75,8 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject` in the order of the table that lists its keys. The
-/// properties of an object's material are not included; they belong to the target
+/// Returns the properties of `subject`, in the order in which the manual of the scene format lists
+/// its keys. The properties of an object's material are not included; they belong to the target
 /// [`Target::material`].
 ///
 /// # Errors

@@ -12,10 +12,10 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
-/// Sets `key` of `subject` to the value in `text`. Keys are those of its
-/// [`Property`](crate::scene::edit::Property) rows. If `text` is empty, `key` is removed. An
-/// optional key then has its default. If `key` is a step of a transform, the step is removed from
-/// the list.
+/// Sets `key` of `subject` to the value in `text`. `key` is the key of one of the
+/// [`Property`](crate::scene::edit::Property) rows of `subject`. For the list of transform steps,
+/// `text` is the kind of a step, which is appended. An empty `text` sets an optional key to its
+/// default, and removes a step of a transform, such as `transform.0.rotate_y`.
 ///
 /// # Errors
 /// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
@@ -124,9 +124,12 @@ pub(super) fn replace(
     Ok(finish(scene, subject, key, values)?.with_note(note))
 }
 
-/// Removes `key` from `values`; the key then has its default. If `key` is a step of a transform,
-/// the step is removed from the list. `values` has the present values of the keys of `subject`.
-/// `field` describes the key.
+/// Removes the optional `key` from `values`, the present values of the keys of `subject`; the key
+/// then has its default. If `key` is a step of a transform, such as `transform.0.rotate_y`, removes
+/// this step from the list instead. `field` describes the key.
+///
+/// # Errors
+/// Fails if the key is required, if there is no such step, or if the edited scene would be invalid.
 fn clear(
     scene: &Scene,
     subject: &Target,

@@ -132,8 +132,8 @@ impl Target {
     }
 
     /// Returns the name of the target in the dashboard's list: `lamp`, `light 2`. An object without
-    /// a name is named by its kind and index: `sphere 3` is the third object. Names from files are
-    /// sanitised and truncated to 40 characters.
+    /// a name is named by its kind and its number among all objects: `sphere 3` is the third
+    /// object. Names from files are sanitised and truncated to 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {

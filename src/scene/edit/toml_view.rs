@@ -94,8 +94,8 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     Ok(next)
 }
 
-/// Returns the description (type, range, help) of the dotted key `key`. Its parts are keys and list
-/// indices. Returns `None` if there is no such key.
+/// Returns the description (type, range, help) of the dotted key `key`, whose parts are keys and
+/// list indices. Returns `None` if there is no such key.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),
@@ -114,8 +114,8 @@ pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Fiel
     }
 }
 
-/// Returns the value of the dotted `key` in `table`. Its parts are keys and list indices. Returns
-/// `None` if `table` does not have the key.
+/// Returns the value of the dotted `key`, whose parts are keys and list indices, in `table`.
+/// Returns `None` if `table` does not have the key.
 pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let mut keys = key.split('.');
     let first = table.get(keys.next()?)?;

@@ -66,7 +66,7 @@ impl CommentKeeper {
     }
 }
 
-/// Calls `act` for every table that has a header and a position in the file.
+/// Calls `act` for every table inside of `table`, at any depth, that has a header in the file.
 fn for_each_table(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
     for (_, item) in table.iter_mut() {
         match item {

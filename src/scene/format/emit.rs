@@ -52,15 +52,15 @@ pub(crate) fn color(value: &Value) -> Option<Color> {
     channels.try_into().ok().map(Color)
 }
 
-/// Returns the table for `value`, an entry of a list in a scene file with the keys `fields`. The
-/// table can be converted to an inline table.
+/// Returns the table for `value`, an entry of a list in a scene file. `fields` are the keys that
+/// the entry may have. The table can be converted to an inline table.
 pub(crate) fn fresh_entry(fields: &'static [Field], value: &Value) -> Table {
     value.as_table().map_or_else(Table::new, |table| fresh_table(fields, table))
 }
 
-/// Returns a table with the keys of `values` that differ from their defaults. Inner tables are
-/// inline. The exceptions are tables in which exactly one key may be given (`shape`, `view_angle`):
-/// they have dotted keys.
+/// Returns a table with the entries of `values` that differ from the defaults of their keys. Inner
+/// tables are inline. The exceptions are tables in which exactly one key may be given (`shape`,
+/// `view_angle`): they have dotted keys.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
     for field in fields {

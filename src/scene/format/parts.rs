@@ -44,8 +44,8 @@ impl Part {
         }
     }
 
-    /// Returns the index, in the whole file, of the first entry of the list at `path` that is in
-    /// this part. Only the list of objects is divided among parts; for all other lists it is 0.
+    /// Returns the index in the whole file of this part's first entry of the list at `path`. Only
+    /// the list of objects is divided among parts; for all other lists the index is 0.
     pub fn first_index(&self, path: &[String]) -> usize {
         match path {
             [list] if list == "object" => self.first_object,

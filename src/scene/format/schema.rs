@@ -128,8 +128,8 @@ impl SchemaChecker<'_> {
     }
 
     /// Adds an error about the unknown key `key`. The error suggests the most similar name in
-    /// `fields`. Returns this name. Returns `None` if no name is similar, or if enough errors that
-    /// come earlier in the file are stored already.
+    /// `fields`. Returns this name. Returns `None` if no name is similar, or if the error is only
+    /// counted, because enough errors earlier in the file are stored.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -265,8 +265,8 @@ impl SchemaChecker<'_> {
 }
 
 /// Returns `true` if a value that is not a table has the type `takes`. A whole number must also be
-/// within its range, because unsigned integers of the scene cannot store other numbers. Other
-/// ranges are checked in [`Scene::faults`](crate::scene::Scene::faults).
+/// within its range, because the unsigned integers in a scene's fields cannot store other numbers.
+/// Other ranges are checked in [`Scene::faults`](crate::scene::Scene::faults).
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
