@@ -55,12 +55,12 @@ impl Thumbnail {
 /// unchanged tiles when the film is downsampled repeatedly; see [`Thumbnail::of_film`].
 pub struct IncrementalDownsample {
     layout: Layout,
-    /// Contribution of each film tile, in the order of the film's tiles.
+    /// Contribution of each film tile to the cells, in the order of the film's tiles.
     parts: Vec<TilePart>,
 }
 
-/// Overlap of the film's tiles with the cells (pixels) of a smaller image: the cells that each
-/// column and each row of tiles overlaps.
+/// Geometry of a downsampling: the sizes of the film and of the smaller image, and the cells
+/// (pixels of the smaller image) that each column and each row of film tiles overlaps.
 struct Layout {
     cols: usize,
     rows: usize,
@@ -74,13 +74,13 @@ struct Layout {
 
 /// Cells (pixels) of a smaller image that one column or one row of film tiles overlaps.
 struct Span {
-    /// Index of the first cell (pixel of the smaller image) that the tiles overlap.
+    /// Index of the first cell (pixel of the smaller image) that the column or row overlaps.
     first: usize,
-    /// Number of cells (pixels of the smaller image) that the tiles overlap.
+    /// Number of cells (pixels of the smaller image) that the column or row overlaps.
     len: usize,
-    /// Cells that overlap each pixel of the tiles, along x for a column of tiles and along y for a
-    /// row. Each pair is the index of a cell, counted from `first`, and the fraction of the pixel
-    /// that this cell covers, 0..=1.
+    /// Cells that overlap each pixel along one axis: x for a column of tiles, y for a row. A cell
+    /// is given as its index, counted from `first`, and the fraction of the pixel that it covers,
+    /// 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
@@ -92,15 +92,15 @@ struct TilePart {
     /// are unchanged. `None` if the tile had no samples at the latest refresh ([`Film::tile`]
     /// returned `None`).
     version: Option<(u64, [u32; 2], usize)>,
-    /// Sums for each cell that the tile overlaps, `[row][column][area, group 0 red, ...]`. The
-    /// first is the total area, inside the cell, of the pixels with samples. Each of the others is
-    /// the sum, over these pixels, of this area times the pixel's mean in one group and channel.
-    /// Empty without samples.
+    /// Values of each cell that the tile overlaps, `[row][column][area, group 0 red, ...]`. `area`
+    /// is the total area, inside the cell, of the pixels with samples. Each other value is the sum,
+    /// over these pixels, of this area times the pixel's mean in one group and channel. Empty
+    /// without samples.
     sums: Vec<f64>,
 }
 
-/// Film tile that has changed since the previous downsampling. [`DirtyTile::refresh`] reads it, on
-/// any thread.
+/// Film tile that has changed since the previous downsampling. [`DirtyTile::refresh`] reads its
+/// samples, and may run on any thread.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -232,11 +232,11 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the sums of one row of
-/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the whole row of pixels were
-/// inside this row of cells. The caller multiplies `line` by the fraction of the height of the
-/// pixels that is inside. `per_unit` are factors that convert integer sums to radiance,
-/// `[group][channel]`.
+/// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the values of one row of
+/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the pixels were inside this
+/// row of cells with their full height; the caller multiplies `line` by the fraction of the height
+/// that is inside. `per_unit` has a factor for each group and channel, which converts an integer
+/// sum to the sum of the radiance of samples.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

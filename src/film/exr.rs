@@ -234,7 +234,8 @@ impl<'a> TileRow<'a> {
 
 /// Returns the contribution of one light group to one colour channel of a pixel: the mean over the
 /// pixel's samples; 0 without samples. `i` is the position of this group and channel in
-/// `[group][channel]` order.
+/// `[group][channel]` order. `per_unit` has the factors that convert integer sums to sums of
+/// radiance, in the same order.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,

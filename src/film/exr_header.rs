@@ -1,9 +1,9 @@
 //! Sorting of the attributes of an OpenEXR header, so that equal pictures have equal files.
 //!
-//! The format allows any order of attributes, and the library's order differs between runs, because
-//! it comes from a hash map. OpenEXR File Layout: a header is a list of attributes that ends with a
-//! zero byte. An attribute consists of a name and a type (each ends with a zero byte), a size (i32,
-//! little-endian), and `size` bytes of data.
+//! OpenEXR allows any order of attributes. The order of the library `exr` differs between runs,
+//! because it comes from a hash map. Source of the format: *OpenEXR File Layout*. A header is a
+//! list of attributes that ends with a zero byte. An attribute consists of a name and a type (each
+//! ends with a zero byte), a size (i32, little-endian), and `size` bytes of data.
 
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 

@@ -35,11 +35,11 @@ pub enum Depth {
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Replaces the first bytes of a file by `after`, then seeks to the end of the file. `before` are
-/// the bytes that the file begins with.
+/// Replaces the first bytes of a file by `after`, then seeks to the end of the file. `before` must
+/// be the bytes with which the file begins.
 ///
 /// # Errors
-/// Fails if the lengths differ, or the output cannot be written.
+/// Fails if `before` and `after` have different lengths, or if the output cannot be written.
 pub(super) fn replace_start(
     sink: &mut dyn WriteSeek,
     before: &[u8],

@@ -13,8 +13,8 @@ pub struct LightWeights {
 
 impl LightWeights {
     /// Returns factors, `[group][channel]`, for the integer sums of a film with the given `scales`.
-    /// A sum times its factor is the radiance of the pixel in one light group and channel, times
-    /// the number of the pixel's samples.
+    /// A sum times its factor is the sum of the radiance of a pixel's samples in one light group
+    /// and channel, under these weights.
     pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()

@@ -1,5 +1,5 @@
-//! Metadata of picture files and film files: reading, and padding of values with spaces. A value
-//! that is known only at the end of a render then fits into the place reserved for it.
+//! Metadata of picture files and film files: reading, and padding of values with spaces. The
+//! padding reserves place for a value that becomes known only at the end of a render.
 
 use crate::disk::open_regular;
 use crate::film::exr_read::read_exr_meta;

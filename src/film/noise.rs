@@ -84,8 +84,8 @@ pub struct TileNoise {
 
 /// Estimator of tile errors under the given light weights and display transform.
 pub struct Estimator {
-    /// Factors, `[group][channel]`, that convert the film's integer sums to radiance times sample
-    /// count.
+    /// Factors, `[group][channel]`, that convert the film's integer sums to sums of the radiance of
+    /// samples.
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
@@ -228,7 +228,8 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Returns this estimate with the larger root mean square errors of this one and of `other`.
+    /// Returns this estimate, but takes `rmse_linear` and `rmse_codes` from `other` where they are
+    /// larger there. The other fields do not change.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             rmse_linear: self.rmse_linear.max(other.rmse_linear),

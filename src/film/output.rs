@@ -9,7 +9,7 @@ use std::ffi::OsStr;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// A picture file format with its encoder.
+/// Picture file format with its encoder.
 struct Format {
     extension: &'static str,
     encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
@@ -60,8 +60,8 @@ impl ImageOutput {
         }
     }
 
-    /// Returns this output with the rule that it never replaces an existing file. Writing then
-    /// fails if the file exists when the write begins, or when the last row is complete.
+    /// Returns an output for the same file that never replaces an existing file. Writing then fails
+    /// if the file exists when the write begins, or when the last row is complete.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
     }

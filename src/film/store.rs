@@ -261,13 +261,14 @@ impl Film {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// Returns the number of pixels of tile `index`.
+    /// Returns the number of pixels of tile `index` that are inside the picture.
     pub fn tile_pixels(&self, index: usize) -> u64 {
         let [width, height] = self.tiles[index].extent();
         (width * height) as u64
     }
 
-    /// Returns the sample counts of tile `index` in both replicates (halves of the samples).
+    /// Returns the numbers of samples per pixel of tile `index` in the replicates A and B (halves
+    /// of the samples). Samples of an incomplete first pass do not count.
     pub fn counts(&self, index: usize) -> [u32; 2] {
         self.tile(index).map_or([0; 2], Tile::counts)
     }
@@ -354,16 +355,16 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Returns number and positions of the samples that were NaN or negative, since the last
-    /// restart of the film.
+    /// Returns the invalid samples (NaN or negative) since the film's last restart: their number,
+    /// and the positions of some of them.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Returns the number of samples above the largest value that the film can store, since the
-    /// last restart of the film.
+    /// Returns the number of samples since the film's last restart that were above the largest
+    /// value that the film can store.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
@@ -390,8 +391,8 @@ impl Film {
         Ok(())
     }
 
-    /// Creates an empty tile at the position of the tile `index`. [`Film::add_at`] adds its samples
-    /// to the film.
+    /// Creates an empty tile with the size of the film's tile `index`. The caller writes samples
+    /// into it and passes it to [`Film::add_at`].
     pub(super) fn new_tile(&self, index: usize) -> Tile {
         let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
         tile.clear_if_stale(self.epoch);

@@ -6,7 +6,8 @@ use crate::film::{LightWeights, TILE};
 
 pub use crate::film::test_random::Rng;
 
-/// Returns an empty film of `width` x `height` pixels, with one light group for each of `scales`.
+/// Returns an empty film of `width` x `height` pixels. Each entry of `scales` creates a light
+/// group; samples of the group are multiplied by it before they are rounded to integers.
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
     Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
@@ -32,8 +33,8 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
 }
 
 /// Adds `count` samples per pixel to both replicates (halves of the samples). `sums(x, y,
-/// replicate)` returns the sum of a pixel's samples in radiance, `[group][channel]`. It is
-/// multiplied by the scale of the group and rounded.
+/// replicate)` returns the sums of a pixel's samples in radiance, `[group][channel]`. Each sum is
+/// multiplied by the scale of its group and rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {

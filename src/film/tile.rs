@@ -257,7 +257,7 @@ impl Tile {
         self.saturated_samples
     }
 
-    /// Records an invalid sample (NaN or negative). It contributes black to the sums.
+    /// Records an invalid sample (NaN or negative). In its place the caller adds black to the sums.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);

@@ -31,7 +31,7 @@ const CLOCK: Tag = *b"TIME";
 /// Version of this program. Another version may trace different samples.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// Inputs of a film's samples that are not in the film's header (size, seed and precision).
+/// Inputs of a film's samples in addition to those in the film's header (size, seed, precision).
 ///
 /// Encoding: hash of the contents of meshes and images (u64, 0 for none), then three texts, each
 /// preceded by its length (u32): the program's version, the sampler's name, the scene.
@@ -199,9 +199,8 @@ impl Checkpoint {
         SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Compiles the scene of the checkpoint and restores the render of this scene. The samples are
-    /// then shown as a picture of `scene`, which may differ from the checkpoint's scene in its
-    /// lights.
+    /// Compiles the checkpoint's scene and restores its render. The picture is then that of
+    /// `scene`, whose lights may differ from those of the checkpoint's scene.
     ///
     /// # Errors
     /// Fails if the samples of the checkpoint are not those of `scene` and `options`.

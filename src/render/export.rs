@@ -25,7 +25,7 @@ pub struct Provenance {
 
 impl RenderState {
     /// Writes the current picture with its metadata to `output`. `report` is the latest report on
-    /// this film; its sample counts and noise become metadata.
+    /// the film; its sample counts and noise become metadata.
     ///
     /// # Errors
     /// Fails if the file cannot be written.
@@ -45,8 +45,8 @@ impl RenderState {
     }
 }
 
-/// Returns the hash that identifies the scene of a picture, after the name of the hash algorithm.
-/// The hash covers the text of the scene file and the contents of its meshes and images.
+/// Returns the hash that identifies the scene of a picture, preceded by the name of the hash
+/// algorithm. The hash covers the text of the scene file and the contents of its meshes and images.
 pub fn scene_hash(text: &str, scene: &Scene) -> String {
     let mut hash = Fnv1a64::default();
     hash.update(text.as_bytes());

@@ -20,9 +20,9 @@ pub struct FirstHitBuffer {
 }
 
 impl FirstHitBuffer {
-    /// Creates the buffer of a grid of `columns` x `rows` cells over a film of `width` x `height`
-    /// pixels, by one ray through the centre of each cell. `first_hits` receives points of the film
-    /// in pixels, and writes the first hits of their camera rays (see
+    /// Traces the buffer of a grid of `columns` x `rows` cells over a film of `width` x `height`
+    /// pixels: one camera ray through the centre of each cell. `first_hits` receives points of the
+    /// film in pixels, and writes the first hits of the camera rays through them (see
     /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],

@@ -167,7 +167,7 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         });
         // The rays of shared packets are divided among the tiles in proportion to the pixels of
         // each tile, because the reported cost must not depend on the packet width. Only packets of
-        // a single tile report glossy lobes.
+        // a single tile report random choices (`glossy`).
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

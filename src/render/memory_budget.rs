@@ -68,10 +68,11 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
 /// Memory \[bytes\] of each tile of a picture region in addition to the film's sums: the tile
 /// itself, its entry in the schedule with the latest estimates, its jobs and their reports.
 const REGION_TILE_BYTES: u64 = 1024;
-/// Memory for each tile of a picture that is rendered in regions: its error, and a number in the
-/// list from which percentiles of the errors are computed \[bytes\].
+/// Memory for each tile of a picture that is rendered in regions: its error estimate, and its entry
+/// in the list from which percentiles of the errors are computed \[bytes\].
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
-/// Memory while a row of OpenEXR tiles is encoded \[bytes per pixel column and light group\].
+/// Memory while a row of OpenEXR tiles is encoded \[bytes per pixel column and layer\]. The layers
+/// are the picture, its two replicates, and the light groups.
 const ROW_BYTES: u64 = 256;
 /// Memory of the program's buffers and allocator, in addition to scene and film \[bytes\].
 const PROGRAM_BYTES: u64 = 3 << 20;
@@ -97,7 +98,8 @@ pub struct Regions {
 /// (which is compiled already) and one region at a time.
 ///
 /// # Errors
-/// Returns the smallest possible `cap` in bytes if even regions of one row of tiles do not fit.
+/// Returns the smallest possible `cap` in bytes if not even regions of one row of tiles fit, or if
+/// the process has already used more memory than `cap`.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }

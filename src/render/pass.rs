@@ -202,9 +202,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces the samples of a packet that the film cannot hold, and records them in `rejected`.
-    /// Valid samples, which are the usual case, cost only a comparison. `sample_of` receives a lane
-    /// and returns the position of its pixel and its sample index.
+    /// Replaces those samples of a packet that the film cannot hold, and records them in
+    /// `rejected`. Valid samples, which are the usual case, cost only a comparison. `sample_of`
+    /// receives a lane and returns the position of its pixel and its sample index.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -257,11 +257,11 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 /// Samples of one job that the film cannot hold.
 pub(super) struct RejectedSamples {
     replicate: usize,
-    /// Samples that are NaN or negative in some light group; the film stores black for this group
-    /// instead.
+    /// Samples that are NaN or negative in at least one light group. In place of such a group's
+    /// light the film stores black.
     pub(super) bad: Vec<InvalidSample>,
-    /// Samples that are above the largest value that the film can hold in some light group; the
-    /// film stores this value instead.
+    /// Samples that exceed the film's largest value in at least one light group. In place of the
+    /// excessive values the film stores the largest value.
     pub(super) saturated: Vec<InvalidSample>,
 }
 

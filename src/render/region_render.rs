@@ -37,8 +37,8 @@ pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions: bands of rows, one after another.
 pub struct RegionRender<'a> {
-    /// Compiled scene, with the film of the current region. `None` only while the film is
-    /// exchanged.
+    /// Compiled scene, with the film of the current region. `None` while the film is exchanged, and
+    /// after a failed exchange.
     state: Option<RenderState>,
     settings: Settings,
     pool: rayon::ThreadPool,
@@ -57,10 +57,10 @@ pub struct RegionRender<'a> {
 }
 
 impl<'a> RegionRender<'a> {
-    /// Compiles `scene`, which has no validation errors, for regions of `rows` rows and for
-    /// `threads` threads. `rows` is a multiple of [`TILE`](crate::film::TILE). Each region is
-    /// rendered until the stop criteria of `settings` are reached. A time limit is divided among
-    /// the regions.
+    /// Compiles `scene`, which must have no validation errors, for regions of `rows` rows and for
+    /// `threads` threads. `rows` must be a multiple of [`TILE`](crate::film::TILE). Each region is
+    /// rendered until one of the stop criteria of `settings` is reached. A time limit is divided
+    /// among the regions.
     ///
     /// # Errors
     /// Fails if a thread cannot be started, or if there is not enough memory for a region.

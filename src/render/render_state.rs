@@ -20,7 +20,7 @@ pub struct Options {
     pub world: world::Options,
     /// Random seed and kind of random numbers.
     pub sampling: SampleSettings,
-    /// Display transform under which the noise is estimated, in 8-bit levels.
+    /// Display transform of the picture whose noise is estimated in 8-bit levels.
     pub display: Display,
 }
 
@@ -40,8 +40,8 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which has no validation errors, and creates an empty film. The film reuses
-    /// the memory of the film of `previous`.
+    /// Compiles `scene`, which must have no validation errors, and creates an empty film. The film
+    /// reuses the memory of the film of `previous`.
     ///
     /// # Panics
     /// Panics if there is not enough memory for the film.
@@ -81,9 +81,9 @@ impl RenderState {
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
 
-    /// Compiles `scene`, which has no validation errors, and creates an empty film for the rows
-    /// `rows` of the picture. The film reuses the memory of the film of `previous`. The first row
-    /// is a multiple of [`TILE`](crate::film::TILE).
+    /// Compiles `scene`, which must have no validation errors, and creates an empty film for the
+    /// rows `rows` of the picture. The film reuses the memory of the film of `previous`. The first
+    /// row must be a multiple of [`TILE`](crate::film::TILE).
     ///
     /// # Errors
     /// Fails if there is not enough memory for the film.
@@ -134,9 +134,8 @@ impl RenderState {
         })
     }
 
-    /// Checks that the samples of the film are valid for `scene`. If they are, the film shows them
-    /// as a picture of `scene` from now on, and the function returns `true`. Otherwise it changes
-    /// nothing and returns `false`.
+    /// Shows the samples of the film as a picture of `scene` from now on and returns `true`, if the
+    /// samples are valid for `scene`. Otherwise changes nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;

@@ -43,8 +43,9 @@ impl SyncRender {
     }
 
     /// Traces the next allocation round: the samples that the schedule adds next, in both
-    /// replicates (halves of the samples). Then estimates the error of the picture. Returns the
-    /// stop criterion that ended the render, or `None` if it continues.
+    /// replicates (halves of the samples). Estimates the error of the picture if the schedule
+    /// requests an estimate at the end of this round. Returns the stop criterion that ended the
+    /// render, or `None` if it continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -67,8 +68,8 @@ impl SyncRender {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
-    /// Returns a lower and an upper estimate of the total seconds of tracing until the displayed
-    /// RMSE is `codes` 8-bit levels. Returns `None` before the first estimate.
+    /// Returns a lower and an upper estimate of the total seconds of tracing until the RMSE of the
+    /// displayed picture falls to `codes` 8-bit levels. Returns `None` before the first estimate.
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))

@@ -32,8 +32,8 @@ pub struct Wave {
 
 impl Wave {
     /// Cuts a piece from the wave (a set of concurrent jobs). Each job is shortened to at most
-    /// `longest` samples per pixel. The piece has the first of these jobs: as many as together
-    /// trace at least `pixel_samples` samples, summed over all pixels, and at least one job.
+    /// `longest` samples per pixel. The piece has only the first of these jobs: just enough to
+    /// trace `pixel_samples` samples, summed over all pixels, and at least one job.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -53,7 +53,8 @@ pub struct JobReport {
     /// Number of rays of every kind (camera, shadow, reflected, transmitted). It is the cost of the
     /// job, independent of the machine.
     pub rays: u64,
-    /// `true` if a path of the job has sampled a glossy lobe.
+    /// `true` if a path of the job has made a random choice: it has sampled a glossy lobe or a
+    /// point of an emitter, or has chosen among lights or between reflection and transmission.
     pub glossy: bool,
     /// Estimated error of the job's tile. `None` unless [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,

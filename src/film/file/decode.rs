@@ -56,7 +56,7 @@ pub fn is_film_file(path: &Path) -> bool {
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-/// Reader of a film file (`.zk`) that has read everything before the tiles.
+/// Reader of a film file (`.zk`). It has already read everything before the tiles.
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
@@ -99,8 +99,8 @@ impl FilmReader<BufReader<File>> {
 }
 
 impl<R: Read> FilmReader<R> {
-    /// Reads everything before the tiles from `bytes`, which has `length` bytes. `path` is the name
-    /// of the file in errors.
+    /// Reads everything before the tiles from `bytes`, the contents of a film file of `length`
+    /// bytes. `path` is the name of the file in errors.
     ///
     /// # Errors
     /// Fails if the bytes cannot be read, are no film file, or are damaged.
@@ -245,7 +245,7 @@ impl<R: Read> FilmReader<R> {
 
 /// Decodes the `HEAD` chunk of a film file. `length` is the length of the whole file in bytes.
 /// Metadata and further chunks of the result are empty. Returns `None` if a field is not valid, or
-/// if a file of `length` bytes is too short for the tiles of a film of this size.
+/// if a file of `length` bytes is too short for the tiles of a film with the decoded size.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;

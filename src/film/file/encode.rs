@@ -53,7 +53,7 @@ pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. A tile in
+/// Encodes the `TILE` chunk with the number `index`, which must be below [`tile_chunks`]. A tile in
 /// which only some pixels have their first sample is written as a tile without samples.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;

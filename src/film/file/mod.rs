@@ -87,8 +87,8 @@ impl FilmFileHeader {
         self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
     }
 
-    /// Writes the picture of `film` to `output`. `self` is the header of the film. `depth` is the
-    /// number of bits per channel of a PNG.
+    /// Writes the picture of `film` to `output`. `self` must be the header of `film`. `depth` is
+    /// the number of bits per channel of a PNG.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.

@@ -11,7 +11,7 @@ const LARGEST_SAMPLE: u64 = 1 << 49;
 /// Number of bytes of one of the film's integer sums in memory.
 const WORD: usize = 8;
 
-/// Appends the film file's record of a tile to `out`. `None` is a tile without samples.
+/// Appends the film file's record of `tile` to `out`; `None` stands for a tile without samples.
 pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.counts() != [0; 2]) else {
         return out.extend([0; 8]);
@@ -59,8 +59,8 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     out.truncate(end);
 }
 
-/// Reads the film file's record of a tile into `tile`, which is empty. Returns `None` if the record
-/// is not valid.
+/// Reads the film file's record of a tile into `tile`, which must be empty. Returns `None` if the
+/// record is not valid.
 pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
     let counts = [fields.u32()?, fields.u32()?];
     let saturated_samples = fields.u64()?;

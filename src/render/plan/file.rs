@@ -4,7 +4,7 @@
 //! The line of a tile has four fields. The first is its base: the number of samples per pixel that
 //! each replicate (half of the samples) had when the plan started. The second is this number in the
 //! merged picture, the third is the expected number of rays per sample. The fourth is `g` if a path
-//! has sampled a glossy lobe, otherwise `-`.
+//! in the tile has made a random choice, such as a direction of a glossy lobe, otherwise `-`.
 
 use crate::disk::open_regular;
 use crate::film::{Display, Tone};

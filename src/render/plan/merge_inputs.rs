@@ -1,5 +1,5 @@
 //! Inputs of a merge: film files that belong to one plan (a render divided among shards). No shard
-//! is in two files.
+//! may be in two of the files.
 
 use crate::render::plan::part::{Part, PartShard};
 use crate::render::plan::{BASE, Plan};

@@ -55,8 +55,8 @@ pub struct PlanSettings {
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Largest number of samples per pixel in tiles with glossy lobes, over the whole render; 0 for
-    /// no limit.
+    /// Largest number of samples per pixel in tiles in which a path makes a random choice (such as
+    /// a direction of a glossy lobe), over the whole render; 0 for no limit.
     pub rays_per_pixel: u32,
     /// Noise target: RMSE of the displayed picture in 8-bit levels.
     pub noise_codes: f64,
@@ -77,8 +77,8 @@ pub struct Plan {
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_codes: f64,
-    /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles without glossy lobes,
-    /// then of tiles with them.
+    /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles in which no path makes a
+    /// random choice, then of the other tiles (see [`PlannedTile::glossy`]).
     pub slopes: [f64; 2],
     /// Sample counts of the picture's tiles, in row order.
     pub tiles: Vec<PlannedTile>,
@@ -95,7 +95,7 @@ pub struct PlannedTile {
     pub end: u32,
     /// Expected number of rays per sample in this tile.
     pub rays_per_sample: f32,
-    /// `true` if a path in the tile has sampled a glossy lobe.
+    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
     pub glossy: bool,
 }
 

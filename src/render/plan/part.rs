@@ -130,7 +130,7 @@ impl Part {
 
 impl Plan {
     /// Returns the numbers of the plan's shards, including [`BASE`], that are not among `numbers`.
-    /// `numbers` are in ascending order.
+    /// `numbers` must be in ascending order.
     pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
         let all = BASE..=self.settings.shards;
         all.filter(|number| numbers.binary_search(number).is_err()).collect()

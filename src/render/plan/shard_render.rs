@@ -44,9 +44,9 @@ pub struct ShardRender {
 }
 
 impl ShardRender {
-    /// Continues the render of a shard on `threads` threads. `ranges` are the shard's sample
-    /// indices in each tile. The film of `state` may already hold the first samples of some ranges;
-    /// these samples took `rays` rays.
+    /// Creates the render of a shard on `threads` threads. `ranges` are the shard's sample indices
+    /// in each tile. The film of `state` may already hold the first samples of some ranges, which
+    /// took `rays` rays; the render then continues after them.
     ///
     /// # Errors
     /// Fails if the sample counts of a tile cannot come from an interrupted render of these ranges,

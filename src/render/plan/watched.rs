@@ -32,7 +32,8 @@ pub struct WatchedFilms {
     /// Plan file that the user named, as an input of a merge; it holds no shards. `None` if the
     /// user named film files.
     named: Option<MergeInput>,
-    /// Plan that all film files share. `None` for a checkpoint, or before the first file is read.
+    /// Plan that all film files share. `None` if the only file is a checkpoint of a render without
+    /// a plan, or before the first file is read.
     plan: Option<Arc<Plan>>,
     /// `(stamps, sum)` of the complete film files: their stamps (time, length, inode) by their
     /// index in `files`, and the sum of their films. `None` before a file is read.
@@ -181,8 +182,8 @@ impl WatchedFilms {
         self.header.as_ref()
     }
 
-    /// Returns the plan that all files share. Returns `None` for a checkpoint, or before the first
-    /// file is read.
+    /// Returns the plan that all files share. Returns `None` if the only file is a checkpoint of a
+    /// render without a plan, or before the first file is read.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_deref()
     }
@@ -237,8 +238,9 @@ impl WatchedFilms {
         rows
     }
 
-    /// Returns the shards of the plan that no file holds, such as `3, 5-7`. Returns `None` if the
-    /// plan file was named, because its files are then listed as missing.
+    /// Returns the shards of the plan that no file holds, such as `3, 5-7`; `None` if there are
+    /// none. Also returns `None` if the user named the plan file, because the film file of each
+    /// missing shard then has an entry of its own.
     fn unnamed(&self) -> Option<String> {
         let plan = self.plan.as_ref().filter(|_| self.named.is_none())?;
         let mut held: Vec<u32> =
@@ -414,7 +416,7 @@ impl WatchedFilms {
     }
 }
 
-/// Creates a film without samples with the size, scales and seed of `header`.
+/// Creates an empty film that has the size, scales, seed and precision of `header`.
 ///
 /// # Errors
 ///

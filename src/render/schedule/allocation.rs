@@ -278,8 +278,8 @@ impl Schedule {
     }
 
     /// Returns for each tile a model of its expected error as a function of its sample count.
-    /// `pooled` is `[slope of tiles without glossy lobes, slope of tiles with them]`, with RMSE ~
-    /// n^-slope for n samples.
+    /// `pooled` is `[slope of tiles that are not glossy, slope of glossy tiles]`, with RMSE ~
+    /// n^-slope for n samples. A tile is glossy if a path in it has made a random choice.
     pub(super) fn expected_errors(&self, pooled: [f64; 2]) -> Vec<ErrorModel> {
         self.calibrated(&self.tile_models(pooled))
     }
@@ -319,9 +319,9 @@ impl Schedule {
 }
 
 /// Returns the sum of the validation estimates over the tiles of `class` (tiles with similar error
-/// estimates) and of its nearest classes. Classes are added until there are [`MIN_CLASS_TILES`]
-/// tiles. The validation estimates of the other classes are scaled to the allocation estimate of
-/// `class`. If that estimate is 0, no classes are added.
+/// estimates) and of its nearest classes. Classes are added in the order of their distance, up to
+/// [`MAX_CLASS_DISTANCE`], until there are [`MIN_CLASS_TILES`] tiles. Their validation estimates
+/// are scaled to the allocation estimate of `class`. If that estimate is 0, no classes are added.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };
@@ -362,7 +362,7 @@ impl WeightedSum {
 /// Fits two error models to the noise estimates of a tile: one to its allocation estimates, one to
 /// its validation estimates. Each estimate is weighted by its sample count. Earlier estimates, from
 /// fewer samples, reduce the influence of chance in the latest one. `pooled` is `[slope of all
-/// tiles without glossy lobes, slope of all tiles with them]`.
+/// tiles that are not glossy, slope of all glossy tiles]`.
 fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
     let (mut sums, mut weights) = ([0.0; 2], 0.0);

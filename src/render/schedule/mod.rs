@@ -53,8 +53,7 @@ pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
 /// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]. Returns
 /// 0 if `count` is such a multiple, or is smaller than [`SAMPLE_ALIGNMENT`]. A larger count is no
-/// multiple only if a stop criterion ended the render at this count and the render was then
-/// resumed.
+/// multiple only if an earlier stop criterion or limit ([`Settings::rays_per_pixel`]) ended there.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
@@ -225,7 +224,8 @@ impl Schedule {
         self.tiles.iter().map(|tile| tile.error)
     }
 
-    /// Returns the number of samples traced so far, over all pixels.
+    /// Returns the number of samples traced so far, over all pixels and both replicates (halves of
+    /// the samples).
     pub fn samples(&self) -> u64 {
         self.samples
     }
@@ -254,9 +254,10 @@ impl Schedule {
     }
 
     /// Returns the largest number of samples per pixel that `tile` may have in each replicate (one
-    /// of two independent halves of the samples), at the end of the render. For tiles with a glossy
-    /// lobe it is half of [`Settings::rays_per_pixel`], at least 1. For other tiles, or if that
-    /// setting is 0, it is [`MAX_SAMPLES`].
+    /// of two independent halves of the samples) at the end of the render. If a path in the tile
+    /// has made a random choice (such as a direction of a glossy lobe), it is half of
+    /// [`Settings::rays_per_pixel`], at least 1. For other tiles, or if that setting is 0, it is
+    /// [`MAX_SAMPLES`].
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -365,10 +366,10 @@ impl Schedule {
             .collect()
     }
 
-    /// Returns the convergence slope p of all tiles with a glossy lobe if `glossy` is `true`,
-    /// otherwise of all other tiles: RMSE ~ n^-p for n samples. It is fitted to the latest doubling
-    /// of the sample count of each of these tiles. Returns 0.5 if none of them has doubled its
-    /// count, or their errors are 0.
+    /// Returns the convergence slope p, RMSE ~ n^-p for n samples, of all tiles in which a path has
+    /// made a random choice if `glossy` is `true`, otherwise of all other tiles. It is fitted to
+    /// the latest doubling of the sample count of each of these tiles. Returns 0.5 if none of them
+    /// has doubled its count, or their errors are 0.
     fn pooled_slope(&self, glossy: bool) -> f64 {
         self.fitted_slope(glossy).unwrap_or(0.5)
     }

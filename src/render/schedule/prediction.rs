@@ -23,8 +23,8 @@ pub struct Prediction {
     /// Expected RMSE of the whole picture after the predicted samples. Its unit is that of the
     /// error target: 8-bit levels or radiance.
     pub rmse: f64,
-    /// Slopes of the error, RMSE ~ n^-slope for n samples: `[tiles without glossy lobes, tiles with
-    /// them]`.
+    /// Slopes of the error, RMSE ~ n^-slope for n samples: `[tiles that are not glossy, glossy
+    /// tiles]` (see [`TilePrediction::glossy`]).
     pub slopes: [f64; 2],
 }
 
@@ -38,7 +38,8 @@ pub struct TilePrediction {
     pub count: u32,
     /// Mean number of rays per sample in this tile.
     pub rays_per_sample: f64,
-    /// `true` if a path in this tile has hit a glossy lobe.
+    /// `true` if a path in this tile has made a random choice, such as a direction of a glossy
+    /// lobe.
     pub glossy: bool,
 }
 
@@ -51,7 +52,7 @@ pub struct TileSamples {
     pub count: u32,
     /// Mean number of rays per sample in the tile.
     pub rays_per_sample: f64,
-    /// `true` if a path in the tile has hit a glossy lobe.
+    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
     pub glossy: bool,
     /// Estimated error of the tile.
     pub error: TileNoise,
@@ -79,9 +80,9 @@ impl Schedule {
     /// Predicts the sample counts at which the picture meets its error target. Samples go to the
     /// tiles in which they reduce the error most per ray, as in an adaptive render. A share
     /// `EXPLORATION` of the additional rays goes to the tiles with the fewest samples.
-    /// `usual_slopes` is `[assumed slope of tiles without glossy lobes, of tiles with them]`. Each
-    /// is used as long as no tile of its kind has doubled its sample count. Returns `None` without
-    /// an error target, or before the first noise estimate.
+    /// `usual_slopes` is `[assumed slope of tiles that are not glossy, of glossy tiles]` (see
+    /// [`TilePrediction::glossy`]). Each is used as long as no tile of its kind has doubled its
+    /// sample count. Returns `None` without an error target, or before the first noise estimate.
     pub fn predict(&self, usual_slopes: [f64; 2]) -> Option<Prediction> {
         let (criterion, target) = self.target()?;
         let rmse = criterion.of_picture(self.noise?);

@@ -12,8 +12,8 @@ impl Schedule {
         self.settings.stop = stop;
     }
 
-    /// Sets the largest number of samples per pixel in tiles that show glossy reflections; 0 for no
-    /// limit. See
+    /// Sets the largest number of samples per pixel in tiles in which a path has made a random
+    /// choice, such as a direction of a glossy lobe; 0 for no limit. See
     /// [`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel).
     pub fn set_rays_per_pixel(&mut self, cap: u32) {
         self.settings.rays_per_pixel = cap;

@@ -55,9 +55,9 @@ pub enum StoppedBy {
     Rmse,
     /// The time limit of the render was reached.
     Time,
-    /// At least one tile with a glossy lobe has reached its largest number of samples
-    /// ([`Settings::rays_per_pixel`]). The tiles that may still get samples together meet the error
-    /// target, or there are no such tiles.
+    /// At least one tile has reached its largest number of samples ([`Settings::rays_per_pixel`]).
+    /// The tiles that may still get samples together meet the error target, or there are no such
+    /// tiles.
     RaysPerPixel,
     /// All tiles hold the largest number of samples that a tile of the film can hold.
     Full,
@@ -82,14 +82,13 @@ impl StoppedBy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// `true` if tiles may get different numbers of samples according to their noise. Otherwise all
-    /// tiles get the same number, except that [`Settings::rays_per_pixel`] limits the samples of
-    /// tiles with a glossy lobe.
+    /// tiles get the same number, except those that [`Settings::rays_per_pixel`] limits.
     pub adaptive: bool,
     /// Measure of the error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// Largest number of samples per pixel in tiles with a glossy lobe, over the whole render and
-    /// both replicates (halves of the samples). It is rounded down to an even number, at least 2. 0
-    /// means no limit.
+    /// Largest number of samples per pixel in tiles in which a path has made a random choice, such
+    /// as a direction of a glossy lobe. It is for the whole render and both replicates (halves of
+    /// the samples) together, and is rounded down to an even number, at least 2. 0 means no limit.
     pub rays_per_pixel: u32,
     /// Stop criteria of the render.
     pub stop: Stop,

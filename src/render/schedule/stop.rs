@@ -8,10 +8,10 @@ use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 /// does not end a render.
 ///
 /// A render that ends with the first estimate below its target ends too early, and reports too
-/// little, if this estimate is too low by chance. Ratio of true to reported RMSE at the end of
-/// simulated renders whose estimates are exact but for chance: 2.2 with 3 effective pixels, 1.49
-/// with 6, 1.22 with 12. If the estimates of the latest three doublings have to be below the target
-/// as well, it is 1.56, 1.23 and 1.11.
+/// small an error, if this estimate is too low by chance. Ratio of true to reported RMSE at the end
+/// of simulated renders whose estimates are exact but for chance: 2.2 with 3 effective pixels, 1.49
+/// with 6, 1.22 with 12. If the estimates before the latest three doublings of the samples must be
+/// below the target as well, the ratio is 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
 impl Schedule {
@@ -98,10 +98,11 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns the estimate of the picture's error on which the end of the render depends. With many
-    /// effective pixels it is the latest estimate. With fewer than [`FEW_PIXELS_TO_STOP`] it is the
-    /// largest of the latest estimate and of those before the latest three doublings of the sample
-    /// counts, which are nearly independent of each other. Returns `None` before the first estimate.
+    /// Returns the estimate of the picture's error on which the end of the render depends. With
+    /// many effective pixels it is the latest estimate. With fewer than [`FEW_PIXELS_TO_STOP`] it
+    /// is the largest of the latest estimate and of the estimates before each of the latest three
+    /// doublings of the sample counts, scaled to the present counts. Estimates on both sides of a
+    /// doubling are nearly independent of each other. Returns `None` before the first estimate.
     fn largest_recent_noise(&self) -> Option<Noise> {
         let latest = self.noise?;
         if self.settings.criterion.of(latest.effective_pixels) >= FEW_PIXELS_TO_STOP {
@@ -114,11 +115,11 @@ impl Schedule {
         Some((0..=DOUBLINGS).filter_map(earlier).fold(latest, Noise::larger))
     }
 
-    /// Returns `true` if the error target is met except in tiles that may not get more samples.
-    /// This requires that at least one tile has its largest number of samples, and that the pooled
-    /// error of the other tiles meets the target. The limit applies only to tiles with glossy
-    /// lobes, and is the same for all of them
-    /// ([`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel)).
+    /// Returns `true` if the error target is met except in tiles that have reached their largest
+    /// number of samples. This requires that there is at least one such tile, and that the pooled
+    /// error of the other tiles meets the target. The largest number
+    /// ([`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel)) is the
+    /// same for all tiles that it limits.
     fn capped_at_target(&self) -> bool {
         let Some((criterion, target)) = self.target() else { return false };
         let is_open = |t: &Tile| t.done < self.cap(t);

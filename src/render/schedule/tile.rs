@@ -18,12 +18,13 @@ pub(super) struct Tile {
     pub done: u32,
     /// Number of rays traced in the tile so far.
     pub rays: u64,
-    /// `true` if a path in the tile has hit a glossy lobe.
+    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
     pub glossy: bool,
     /// Latest noise estimate of the tile. `None` before the first estimate.
     pub error: Option<TileNoise>,
-    /// Earlier noise estimates of the tile, oldest first. From one entry to the next the sample
-    /// count at least doubles.
+    /// Noise estimates of the tile from which its error over the sample count is fitted, oldest
+    /// first. From one entry to the next the sample count at least doubles. The last entry may be
+    /// the latest estimate.
     pub history: Vec<TileNoise>,
 }
 

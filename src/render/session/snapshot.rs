@@ -39,7 +39,8 @@ pub struct Snapshot {
     /// `None` if no size is requested, or without a scene. Before the first complete picture it is
     /// also `None` if tracing the hits would delay that picture too much.
     pub first_hits: Option<Arc<FirstHitBuffer>>,
-    /// Error and number of samples of each tile.
+    /// Error and number of samples of each tile; empty if no picture is requested, or without a
+    /// film.
     pub tiles: Arc<TileMaps>,
     /// Samples and error of the requested pixel. `None` if the pixel is outside of the film or none
     /// is requested.
@@ -95,8 +96,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Creates a snapshot of `film`. `noise_codes` has the RMSE of each tile in 8-bit levels.
-    /// `downsample` keeps the downsampled picture of the previous snapshot, so that only changed
-    /// tiles are read again.
+    /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
+    /// so that only changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval at which the watched film files are checked.
 const POLL: Duration = Duration::from_secs(1);
-/// Smallest pause between two checks of the watched files, as a multiple of the duration of the
-/// first check. With 2, checks take at most a third of the time.
+/// Smallest pause after a check of the watched files, as a multiple of the duration of this check.
+/// With 2, checks take at most a third of the time.
 const REST: u32 = 2;
 
 /// Function that a client queues to run on the thread of the watch session. Its argument is the
@@ -156,7 +156,7 @@ struct Worker {
     reported: Option<WatchReport>,
 }
 
-/// Report on the film that a watch session shows, and RMSE of its tiles in 8-bit levels.
+/// Report on the film that a watch session shows, and RMSE of the film's tiles in 8-bit levels.
 struct Shown {
     report: Report,
     noise_codes: Vec<f32>,

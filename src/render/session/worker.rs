@@ -27,8 +27,8 @@ pub(super) struct Worker {
     /// `true` if the newest scene must start with an empty film, even if samples of the active
     /// render could be reused.
     restart: bool,
-    /// Scene to show, and the checkpoint from which its render continues. `None` if there is
-    /// nothing to continue.
+    /// Scene to show, and the checkpoint from which its render continues. `None` if no
+    /// checkpoint is waiting to be continued.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     checkpoints: Vec<(Provenance, CheckpointTask)>,

@@ -117,8 +117,8 @@ fn rounds_are_deterministic_and_independent_of_time() {
 }
 
 /// Checks that a tile gets further samples even if only its validation pixels are noisy. These
-/// pixels do not select tiles for samples. The adaptive picture takes at most 1.5 times the rays of
-/// a uniform picture with the same true error.
+/// pixels do not select tiles for samples. The adaptive picture must take at most 1.5 times the
+/// rays of a uniform picture with the same true error.
 #[test]
 fn noise_in_validation_pixels_is_sampled_away() {
     for hidden in [vec![7], (0..100).step_by(3).collect::<Vec<_>>()] {

@@ -47,7 +47,7 @@ struct Model {
     rng: Rng,
     waves: usize,
     /// `true` if each job must start at a sample index that is a multiple of [`SAMPLE_ALIGNMENT`],
-    /// or a power of two below it.
+    /// or a power of two below [`SAMPLE_ALIGNMENT`].
     aligned: bool,
     /// Numbers of the tiles with errors only in their validation pixels, which do not select tiles
     /// for samples. The allocation estimate of these tiles is 0.
