@@ -115,8 +115,8 @@ fn silhouette_edges_are_equal_under_every_acceleration() {
 }
 
 /// Compares the acceleration structures on small and elongated pictures with view angles from 5 to
-/// 179 degrees. One tile may span more than a half space around the tile's centre. Each scene has
-/// two planes, a rectangle, and random objects.
+/// 179 degrees. The rays of a single tile may cover more than a hemisphere of directions. Each
+/// scene has two planes, a rectangle, and random objects.
 #[test]
 fn view_angles_are_equal_under_every_acceleration() {
     let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\

@@ -230,8 +230,9 @@ fn floor(folder: &Path, environment: &str) -> Scene {
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Checks an environment image with a pixel 2^20 times as bright as the others. No sample is
-/// infinite or NaN. The radiance of a white floor is its irradiance by the image, divided by pi.
+/// Checks an environment image with a pixel 2^20 times as bright as the others. No sample may be
+/// infinite or NaN. The radiance of a white floor must be its irradiance by the image, divided by
+/// pi.
 #[test]
 fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     let folder = tempfile::tempdir().unwrap();

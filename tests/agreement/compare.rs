@@ -20,8 +20,8 @@ use zerkalo::world::Precision;
 pub const SIZE: [u32; 2] = [32, 24];
 /// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 4;
-/// Probability of a false alarm in all comparisons of one scene. With a hundred scenes, the
-/// probability of any false alarm is 1 / 1000.
+/// Probability that any of the comparisons of one scene gives a false alarm. With a hundred scenes,
+/// the probability of any false alarm is 1 / 1000.
 const LEVEL: f64 = 1e-3 / 100.0;
 
 /// Difference between two pictures of a scene, and the largest difference that chance explains.
@@ -30,8 +30,8 @@ pub struct Verdict {
     /// Largest difference between the means of a block in both pictures, in standard errors.
     pub worst_z: f64,
     pub allowed_z: f64,
-    /// Chi-square: sum over all blocks of the squared difference in brightness, each in standard
-    /// errors.
+    /// Chi-square: each block's difference in brightness, in standard errors, squared and summed
+    /// over all blocks.
     pub chi2: f64,
     pub allowed_chi2: f64,
     pub picture: Vec<DVec3>,
@@ -104,11 +104,11 @@ impl Picture {
         })
     }
 
-    /// Compares the block means of this picture with those of the picture `reference`. The
-    /// reference has `samples` samples per pixel and is far noisier than this picture. The variance
-    /// of its single samples is estimated twice: from the reference, and from the program's picture
-    /// with independent random numbers. The larger estimate is used, because few samples
-    /// underestimate the variance of rare events.
+    /// Compares the block means of this picture with those of `reference`, a far noisier picture
+    /// with `samples` samples per pixel. The variance of single samples in the reference is
+    /// estimated twice: from the reference, and from the program's picture with independent random
+    /// numbers. The larger estimate is used, because few samples underestimate the variance of rare
+    /// events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
@@ -157,8 +157,8 @@ pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
 
-/// Returns the scene seen by a camera that is turned to `point`, with a vertical view angle of
-/// `degrees`. If the camera focuses on a point, the plane in focus still contains this point.
+/// Returns `scene` with its camera turned to `point` and with a vertical view angle of `degrees`.
+/// If the camera has a focus point, the plane in focus still contains the focus point.
 pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     let mut scene = scene.clone();
     scene.camera.target = Some(point);

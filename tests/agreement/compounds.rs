@@ -53,8 +53,8 @@ const ASIDE: f64 = 1e-7;
 pub type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Returns `true` if the ball around the shape shows that a ray does not hit it before the
-    /// distance `end`.
+    /// Returns `true` if the ball around the shape shows that a ray does not hit the shape before
+    /// the distance `end`.
     fn is_beside(&self, origin: DVec3, direction: DVec3, end: f64) -> bool {
         self.scene_ball.is_some_and(|(center, radius)| {
             // Distance to the point of the ray that is nearest to the centre.

@@ -158,7 +158,7 @@ impl Triangles {
         self.corners.iter().flatten().copied()
     }
 
-    /// Returns the colour of triangle `i` in the mesh file.
+    /// Returns the colour that the mesh file gives triangle `i`; white without colours in the file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.colors.get(i).copied().unwrap_or(DVec3::ONE)
     }

@@ -84,7 +84,7 @@ fn shipped_scenes_agree_with_reference_tracer() {
     for (name, scene) in all_shipped() {
         let scene = small(scene);
         let samples = match Tracer::new(&scene, Mutation::None) {
-            // The other tests of that scene need more samples.
+            // Other tests need the reference picture of emissive-objects.toml with more samples.
             Ok(tracer) if tracer.is_slow() && name != "emissive-objects.toml" => {
                 REFERENCE_SAMPLES / 4
             }
@@ -286,8 +286,8 @@ fn diffuse_bounces_agree_with_reference_tracer() {
     }
 }
 
-/// Checks apertures by radius and by f-number, from tiny to larger than the room. They are focused
-/// by distance, by point and on the target, with and without near plane.
+/// Checks lenses whose apertures, by radius and by f-number, are from tiny to larger than the room.
+/// The lenses are focused by distance, by point and on the target, with and without near plane.
 #[test]
 fn lenses_agree_with_reference_tracer() {
     let number = Aperture::FNumber;
@@ -357,9 +357,9 @@ fn rough_glass(keys: &str) -> Scene {
 }
 
 /// Checks every lobe of rough glass, two-sided with Fresnel's equations and with Schlick's formula,
-/// and one-sided. A glass box touches the floor. Lobe directions below the surface are mirrored up
-/// in one picture and absorbed in the other. With microfacets, both pictures are compared with the
-/// same reference, because such lobes do not depend on this setting.
+/// and one-sided. A glass box touches the floor. Each case has two pictures: lobe directions below
+/// the surface are mirrored up in one and absorbed in the other. Microfacet lobes do not depend on
+/// this setting, so both of their pictures are compared with the same reference.
 #[test]
 fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     for lobe in [
@@ -449,8 +449,8 @@ fn one_sided_transparent_objects_reflect_on_their_front_only() {
 }
 
 /// Checks a pane in front of a black background. The camera sees the back of the pane, and a bright
-/// wall is behind the camera. A two-sided pane reflects the wall. A one-sided pane transmits the
-/// black background and reflects nothing.
+/// wall is behind the camera. A two-sided pane must reflect the wall. A one-sided pane must
+/// transmit the black background and reflect nothing.
 #[test]
 fn back_of_one_sided_pane_does_not_reflect() {
     for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {

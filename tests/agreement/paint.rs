@@ -16,8 +16,8 @@ use zerkalo::shape::Shape;
 /// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;
 
-/// Distance from the rims of a cylinder, as a share of its height, at which the texture on its ends
-/// is looked up.
+/// Limit of the cylindrical mapping: its coordinate v, as a share of the height, is clamped to this
+/// distance from both ends. The ends of a cylinder thus show the texture next to their rims.
 const RIM: f64 = 1e-6;
 
 /// Image file of the folder `scenes`. The lowest row is the first.
@@ -194,8 +194,8 @@ pub struct Spot<'a> {
 }
 
 impl Spot<'_> {
-    /// Returns the texture coordinates of `point`, in repeats of the image. `point` is on the same
-    /// side of the same shape as the spot `self`.
+    /// Returns the texture coordinates of `point`, in repeats of the image. `point` must be on the
+    /// same side of the same shape as the spot `self`.
     fn uv(&self, placement: &Placement, point: DVec3) -> DVec2 {
         let (scale, offset) = (DVec2::from(placement.scale), DVec2::from(placement.offset));
         let (mapping, view) = self.leaf.canvas.view(placement);

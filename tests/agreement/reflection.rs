@@ -71,7 +71,7 @@ fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
 }
 
 /// Returns the fraction of the microfacets with normal `h` that are visible from the direction `v`.
-/// `h` and `v` are on the same side of the surface.
+/// `h` and `v` must be on the same side of the surface.
 fn visible(material: &Material, n: DVec3, h: DVec3, v: DVec3) -> f64 {
     let (ggx, alpha) = (material.lobe == Lobe::Ggx, material.microfacet_alpha());
     match material.masking {

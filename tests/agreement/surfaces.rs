@@ -128,8 +128,9 @@ impl Piece {
         }
     }
 
-    /// Returns `true` if a point is on the inner side of this piece of a solid's surface. Pieces
-    /// other than a torus belong to convex solids.
+    /// Returns `true` if a point is on the inner side of this piece of a solid's surface. A point
+    /// that is on the inner side of all pieces is inside of the solid, because every solid is
+    /// convex or a torus, which is a single piece.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,

@@ -588,7 +588,8 @@ const KNOWN: [&str; 23] = [
     "bump",
 ];
 
-/// Returns an error if the material has a key that the reference tracer does not support.
+/// Returns an error if the reference tracer does not support a key that the material sets to a
+/// value other than the default.
 fn unknown_keys(material: &Material) -> Result<(), String> {
     let plain = Material::default().to_table();
     for (key, value) in material.to_table() {

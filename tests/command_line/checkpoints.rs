@@ -8,7 +8,8 @@ use zerkalo::film::file::FilmReader;
 /// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;
 
-/// Size, stop criterion and threads of the interrupted renders. They take about a second.
+/// Size, stop criterion and threads of the tested renders. Without interruption, a render takes
+/// about a second.
 const LONG: [&str; 6] = ["--size", "160x120", "--noise", "0.35", "--threads", "2"];
 
 /// Returns the film in the checkpoint at `path` as bytes, which are equal for films with equal
@@ -52,7 +53,7 @@ fn killed_and_resumed_render_equals_an_uninterrupted_one() {
         let _ = child.kill();
         child.wait().unwrap();
         if desk.path("part.zk").exists() {
-            // A checkpoint is complete at every moment.
+            // The checkpoint must be complete, whenever the render is killed.
             assert!(!test_film(&desk.path("part.zk")).is_empty());
             resumed += 1;
         }
@@ -83,8 +84,8 @@ fn signal_keeps_the_samples_and_another_target_continues_them() {
     assert_eq!(run.status, 143, "{}", run.err);
     let before = FilmReader::open(&desk.path("a.zk")).unwrap().read().unwrap().1.samples();
     assert!(before > 0);
-    // The resumed render has reached its noise target already. Its picture is that of the
-    // checkpoint.
+    // The checkpoint already meets the noise target of the resumed render, which must keep the
+    // samples of the checkpoint.
     let done = desk.run(&args("200", &["--resume", "a.zk", "--checkpoint", "b.zk"]));
     assert_eq!(done.status, 0, "{}", done.err);
     let after = FilmReader::open(&desk.path("b.zk")).unwrap().read().unwrap().1.samples();

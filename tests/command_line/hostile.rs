@@ -151,8 +151,8 @@ fn environment_is_printed_without_control_characters() {
     assert!(run.out.contains("not queried"), "{}", run.out);
 }
 
-/// Checks that devices, pipes and folders are refused as meshes without blocking, whatever their
-/// names are.
+/// Checks that devices, pipes and folders are refused as mesh files, whatever their names are, and
+/// that the program does not wait for their contents.
 #[test]
 #[cfg(unix)]
 fn scenes_read_regular_files_only() {

@@ -54,8 +54,8 @@ fn regions_equal_the_picture_as_a_whole() {
                 let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
                 let peak = stats["peak_rss_bytes"].as_u64();
                 let cap = (least + more_memory) * 1_000_000;
-                // This also holds for larger executables, such as those of test builds, because the
-                // program measures the memory that it and the scene take.
+                // The limit must also hold for larger executables, such as those of test builds,
+                // because the program measures the memory that it and the scene take.
                 assert!(peak.is_none_or(|peak| peak <= cap), "{memory}: {peak:?} bytes");
                 assert_eq!(stats["stopped_by"], "spp");
             }
@@ -134,8 +134,8 @@ fn checkpoint_of_a_film_that_does_not_fit_is_refused() {
     assert!(run.status == 2 && run.err.contains("such as 4GB"), "{}", run.err);
 }
 
-/// Checks that a signal between two regions leaves the old picture file unchanged and no other
-/// file.
+/// Checks that a signal between two regions leaves the old picture file unchanged, and that no
+/// further file remains.
 #[test]
 #[cfg(unix)]
 fn signal_leaves_no_part_of_a_picture() {

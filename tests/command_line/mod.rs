@@ -1,4 +1,4 @@
-//! Tests of the command line, used as users and scripts do.
+//! Tests of the command line, which run the program as users and scripts do.
 
 mod checkpoints;
 mod hostile;

@@ -60,8 +60,8 @@ fn full_stdout_is_a_failure_and_a_closed_pipe_is_none() {
     assert_eq!(run.err.trim(), "0");
 }
 
-/// Checks that a result file that cannot be created is refused before the work begins. An error
-/// while a result is written, on a full device, is reported after the work.
+/// Checks that a result file that cannot be created is refused before the work begins. If a device
+/// is full, so that the result cannot be written, the error must be reported after the work.
 #[test]
 fn unwritable_results_are_failures() {
     let desk = Desk::new();

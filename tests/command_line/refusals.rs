@@ -79,7 +79,8 @@ fn every_bad_scene_has_status_1_and_names_its_file() {
     assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
 }
 
-/// Checks the message of the program on an emulated processor that lacks features of the build.
+/// Checks the program's message on an emulated processor that lacks an instruction set for which
+/// the program was built.
 #[cfg(target_arch = "x86_64")]
 #[test]
 #[ignore = "needs qemu-x86_64 (Debian: qemu-user); promised only with RUSTFLAGS=\"-C target-cpu=x86-64-v3\""]
@@ -94,8 +95,8 @@ fn old_processor_gets_a_message() {
     }
 }
 
-/// Checks the refusal of a film of 3.2 GB under a limit of 1.5 GB of address space. The message
-/// contains the sums and a remedy.
+/// Checks the refusal of a picture whose film needs 4.4 GB of memory under a limit of 1.5 GB of
+/// address space. The message must state the needed and the available memory, and suggest a remedy.
 #[test]
 #[cfg(target_os = "linux")]
 fn film_that_does_not_fit_is_refused_with_sums_and_remedy() {

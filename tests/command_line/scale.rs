@@ -1,4 +1,5 @@
-//! Large scenes: memory is measured as the peak of a child process, time as ratios within one run.
+//! Large scenes: limits on memory and processor time. Memory is measured as the peak of a child
+//! process. Growth in time is the ratio of the times of two scene sizes within one run.
 
 use super::*;
 use std::fmt::Write;
@@ -103,8 +104,8 @@ fn object_takes_at_most_a_kilobyte_beyond_its_text() {
 type Family = (&'static str, fn(&Desk, usize) -> String, f64);
 
 /// Checks the processor time and memory for a million spheres, on a grid or at the same place, and
-/// for a million copies of a triangle in OBJ, STL and glTF files. Four times the input takes at
-/// most 2.3^2 times the processor time.
+/// for a million copies of a triangle in OBJ, STL and glTF files. Four times the input must take
+/// less than 2.3^2 times the processor time.
 ///
 /// cargo test --release --test program command_line:: -- --ignored --nocapture million
 #[test]

@@ -88,8 +88,8 @@ fn unfinished_shards_are_running_and_then_late() {
     let desk = Desk::new();
     plan(&desk, "job", 2);
     trace(&desk, "job", 1);
-    // The film file of a shard is unfinished if a signal has stopped its render. Its PART chunk
-    // says so.
+    // Film file of shard 1 as it remains when a signal stops its render: the chunk PART says that
+    // the shard is unfinished.
     let whole = FilmReader::open(&desk.path("job-1.zk")).unwrap().header().clone();
     let mut header = whole.clone();
     let text = String::from_utf8(header.chunks[b"PART"].clone()).unwrap();
@@ -158,7 +158,7 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
     let single = open(&desk, &["a.zk"]).unwrap();
     assert!(single.film().unwrap().bytes() == film(&desk, "a.zk").bytes());
     assert_eq!((single.complete_shards(), states(&single).len()), (None, 1));
-    // If a watched file is replaced by a file that does not belong to the plan, it is left out.
+    // A file that does not belong to the plan is left out if it replaces a watched file.
     let mut films = open(&desk, &["job.plan"]).unwrap();
     let whole = films.film().unwrap().bytes();
     let own = fs::read(desk.path("job-1.zk")).unwrap();

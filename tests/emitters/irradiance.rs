@@ -215,7 +215,7 @@ fn tiny_and_huge_lights_keep_their_irradiance() {
     check(&cases, 1 << 15, [1e-3, 1e-6]);
 }
 
-/// Checks a light that lies in the surface of a ceiling: the ceiling does not cover the light.
+/// Checks that a light that lies in the surface of a ceiling is not covered by the ceiling.
 #[test]
 fn light_in_a_ceiling_shines_into_the_room() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);

@@ -129,9 +129,10 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
     check(&cases, 1 << 16, [2e-4, 1e-9]);
 }
 
-/// Checks that each path samples all spots unless their cones have together the solid angle of
-/// [`CHOSEN`] hemispheres, even if it samples only a few of the points. The spots then have light
-/// groups of their own, without noise.
+/// Checks the limit up to which each path samples all spot lights, although it samples only a few
+/// of the point lights: together, the cones of the spots must have less than the solid angle of
+/// [`CHOSEN`] hemispheres. Up to this limit, each spot has a light group of its own, whose radiance
+/// has no noise.
 #[test]
 fn few_spots_among_many_points_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
@@ -146,8 +147,9 @@ fn few_spots_among_many_points_are_all_asked() {
     }
 }
 
-/// Returns the mean number of samples per pixel with which the picture of a room with a ball has
-/// an RMSE of half an 8-bit level. `lights` are the intensities of its lights.
+/// Returns the mean number of samples per pixel that an adaptive render of a ball on a floor takes
+/// until its estimated RMSE is half an 8-bit level. `lights` are the intensities of the point
+/// lights.
 fn samples_to_half_a_level(lights: &[f64]) -> f64 {
     let mut numbers = Numbers::new(5);
     let mut text = "[film]\nsize = [96, 72]\n\
@@ -199,8 +201,9 @@ fn weak_lights_hardly_change_the_number_of_samples() {
     }
 }
 
-/// Checks many point lights of which each path samples only a few. The lights share one light
-/// group, whose mean radiance is right. A spot light beside them has a group of its own.
+/// Checks many point lights of which each path samples only a few. They must share one light group,
+/// and the mean radiance of this group must be right. A spot light beside them must have a group of
+/// its own.
 #[test]
 fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use zerkalo::lanes::{Double, Single};
 use zerkalo::scene::Scene;
 
-/// Creates the scene of a camera that looks down at a mirror with the given material, and of a
-/// sphere light straight above the mirror, behind the camera.
+/// Creates the scene of a camera that looks down at a mirror with the keys `material`. A light with
+/// the keys `light` is the only light.
 fn mirror(material: &str, light: &str) -> Scene {
     scene(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
@@ -42,9 +42,10 @@ fn camera_and_mirror_see_visible_lights_only() {
     assert!((mean - 1.0).abs() < 1e-8 && error < 1e-8, "{mean} ± {error}");
 }
 
-/// Checks that a rough pane with a cone lobe transmits and reflects the fraction of the lobe's
-/// solid angle that the light covers. Points of the light must be sampled, because reflected rays
-/// alone would hit the smallest lights in a few of a million samples.
+/// Checks a rough pane with a cone lobe. The transmitted and the reflected radiance must be 0.7
+/// times the fraction of the lobe's solid angle that a light of unit radiance covers. Points of the
+/// light must be sampled, because reflected rays alone would hit the smallest lights in a few of a
+/// million samples.
 #[test]
 fn rough_panes_find_small_lights_on_both_sides() {
     let mut cases = Vec::new();
@@ -72,7 +73,8 @@ fn rough_panes_find_small_lights_on_both_sides() {
     check(&cases, 1 << 14, [2e-3, 1e-6]);
 }
 
-/// Checks that a cone lobe reflects the fraction of the lobe's solid angle that the light covers.
+/// Checks a mirror with a cone lobe. Its radiance must be 0.7 times the fraction of the lobe's
+/// solid angle that a light of unit radiance covers.
 #[test]
 fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     let mut cases = Vec::new();

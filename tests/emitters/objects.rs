@@ -201,8 +201,8 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
         (format!("glass on {shape}"), receiver(DVec3::NEG_Y, MATT, &rest), 0.0)
     });
     check(&inside, 4096, ROUNDING);
-    // The lamp's lower face is in the plane of a rotated square. It is within the square's bounding
-    // box, but beside the square.
+    // The lamp's lower face is in the plane of a rotated square. The face is within the square's
+    // bounding box, but beside the square.
     let beside =
         object("lamp", "shape.box = { center = [1.8, 1.05, 0.6], size = [0.1, 0.1, 0.1] }");
     let square =

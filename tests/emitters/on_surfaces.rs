@@ -31,8 +31,8 @@ fn look_through(degrees: f64, eye: DVec3, target: DVec3, rest: &str) -> Scene {
     ))
 }
 
-/// Checks lights with a size on an infinite plane: the eye sees them, and they light a floor. The
-/// finite objects of the scene are small and far away from the light, or there are none.
+/// Checks lights with a size on an infinite plane: the eye must see them, and they must light a
+/// floor. The finite objects of the scene are small and far away from the light, or there are none.
 #[test]
 fn lights_on_planes_are_visible_and_light_the_scene() {
     let mut cases = Vec::new();
@@ -157,12 +157,13 @@ fn reflections_of_emissive_sheets_on_ceilings_are_the_limit_of_a_gap() {
     }
 }
 
-/// Checks an emissive sheet on the outside of a solid that the eye is outside of: it shows and
-/// lights the outside, also if only a mirror shows its side of the solid.
+/// Checks an emissive sheet on the outside of a solid; the eye is outside, too. The sheet must be
+/// visible and light the outside. It must also be visible if it faces away from the eye and towards
+/// a mirror.
 #[test]
 fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
-    // Receiver at the origin below the block. The sign is on the block's lower side or on its far
-    // side, which a mirror shows.
+    // Receiver at the origin below the block. The emissive sheet is on the block's lower side, or
+    // on its far side (`far_sign`), which a mirror shows.
     let (text, corners) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.5, 0.3]);
     let far_sign = "shape.rectangle = { center = [0.0, 1.5, -0.5], size = [0.5, 0.3], \
                     normal = [0.0, 0.0, -1.0] }";

@@ -169,7 +169,7 @@ fn assert_honest(outcomes: &[Outcome]) {
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 24, 25, 35];
-    // A smaller noise target needs a better reference.
+    // A smaller noise target needs a reference with more samples.
     let reference_count = |number| (256.0 / target_of(number)) as u32;
     let outcomes = cheap.map(|number| examine(number, reference_count(number), 1, 1));
     assert_honest(&outcomes);
@@ -214,9 +214,9 @@ fn survey_of_200_scenes() {
 }
 
 /// Checks a picture of a white ball that is smaller than a pixel. For the same noise target,
-/// adaptive sampling takes at most 1.5 times the rays of uniform sampling. The allocation estimate,
-/// which is made from half of the pixels, sees no noise in the ball's tile; only the other pixels
-/// are noisy.
+/// adaptive sampling must take at most 1.5 times the rays of uniform sampling. The allocation
+/// estimate is made from half of the pixels. It sees no noise in the ball's tile, because all noisy
+/// pixels are in the other half.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "

@@ -168,7 +168,7 @@ fn bright_colour_does_not_saturate_film() {
 }
 
 /// Checks two facing mirrors that amplify light, with a bright background. The red radiance of
-/// every pixel is finite and above 1, the largest displayed value.
+/// every pixel must be finite and above 1, the largest displayed value.
 #[test]
 fn amplifying_mirrors_give_finite_white() {
     let text = |k: f64, depth: u32| {

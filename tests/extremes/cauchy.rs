@@ -1,6 +1,7 @@
-//! Chords of isotropic uniform lines, for every registered kind of shape. Of the lines that hit a
-//! convex body with surface S', the share S / S' hits a convex body inside it with surface S and
-//! volume V. The mean chord is 4 V / S (Cauchy, Crofton).
+//! Chords of isotropic uniform lines, for every registered kind of shape. Let a convex body with
+//! the surface area S and the volume V be inside of another one with the surface area S'. Of the
+//! lines that hit the outer body, the share S / S' hits the inner body, with the mean chord 4 V / S
+//! (Cauchy, Crofton).
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, bounding_sphere, closest, every_kind};
@@ -143,8 +144,8 @@ impl Tally {
         }
     }
 
-    /// Checks the share of lines that hit and the mean chord against the expected values `share`
-    /// and `mean_chord`. Returns the larger of the two deviations, each in standard deviations.
+    /// Checks that the fraction of hits among the lines is `share`, and that the mean chord is
+    /// `mean_chord`. Returns the larger of the two deviations, each in standard deviations.
     fn check(&self, name: &str, share: f64, mean_chord: f64) -> f64 {
         let found = self.hits / self.lines;
         let sigma = (share * (1.0 - share) / self.lines).sqrt();

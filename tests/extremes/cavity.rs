@@ -12,8 +12,8 @@ fn ball(radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::ZERO, radius })
 }
 
-/// Checks rays from inside the cavity of a solid whose walls are at least 0.2 thick: they hit the
-/// wall where it begins, then where it ends, and nothing beyond.
+/// Checks rays from inside the cavity of a solid whose walls are at least 0.2 thick. Each ray must
+/// hit the inner surface of the wall, then its outer surface, and nothing beyond.
 fn check_cavity<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let geometry = geometry::<L>(form);
     let mut numbers = Numbers::new(seed);

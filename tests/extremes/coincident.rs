@@ -16,8 +16,8 @@ fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
 }
 
 /// Checks a box with a hole in its top. The top of the shape that cuts the hole is `units` times
-/// the rounding error above or below the top of the box. No ray from above hits a surface in the
-/// opening.
+/// the rounding error above or below the top of the box. No ray from above or below may hit a
+/// surface in the opening.
 fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
     let top = nudged(1.0, units, L::EPSILON);
     let cutter = block([0.0, (top + 0.3) / 2.0, 0.0], [1.0, top - 0.3, 1.0]);
@@ -44,7 +44,7 @@ fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
             && hit.point.z.abs() < 0.5 - unit;
         assert!(!in_opening, "skin: {}", context());
     }
-    // Rays that start in the hole and point upwards meet no surface in the opening.
+    // Rays that start in the hole and point upwards must meet no surface in the opening.
     let up: Vec<Line> =
         lines.iter().map(|(o, d)| (*o + *d * 0.45, -*d)).filter(|l| l.0.y > 0.31).collect();
     let leaves_opening = |l: &Line| {
@@ -96,7 +96,7 @@ fn check_fused<L: SimdFloat>(units: i32) {
     if units > -2 {
         return;
     }
-    // Rays from above to the edge of the common face. The boxes overlap there by more than a
+    // Rays from above to the edge of the common face, for boxes that overlap by more than a
     // rounding error.
     let lines: Vec<Line> = (0..60_000)
         .map(|n| {

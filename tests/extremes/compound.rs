@@ -158,9 +158,9 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
     }
 }
 
-/// Checks random trees of set operations with at most 8 levels. Rays enter and leave the solid
-/// alternately. A point between two hits is inside or outside of the solid, as the set operations
-/// on the parts say. A quarter of a million rays are traced in each precision.
+/// Checks random trees of set operations with at most 8 levels. Rays must enter and leave the solid
+/// alternately. A point between two hits must be inside or outside of the solid, as the set
+/// operations on the parts say. A quarter of a million rays are traced in each precision.
 #[test]
 fn extreme_08_parity() {
     check_parity(2_500);
@@ -203,8 +203,9 @@ fn check_parity(rays: usize) {
                 }
                 let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
                 let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
-                // The tie tolerance, within which surfaces count as coincident, hides very thin
-                // slivers of the solid. It is very improbable that a random point lies in a sliver.
+                // Slivers of the solid that are thinner than the tie tolerance (within which
+                // surfaces count as coincident) are lost. A random point is almost never in such a
+                // sliver.
                 assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
             }
         }

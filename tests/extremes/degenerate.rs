@@ -230,8 +230,8 @@ fn extreme_06_degenerate_rays_at_every_kind() {
     }
 }
 
-/// Checks rays along an axis that pass beside the bounding box of a shape. They miss, whatever the
-/// signs of the zeros in their direction.
+/// Checks rays along an axis that pass beside the bounding box of a shape. They must miss, whatever
+/// the signs of the zeros in their direction.
 #[test]
 fn extreme_06_zeros_of_either_sign_beside_every_solid() {
     for (name, form) in every_kind() {

@@ -98,7 +98,7 @@ fn circle_of_confusion_matches_its_closed_form() {
             );
             assert!(z < MAX_Z, "depth {depth}, radius {radius}, focus {focus}: z {z}");
             assert!(sobol <= 0.4 * random, "{sobol} with Sobol points, {random} without");
-            // A circle that is 5 % larger is noticed.
+            // The comparison must detect a circle of confusion that is 5 % larger.
             if depth != focus {
                 let larger = edge(depth, 1.05 * radius, focus);
                 let (z, _) = compare(&larger, &expected, precision);
@@ -156,7 +156,8 @@ fn pixels_bytes(scene: &Scene) -> Vec<u8> {
     rendered(scene, 1, Precision::Auto, 2).film.bytes()
 }
 
-/// Checks lenses as large as the room and larger, focused anywhere. Every sample is finite.
+/// Checks that all samples are finite for lenses as large as the room and larger, at any focus
+/// distance.
 #[test]
 fn huge_aperture_gives_finite_samples() {
     for name in ["mirror-room.toml", "mirror-room-physical.toml", "glass.toml", "torus.toml"] {

@@ -8,9 +8,9 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Surfaces on which the lamp at (0, 3, 0) lies. The second value is a distance from the y axis.
-/// The lamp lights those points of the plane y = 4, above the ceiling, that are farther from the
-/// axis than this distance.
+/// Surfaces on which the lamp at (0, 3, 0) lies, each with the distance from the y axis beyond
+/// which the lamp lights points of the plane y = 4, above the surface. Infinity means that the lamp
+/// lights no such points.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),
@@ -31,8 +31,9 @@ const CEILINGS: [(&str, f64); 9] = [
 const SLAB: &str = "v -3 3 -3\nv 3 3 -3\nv 3 3.2 -3\nv -3 3.2 -3\nv -3 3 3\nv 3 3 3\nv 3 3.2 3\nv -3 3.2 3\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Returns two lists of points and normals that receive light. The first is on a room's floor and a
-/// wall that reaches up to the ceiling, the second on a board above the ceiling.
+/// Returns two lists of points, each with its normal. The points of the first list are on a room's
+/// floor and on a wall that reaches up to the ceiling, those of the second on a board above the
+/// ceiling.
 fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
     let mut below = Vec::new();
     let mut above = Vec::new();
@@ -101,7 +102,7 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     if ceiling.starts_with("sphere") || ceiling.starts_with("cone") {
         return;
     }
-    // The surface on which the lamp lies is dark.
+    // The surface on which the lamp lies must be dark.
     let flat = |x: f64| -> Line {
         let p = DVec3::new(x, 3.0, 0.3 * x);
         let from = place.transform_point3(p + DVec3::new(0.01, -0.3, 0.02));

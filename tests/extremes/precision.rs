@@ -1,7 +1,7 @@
 //! Choice of precision by `auto`: double where errors of single precision would be visible, single
-//! elsewhere. In each family of scenes, one proportion, such as the ratio of a ball's radius to the
-//! size of the floor, becomes smaller and smaller. The error of single precision is the RMSE
-//! against double precision with the same samples, in 8-bit levels.
+//! elsewhere. In each family of scenes, one parameter becomes smaller and smaller, such as the
+//! radius of a ball on a floor of constant size. The error of single precision is the RMSE against
+//! double precision with the same samples, in 8-bit levels.
 
 use crate::common::report::report;
 use crate::support::{all_shipped, begin, parsed, picture, pool, shipped, sized, uniform};
@@ -57,15 +57,15 @@ fn error(scene: &Scene, samples: u32) -> f64 {
     Pair::new(scene).error(samples)
 }
 
-/// Family of scenes that differ in one proportion, such as the ratio of a ball's radius to the size
-/// of the floor.
+/// Family of scenes with one parameter, such as the radius of a ball on a floor of constant size.
 struct Family {
     name: &'static str,
-    /// Function that returns the scene text for a proportion, which is at most 1/4.
+    /// Function that returns the scene text for a value of the parameter, which is at most 1/4.
     text: fn(f64) -> String,
-    /// Smallest tested proportion of the family.
+    /// Lower limit of the tested values of the parameter.
     least: f64,
-    /// Error that single precision must have at least at the smallest proportion, in 8-bit levels.
+    /// Lower limit of the error of single precision, in 8-bit levels, at the smallest tested value
+    /// of the parameter.
     visible: f64,
 }
 
@@ -220,9 +220,10 @@ const FAMILIES: [Family; 10] = [
     Family { name: "two balls far apart", text: far_apart, least: 1e-7, visible: 1.0 },
 ];
 
-/// Checks families of scenes whose proportion shrinks. `auto` selects single precision at first,
-/// and double precision from some proportion on. Where it selects single, the error is invisible.
-/// At the smallest proportion the error of single precision would be visible.
+/// Checks families of scenes whose parameter shrinks. `auto` must select single precision at first,
+/// and double precision from some value of the parameter on. Where it selects single precision, the
+/// error must be invisible. At the smallest value, the error of single precision must be at least
+/// `visible`.
 #[test]
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
@@ -260,8 +261,8 @@ fn auto_takes_double_where_single_would_show() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Checks that the choice of precision depends on the proportions of a scene only, not on its size
-/// and place.
+/// Checks that the choice of precision depends on the ratios of lengths in a scene only, not on the
+/// size and place of the scene.
 #[test]
 fn auto_takes_single_where_proportions_are_harmless() {
     let scene_text = |place: f64, size: f64| {

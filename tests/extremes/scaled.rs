@@ -98,8 +98,8 @@ fn scaled_scenes_give_the_same_picture() {
     check("scaled by 2^20", 1_048_576.0, DVec3::ZERO, [0.0; 2], 0);
 }
 
-/// Number of pixels, of 3,072, that may differ from the original picture by more than rounding: a
-/// path in single precision passes an edge on another side.
+/// Number of the 3,072 pixels that may differ by more than rounding from the original picture,
+/// because a path in single precision passes an edge on another side.
 const FLIPPED: usize = 2;
 
 /// Largest RMS difference between two pictures with equal samples that rounding may cause, in 8-bit
@@ -107,8 +107,8 @@ const FLIPPED: usize = 2;
 /// double and 5e-5 in single precision.
 const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
 
-/// Checks moved scenes. Numbers in a scene file that are moved by ten million units are rounded to
-/// 2e-9.
+/// Checks moved scenes. Coordinates that are moved by ten million units are rounded to 2e-9 in the
+/// scene file.
 #[test]
 fn shifted_scenes_give_the_same_picture() {
     let aside = DVec3::new(1.0, -0.7, 0.3);

@@ -198,7 +198,8 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
     }
 }
 
-/// Checks self-shadowing in 392 settings of 8000 points each.
+/// Checks self-shadowing at 8000 points in each of 392 combinations of shape, scale, direction of
+/// the light and precision.
 #[test]
 fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
@@ -220,7 +221,7 @@ fn extreme_15_self_shadow_far_from_the_origin() {
 }
 
 /// Checks the shadow of a box that hovers a millionth of its size above the ground. The ground
-/// under the box is dark, except for a strip as wide as the gap, which slanting light reaches.
+/// under the box must be dark, except for a strip as wide as the gap, which slanting light reaches.
 fn check_gap(scale: f64, precision: Precision) {
     let gap = 1e-6 * scale;
     let scene = scene(&format!(

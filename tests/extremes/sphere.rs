@@ -61,9 +61,9 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     (across2.0.sqrt() - radius, DVec3::from_array(point))
 }
 
-/// Checks rays from the distance `far` at a unit sphere. They are aimed at points within 0.7 of its
-/// centre and at points near its limb. Returns the largest distance of a hit point from the
-/// surface.
+/// Checks rays that start at the distance `far` from a unit sphere. They are aimed at points within
+/// 0.7 of its centre and at points near its limb. Returns the largest distance of a hit point from
+/// the surface.
 fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let mut worst = 0f64;
     let mut numbers = Numbers::new(seed);
@@ -251,8 +251,8 @@ fn closed_form_10_silhouettes() {
     }
 }
 
-/// Checks which pixels of a sphere's whole picture show the sphere. The camera rays are those of
-/// the compiled camera. The expected pixels follow from the exact silhouette.
+/// Checks that a pixel shows the sphere exactly if the pixel's centre is inside of the sphere's
+/// silhouette, for which there is a closed form. The camera rays are those of the compiled camera.
 #[test]
 fn closed_form_10_every_pixel_of_a_sphere() {
     let camera = Camera {

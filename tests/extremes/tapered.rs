@@ -216,8 +216,8 @@ fn extreme_12_along_a_generator() {
     report(12, "single", "finite");
 }
 
-/// Checks tangents of cylinders, cones and conical frusta. Their hits are finite, and no tangent
-/// has a chord longer than `limit`.
+/// Checks tangents of cylinders, cones and conical frusta. Their hits must be finite, and no
+/// tangent may have a chord longer than `limit`.
 fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);

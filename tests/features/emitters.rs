@@ -103,7 +103,7 @@ fn d9_environment() {
             ("half the intensity", &|s| lamp(s).intensity *= 0.5),
         ],
     );
-    // A diffuse bounce that leaves the scene adds no light of the environment.
+    // A diffuse bounce that leaves the scene must add no light of the environment.
     let mut bouncing = shipped("environment.toml");
     bouncing.trace.max_diffuse_depth = 2;
     agrees(&bouncing, &bouncing, 128).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));

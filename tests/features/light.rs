@@ -359,7 +359,7 @@ fn d3_indirect_diffuse() {
             ("another red", &|s| material(s, "red").color = Color([0.06, 0.06, 0.5])),
         ],
     );
-    // Where a path bounces, ambient light is not added.
+    // Ambient light must not be added where a path bounces.
     let mut ambient = shipped("mirror-room.toml");
     ambient.trace.max_diffuse_depth = 1;
     agrees(&ambient, &ambient, 96).unwrap_or_else(|e| panic!("ambient light: {e}"));

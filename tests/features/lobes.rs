@@ -129,9 +129,9 @@ struct Spot {
     radiance: DVec3,
 }
 
-/// Pixel that shows the mirror, with the balls that it may reflect.
+/// Pixel that shows the mirror, with all balls of the scene.
 struct Footprint {
-    /// Balls that the pixel's lobe may reflect.
+    /// Balls of the scene, as seen from the point of the mirror that the pixel shows.
     spots: Vec<Spot>,
     /// Rendered radiance of the pixel.
     radiance: DVec3,
@@ -139,8 +139,8 @@ struct Footprint {
     error: DVec3,
 }
 
-/// Returns the pixels of `tested` that show the mirror, each with the balls of `original` as seen
-/// from the point of the mirror.
+/// Returns the pixels of `tested` that show the mirror. Each has the balls of `original`, as seen
+/// from the point of the mirror that the pixel shows.
 fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     let original = sized(original.clone(), FINE);
     let mut tested = sized(tested.clone(), FINE);
@@ -173,7 +173,8 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
 /// Compares each pixel with its expected radiance: the sum over its balls of k_r x share x
 /// radiance, where k_r is 0.9. `share` returns the share of the lobe that a ball covers. Pixels
 /// with a ball for which `share` returns `None` are left out. A pixel whose expected radiance is 0
-/// must be exactly black. The differences of the other pixels must add up to 0, apart from noise.
+/// must be exactly black. The differences between rendered and expected radiance of the other
+/// pixels must add up to 0, apart from noise.
 fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> Verdict {
     let (mut sum, mut variance, mut expected_sum) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     let (mut bright, mut dark) = (0, 0);

@@ -106,8 +106,8 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
 }
 
 /// Checks two facing square mirrors, each 1e4 units wide. Ambient light adds the radiance 1 at
-/// every surface. Every pixel has the sum of `terms`, the throughputs with which a path reaches its
-/// successive surfaces.
+/// every surface. Every pixel must have the sum of `terms`, the throughputs with which a path
+/// reaches its successive surfaces.
 fn sums_reflections(
     tested: &Scene,
     mirrors: [&str; 2],
@@ -151,7 +151,8 @@ fn b2_ray_tree() {
             ("no tree", &|s| s.trace.ray_types = RayTypes::Shadows),
         ],
     );
-    // 0.9^28 is the last power above 0.05; the depth of the scene is 40.
+    // Paths end at the smallest throughput of the scene, 0.05, before they reach its depth limit,
+    // 40: 0.9^28 is the last power above 0.05.
     let powers = || (0..).map(|n| 0.9f64.powi(n)).take_while(|w| *w >= 0.05);
     assert_eq!(powers().count(), 29);
     row(

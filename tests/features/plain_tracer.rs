@@ -35,7 +35,7 @@ pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
 }
 
 /// Compares the program's picture of `tested` with the reference tracer's picture of `original`,
-/// pixel by pixel. The scenes must not depend on random choices.
+/// pixel by pixel. The pictures must not depend on random numbers.
 pub fn agrees_exactly(original: &Scene, tested: &Scene) -> Verdict {
     let mut original = sized(original.clone(), RASTER);
     original.film.filter = Filter::Point;

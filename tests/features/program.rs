@@ -48,8 +48,9 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
 }
 
 /// Checks a render of `tested` to a noise of `levels` 8-bit levels. If `cap` is not 0, the cap on
-/// rays per pixel ends the render, and the largest number of samples of a tile with a reflecting
-/// surface is `cap`. If `cap` is 0, the noise ends the render, after more than 16 samples.
+/// rays per pixel must end the render, and the largest number of samples of a tile with a
+/// reflecting surface must be `cap`. If `cap` is 0, the noise must end the render, after more than
+/// 16 samples in such a tile.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
     let stop = Stop { noise_codes: Some(levels), ..Stop::default() };

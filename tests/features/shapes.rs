@@ -6,9 +6,9 @@ use crate::support::shipped;
 use zerkalo::scene::Scene;
 use zerkalo::shape::{Difference, Intersection, Shape, Union};
 
-/// Checks that first hits in `file` agree with the formulas, and that they disagree after each
-/// mutation. A mutation consists of its name, the name of an object, and the text of the object's
-/// new shape.
+/// Checks that first hits in `file` agree with the formulas of the shapes, and that they disagree
+/// after each mutation. A mutation consists of its name, the name of an object, and the text of the
+/// object's new shape.
 fn shapes(file: &str, mutations: &[(&str, &str, &str)]) {
     let original = shipped(file);
     let changes: Vec<_> = mutations
