@@ -92,9 +92,9 @@ diffuse = 0.2
 reflection = 0.7
 "#;
 
-/// Returns a scene with `count` objects at random positions in the unit ball. `shapes` are the
-/// lines of the scene file that describe the objects' shapes, each at the origin and of about unit
-/// size.
+/// Returns a scene with `count` objects at random positions in the unit ball. Their shapes are
+/// taken in turn from `shapes`: lines of a scene file, each with a shape of about unit size at the
+/// origin.
 fn crowd(count: usize, shapes: &[&str]) -> Scene {
     let mut random = Random(11);
     let mut text = ROOM.to_string();
@@ -140,8 +140,8 @@ fn tracks(scene: &Scene, n: usize) -> Scene {
     scene
 }
 
-/// Prints the nanoseconds per sample of each of `scenes`, which are given with their numbers of
-/// spheres: for the automatic choice of the acceleration structure, and for a BVH.
+/// Prints the nanoseconds per sample of each scene, for the automatic choice of the acceleration
+/// structure and for a BVH. `scenes` are pairs of the number of spheres and the scene.
 fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
     let times_with = |acceleration| {
         times(scenes.iter().map(|(_, s)| Bench::new(s, acceleration, size)).collect())

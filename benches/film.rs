@@ -8,9 +8,9 @@ use zerkalo::film::{
     Thumbnail, Tone, WholeFilm,
 };
 
-/// Returns a film of a noisy gradient with `groups` light groups. Each pixel has two replicates
-/// (halves of the samples) of 64 samples each. The noise is estimated from the difference between
-/// the replicates.
+/// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
+/// replicates (halves of the samples) of 64 samples each. The noise is estimated from the
+/// difference between the replicates.
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
     let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });

@@ -128,8 +128,8 @@ fn list_or_tree(c: &mut Criterion) {
 }
 
 /// Measures a render of the scene mirror-room-physical on one thread, with accumulation in the
-/// film: 16 samples for each of 160x120 pixels. The ratio of the results for two SIMD types is the
-/// speed-up in a whole render.
+/// film: 16 samples for each of 160x120 pixels. The ratio of the throughputs of two SIMD types is
+/// the speed-up of a whole render by the wider type.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];

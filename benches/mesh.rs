@@ -48,9 +48,9 @@ fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     corners.map(block).collect()
 }
 
-/// Returns `rays` random rays in packets. The rays of a packet have a common origin, and their unit
-/// directions differ by a vector of at most the length `spread`. If `spread` is above 1, all rays
-/// are independent of each other.
+/// Returns `rays` random rays in packets. The rays of a packet have a common origin, and the
+/// difference of any two of their unit directions has at most the length `spread`. If `spread` is
+/// above 1, all rays are independent of each other.
 fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)

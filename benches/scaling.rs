@@ -118,9 +118,9 @@ impl Times {
 }
 
 impl Setup {
-    /// Returns the size in megabytes of a film file, if the render is divided into `shards` shards
-    /// with one file each. `blocks` is the mean number of blocks of samples in a tile. With fewer
-    /// shards than blocks, every file holds samples of all tiles.
+    /// Returns the size in megabytes of one film file of a render with `shards` shards. `blocks` is
+    /// the mean number of blocks of samples in a tile. With fewer shards than blocks, every file
+    /// holds samples of all tiles.
     fn part(&self, shards: usize, blocks: f64) -> f64 {
         self.part_mb * (blocks / shards as f64).min(1.0)
     }
@@ -174,8 +174,8 @@ impl Setup {
         end
     }
 
-    /// Simulates a render in one round (pilot, shards, merge), or in two rounds of shards. Returns
-    /// the durations of its phases.
+    /// Simulates a render and returns the durations of its phases. If `rounds` is 1, these are
+    /// pilot, shards and merge; otherwise there are two rounds of shards.
     fn render(&self, rounds: usize, shards: usize, machines: usize, random: &mut Random) -> Times {
         let ends = match rounds {
             1 => vec![self.pilot, 1.0],

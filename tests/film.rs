@@ -36,7 +36,7 @@ fn random_bits(seed: u64) -> u64 {
     Numbers::new(seed).bits()
 }
 
-/// Returns sample `index` of a pixel, a pure function of its arguments. The order of values is
+/// Returns sample `index` of a pixel, which depends on the arguments alone. The order of values is
 /// `[group][channel]`. About one sample in 2000 is invalid: `None`.
 fn sample(x: usize, y: usize, replicate: usize, index: u32) -> Option<[f64; 6]> {
     let seed = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
@@ -58,8 +58,8 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds the samples `range` of one of the two replicates (halves of the samples) to the tiles
-/// `tiles`, in the order of the list.
+/// Adds the samples `range` of one of the two replicates (halves of the samples) to the tiles in
+/// `tiles`, in the order of this list.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -102,7 +102,8 @@ fn threads_do_not_change_the_bytes() {
 }
 
 /// Adds the first sample of replicate A (half of the samples) to each pixel. The pixels are visited
-/// in lattices, from coarse to fine; `steps` are the distances between the pixels of each lattice.
+/// in lattices, from coarse to fine. `steps` contains for each lattice the distance between its
+/// pixels.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;

@@ -14,7 +14,7 @@ use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
-/// Truncation bias that the program reports for one of the limits.
+/// Truncation bias that the program reports for `max_depth` or for `min_throughput`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bias {
     /// The program reports no bias for the limit.

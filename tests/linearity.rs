@@ -25,12 +25,14 @@ fn small(name: &str) -> Scene {
     sized(shipped(name), SIZE)
 }
 
-/// Returns the radiance of a picture with a few samples, in the order `[row][column][channel]`.
+/// Returns the radiance of every pixel of a scene rendered with a few samples, in the order
+/// `[row][column][channel]`.
 fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
     picture(&rendered(scene, 4, precision, 8), Replicates::Both).concat()
 }
 
-/// Returns the largest difference between two pictures, divided by the largest value of both.
+/// Returns the largest difference between two pictures, divided by the largest absolute value in
+/// either of them.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = a.iter().chain(b).fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -42,7 +44,7 @@ fn has(scene: &Scene, part: &str) -> bool {
     world.inventory().split(", ").any(|p| p == part)
 }
 
-/// Returns the scene of three lights with a background.
+/// Returns the scene light-groups (a ball under three lights) with a coloured background.
 fn lit() -> Scene {
     let mut scene = small("light-groups.toml");
     scene.background.color = Color([0.1, 0.2, 0.3]);

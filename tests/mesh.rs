@@ -1,4 +1,4 @@
-//! Ray/mesh intersection: meshes are watertight, and hits are independent of packets and vector
+//! Ray/mesh intersection: meshes must be watertight, and hits independent of packets and vector
 //! width.
 
 use crate::common;
@@ -95,7 +95,8 @@ fn check_watertight<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     }
 }
 
-/// Checks meshes with large triangles, small ones and slivers, with `factor` times 330,000 rays.
+/// Checks meshes with large triangles, small ones and slivers, with `factor` times 330,000 rays in
+/// total.
 fn check_watertight_meshes(factor: usize) {
     let coarse = ball(8, 12);
     check_watertight::<Single>(&coarse, factor * 75_000);

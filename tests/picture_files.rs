@@ -1,5 +1,5 @@
-//! Picture files that the program writes, which have the same bytes for any number of threads and
-//! of SIMD lanes.
+//! Picture files that the program writes, which must have the same bytes for any number of threads
+//! and of SIMD lanes.
 
 use std::fs;
 use std::process::Command;

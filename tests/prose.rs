@@ -15,7 +15,7 @@ const FIRST_WORDS: &[&str] =
 const AVOIDED: &[&str] =
     &["told", "tell", "tells", "thing", "things", "somebody", "nobody", "anybody"];
 
-/// Exceptions: doc comments that may contain an avoided word, each given by file and word.
+/// Exceptions: avoided words that the comments of a file may contain, each given by file and word.
 const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// Returns every Rust file under `folder`.

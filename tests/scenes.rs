@@ -81,7 +81,7 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
 
 /// Returns the reference of a scene as text, with one line for each block of pixels. A line
 /// contains six numbers: for the three channels the mean over the renders with all seeds, and for
-/// the three channels the standard error of the block in a single render.
+/// the three channels the standard error of this mean in a single render.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;

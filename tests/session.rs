@@ -1,4 +1,4 @@
-//! Films of sessions (background renderers), which do not depend on threads, interruptions or
+//! Films of sessions (background renderers), which must not depend on threads, interruptions or
 //! earlier scenes.
 
 use crate::support;

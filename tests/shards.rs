@@ -107,7 +107,8 @@ fn merged_film_equals_one_process_and_is_the_expected_one() {
     assert!(plan.differing_tile(&sum.film, &all[1..]).is_some());
 }
 
-/// Checks a shard that is interrupted after every step and continued from a copy of its film.
+/// Checks that a shard that is interrupted after every step, and continued from a copy of its film,
+/// equals an uninterrupted one.
 #[test]
 fn interrupted_shard_equals_uninterrupted() {
     let scene = scene("reflecting-tracks", Some([96, 64]));

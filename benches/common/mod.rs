@@ -15,8 +15,8 @@ pub fn seconds(start: Instant) -> f64 {
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-/// Returns the shortest time in seconds that each function of `candidates` takes. There are
-/// `rounds` rounds, in which all functions take turns.
+/// Runs each function of `candidates` `rounds` times, in turns. Returns the shortest time in
+/// seconds of each function.
 pub fn in_turns(rounds: usize, candidates: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     let clock = Instant::now();
     let mut best = vec![f64::INFINITY; candidates.len()];
@@ -58,7 +58,7 @@ pub fn towards(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     d.map(|x| x / length)
 }
 
-/// Returns the mesh of a bumpy ball of about `2 x rings x sides` triangles.
+/// Returns the mesh of a bumpy ball, with about `2 x rings x sides` triangles.
 pub fn ball(rings: usize, sides: usize) -> TriangleMesh {
     let mut positions = Vec::new();
     for ring in 0..=rings {

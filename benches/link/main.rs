@@ -32,7 +32,7 @@ use zerkalo::terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
-/// Simulated connections, each as name, bytes per second, and delay of each direction.
+/// Simulated connections, each as name, bytes per second, and one-way delay.
 const LINKS: [(&str, f64, Duration); 2] = [
     ("1 Mbit/s, 100 ms", 125e3, Duration::from_millis(50)),
     ("256 kbit/s, 300 ms", 32e3, Duration::from_millis(150)),
@@ -138,7 +138,7 @@ impl Host {
     }
 }
 
-/// Replies of the simulated terminal to requests of the dashboard.
+/// Periods in which the simulated terminal replies to requests of the dashboard.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Replies {
     Always,
@@ -183,7 +183,8 @@ const ROWS: [Row; 7] = [
 ];
 
 /// Measures the latency from a key press to the new picture under the conditions of `row`, a row of
-/// the printed table. Opens the dashboard, lets the picture converge, and presses keys.
+/// the printed table. Opens the dashboard and presses keys while the picture converges. Also reads
+/// the reported rate of the connection, both then and after the picture has converged.
 fn measure(
     name: &str,
     row: &Row,

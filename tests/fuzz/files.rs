@@ -1,4 +1,5 @@
-//! Small valid files of every format. Together they contain every feature that the readers support.
+//! Small valid files of every format that the program reads. Together they contain every feature
+//! that the readers support.
 
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
@@ -7,7 +8,7 @@ use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
 use zerkalo::sampling::SamplerKind;
 use zerkalo::value::fnv1a64;
 
-/// Returns a sphere of triangles: its corners, and the indices of the corners of each triangle.
+/// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     for ring in 0..=rings {
@@ -111,8 +112,8 @@ pub fn stl() -> Vec<Vec<u8>> {
     vec![text.into(), bytes]
 }
 
-/// Returns the JSON description and the buffer of a glTF file. `uri` is a JSON entry with the
-/// buffer's location, or empty.
+/// Returns the JSON description and the buffer of a glTF file. `uri` is the JSON entry with the
+/// buffer's location, followed by a comma. It is empty for binary glTF.
 fn description(uri: &str) -> (String, Vec<u8>) {
     let (points, triangles) = ball(4, 6);
     let mut buffer = Vec::new();

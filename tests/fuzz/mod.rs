@@ -1,4 +1,5 @@
-//! Fuzz tests: seeded mutations of valid files cause no panic, no hang and no large allocation.
+//! Fuzz tests: seeded mutations of valid files must cause no panic, no hang and no large
+//! allocation.
 
 mod files;
 mod mutate;
@@ -23,11 +24,11 @@ use zerkalo::scene::Scene;
 /// Number of mutations that are read for each format.
 const CASES: u64 = 5_000;
 
-/// Longest allowed time for reading one file. The time is the shortest of up to five attempts,
-/// because other programs may slow down one of them.
+/// Longest allowed time for reading one file. The fastest of up to five attempts counts, because
+/// other programs may slow down the others.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// Largest peak memory of the whole test, in KiB.
+/// Limit on the peak memory of the test process, in KiB.
 const MEMORY_KIB: u64 = 512 << 10;
 
 /// Returns the peak memory of this process in KiB. Returns 0 if the system does not report it.
@@ -37,8 +38,8 @@ fn peak_kib() -> u64 {
     line.and_then(|l| l.trim().split(' ').next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Reads `CASES` mutations of the files `seeds`. `read` returns `true` if it accepts a file.
-/// Returns the number of accepted files.
+/// Reads `CASES` mutations of the files `seeds` and returns the number of accepted ones. `read`
+/// returns `true` if it accepts a file; it must accept the unchanged files.
 fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> u64 {
     for (i, seed) in seeds.iter().enumerate() {
         assert!(read(seed), "seed {i} of {name} is not good");

@@ -1,4 +1,4 @@
-//! Comparison of packets with vectors of width 1: their results are equal in every bit.
+//! Comparison of packets with vectors of width 1: their results must be equal in every bit.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, packets, surface};

@@ -58,7 +58,7 @@ fn closed_form_01_a_point_light_on_a_plane() {
 }
 
 /// Checks the shadow of a rectangle with the corners (+-1.5, 1, +-1), turned by 20 degrees. The
-/// ground is dark exactly where the segment to the light crosses the rectangle.
+/// ground must be dark exactly where the segment to the light crosses the rectangle.
 #[test]
 fn closed_form_01_the_shadow_has_straight_edges() {
     let light = DVec3::new(0.5, 4.0, -0.7);

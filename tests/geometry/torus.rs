@@ -181,7 +181,7 @@ fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f6
 }
 
 /// Returns lines along `d` through an even grid of `side` by `side` points. The grid is a square of
-/// half-width `half` around the origin.
+/// half-width `half` around the origin, perpendicular to `d`.
 fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
     let (u, v) = d.any_orthonormal_pair();
     let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
@@ -257,9 +257,9 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Checks compounds (CSG) of a torus, a ball and a half-space. The middle of each interval between
-/// two hits is inside of the compound by the number of hits before it, and also by the set
-/// operations.
+/// Checks hits on compounds (CSG) of a torus, a ball and a half-space. A line has an odd number of
+/// hits before a point exactly if the point is inside of the compound. The test compares both for
+/// the middle of each interval between two hits.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -311,9 +311,9 @@ fn torus_in_compounds_has_two_intervals() {
     assert!(several > 30, "{several}");
 }
 
-/// Checks bounds, clearance and normals of a torus under three affine maps. The bounds touch the
-/// image of the surface. The clearance, a lower bound of the distance between a point and the
-/// surface, does not exceed this distance. Normals exist where rays hit.
+/// Checks bounds, clearance and normals of a torus under three affine maps. The bounds must touch
+/// the image of the surface. The clearance is a lower bound of the distance between a point and the
+/// surface and must not exceed it. Normals must exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

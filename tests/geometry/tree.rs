@@ -1,4 +1,5 @@
-//! BVHs, and bounding boxes in object or scene space, against a linear list: their hits are equal.
+//! BVHs, and bounding boxes in object or scene space, against a linear list: their hits must be
+//! equal.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, packets};

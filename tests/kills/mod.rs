@@ -1,7 +1,7 @@
 //! Crash tests. 100 programs are ended at random moments while their scene is edited, saved and
-//! exported. They are ended by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged,
-//! and no edit is lost that was made at least a given time before the end. After SIGTERM and SIGHUP
-//! the terminal is restored.
+//! exported. They are ended by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file may be
+//! damaged, and no edit may be lost that was made at least a given time before the end. After
+//! SIGTERM and SIGHUP the terminal must be restored.
 //!
 //! The message of a failure contains the number of its run. `ZERKALO_KILL=17 cargo test --test
 //! program kills::` repeats run 17 alone, with the same keys at the same times as far as the
@@ -31,8 +31,9 @@ const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
-/// Number of consecutive runs of which the first four are followed by a recovery, one for each
-/// cause of the end. In a recovery the program is started again and restores the unsaved edits.
+/// Period of the recoveries: of this many consecutive runs, the first four are followed by a
+/// recovery, one for each cause of the end. In a recovery the program is started again and restores
+/// the unsaved edits.
 const RECOVERY_PERIOD: usize = 20;
 /// Smallest age of an edit that must survive SIGKILL. The age is the time from the edit's key press
 /// to the signal.
@@ -53,8 +54,9 @@ enum End {
 const ENDS: [End; 4] = [End::Term, End::Hup, End::Kill, End::Closed];
 
 impl End {
-    /// Returns the expected exit status, `None` for SIGKILL, and the smallest age of an edit that
-    /// must survive. The age is the time from the edit's key press to the program's end.
+    /// Returns two values: the expected exit status (`None` for SIGKILL), and the smallest age of
+    /// an edit that must survive. The age is the time from the edit's key press to the program's
+    /// end.
     fn consequences(self) -> (Option<u32>, Duration) {
         match self {
             Self::Term => (Some(143), READ_AFTER),
@@ -102,8 +104,8 @@ impl Plan {
     }
 }
 
-/// Stalls of the machine. A stall is a short sleep that lasted too long: its start, and the time by
-/// which it exceeded the requested duration.
+/// Stalls of the machine: short sleeps that lasted too long. Each is stored as its start and the
+/// time by which it exceeded the requested duration.
 static STALLS: Mutex<Vec<(Instant, Duration)>> = Mutex::new(Vec::new());
 
 /// Measures short sleeps until `over` is `true`. Records a stall of the machine if a sleep lasts
@@ -133,8 +135,9 @@ fn stall_allowance(start: Instant) -> Duration {
 /// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
 /// program's end, or 0 if no edit is lost.
 ///
-/// # Errors Fails if the exit status is wrong, if a file is damaged, if an edit that must be kept
-/// is lost, or if the terminal is not restored after SIGTERM or SIGHUP.
+/// # Errors
+/// Fails if the exit status is wrong, if a file is damaged, if an edit that must be kept is lost,
+/// or if the terminal is not restored after SIGTERM or SIGHUP.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
@@ -196,7 +199,7 @@ fn run(number: usize) -> Result<Duration, String> {
 }
 
 /// Checks that the output `bytes` leaves the alternate screen and contains no control sequences
-/// afterwards. `restored` must be `true`: the terminal has its original modes.
+/// afterwards. Also checks `restored`, which is `true` if the terminal has its original modes.
 fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     let left = find(bytes, LEAVE.as_bytes()).ok_or("the terminal was not left")?;
     let after = &bytes[left + LEAVE.len()..];
@@ -354,8 +357,8 @@ fn check_runs(numbers: Vec<usize>) {
     );
 }
 
-/// Checks the end of the program if the terminal is lost while an export is still running. The
-/// program then prints the result of the export to a closed stdout.
+/// Checks the exit status if the terminal is lost while an export is still running. The program
+/// then prints the result of the export to a closed stdout.
 #[test]
 fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
     for _ in 0..4 {

@@ -59,7 +59,7 @@ pub const KEYS: [(&str, &[u8]); 10] = [
 /// Index in `KEYS` of the key that saves the scene.
 pub const SAVE: usize = 7;
 
-/// Returns the text that a save would write after each prefix of `keys`, which are indices into
+/// Returns the texts that a save would write after each prefix of `keys`, which are indices into
 /// [`KEYS`]. The first text is that before any key, the last that after all keys.
 pub fn states(keys: &[usize]) -> Vec<String> {
     let path = PathBuf::from("scene.toml");

@@ -55,7 +55,8 @@ struct Figures {
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean OKLab error of the screen, measured at the end of each wave (set of concurrent jobs).
+    /// Mean OKLab distance between the screen and the picture, measured at the end of each wave
+    /// (set of concurrent jobs).
     mean_error: f64,
     /// Seconds from the end of the last wave until the screen shows the picture exactly.
     exact_after: f64,

@@ -16,8 +16,8 @@ pub const SCREEN: [u16; 2] = [160, 45];
 /// Area of the picture on the screen: all rows except the last one, which shows text.
 const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
 
-/// Picture that converges. Its first wave has one sample per half cell (upper or lower half of a
-/// terminal cell).
+/// Picture that converges. Its first wave (set of concurrent jobs) has one sample per half cell
+/// (upper or lower half of a terminal cell).
 pub struct Work {
     rendering: RenderState,
     schedule: Schedule,
@@ -31,7 +31,7 @@ pub struct Work {
 }
 
 impl Work {
-    /// Renders `scene` up to `spp` samples per pixel.
+    /// Prepares a render of `scene` with up to `spp` samples per pixel.
     pub fn new(scene: &Scene, spp: u32) -> Self {
         let size = [PICTURE.width, 2 * PICTURE.height].map(u32::from);
         let scene = support::sized(scene.clone(), size);
@@ -78,7 +78,8 @@ impl Work {
         self.cells.set_string(0, PICTURE.height, text, Style::new());
     }
 
-    /// Replaces the scene by `scene`, which is rendered up to `spp` samples per pixel.
+    /// Replaces the scene by `scene` and prepares a render of it with up to `spp` samples per
+    /// pixel.
     pub fn edit(&mut self, scene: &Scene, spp: u32) {
         let Self { subject, version, .. } = *self;
         *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };

@@ -1,6 +1,6 @@
 //! Changes that a client makes while a session (background renderer) runs: lights, stop criteria,
-//! display, threads. Samples are kept where possible, and noise estimates equal those of a fresh
-//! render.
+//! display, threads. Samples must be kept where possible, and noise estimates must equal those of a
+//! fresh render.
 
 mod noise;
 
@@ -357,8 +357,8 @@ fn finished_or_paused_session_stays_asleep() {
     assert_eq!((idle_switches, switches_in(&session)), (0, 0));
 }
 
-/// Returns the number of wake-ups of the session's thread in 0.2 seconds. It is the minimum of five
-/// tries, because the thread needs a moment to fall asleep.
+/// Returns the number of wake-ups of the session's thread in 0.2 seconds: the smallest number of
+/// five tries, because the thread needs a moment to fall asleep.
 #[cfg(target_os = "linux")]
 fn switches_in(session: &Session) -> u64 {
     let ids = session

@@ -7,7 +7,8 @@ use zerkalo::render::RenderState;
 use zerkalo::render::session::Session;
 use zerkalo::value::Color;
 
-/// Returns the picture of a session in 8-bit levels, not rounded, and its estimated noise.
+/// Returns the picture of a session in 8-bit levels, not rounded, and the estimated noise of this
+/// picture.
 fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
@@ -24,8 +25,8 @@ fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
 
 /// Checks the noise estimate after lights are dimmed and brightened in a finished adaptive render.
 /// The true error is the difference from a fresh render with another seed. On average over several
-/// seeds the estimated error equals the true one, both for the new light weights and for a fresh
-/// render with the new lights.
+/// seeds the estimated error must equal the true one, both for the new light weights and for a
+/// fresh render with the new lights.
 #[test]
 fn noise_estimate_after_light_change_is_accurate() {
     let mut bright = scene();

@@ -7,9 +7,9 @@ use zerkalo::material::{Lobe, Masking};
 
 const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
 
-/// Known albedos of Beckmann microfacets with F = 1. Each row contains a masking, an alpha, and the
-/// albedos at five angles. They come from a quadrature of the closed formula that is independent of
-/// this program.
+/// Known albedos of Beckmann microfacets with the Fresnel reflectance F = 1. Each row contains a
+/// masking, an alpha, and the albedos at the angles [`DEGREES`]. They come from a numerical
+/// quadrature of the closed formula, independent of this program.
 const KNOWN: [(Masking, f64, [f64; 5]); 7] = [
     (Masking::VCavity, 0.2, [1.000, 0.992, 0.928, 0.960, 0.991]),
     (Masking::VCavity, 0.4, [0.964, 0.912, 0.932, 0.975, 0.995]),

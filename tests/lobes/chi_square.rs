@@ -25,7 +25,8 @@ struct Chart {
     spread: ReflectionLobe<f64>,
     /// Interface that the rays are transmitted through; `None` for reflected rays.
     through: Option<Sides>,
-    /// Two tangents and the axis of the lobe: the surface normal for lobes of microfacets.
+    /// Frame of the lobe: two tangents, and the axis. The axis is the surface normal for microfacet
+    /// distributions.
     frame: [Vector; 3],
 }
 
@@ -94,7 +95,7 @@ impl Chart {
         dot(crossing.transmitted.0, self.n) < 0.0 && self.leaving(h).is_some()
     }
 
-    /// Returns the frame of the square lobe: its two sides and its axis.
+    /// Returns the frame of the square lobe: the directions of its two sides, and its axis.
     fn square_frame(&self) -> [Vector; 3] {
         let frame = Frame::around(Vec3::<f64>::of(self.mirror()));
         [vector(frame.t), vector(frame.b), vector(frame.n)]
@@ -157,8 +158,8 @@ impl Chart {
                     return (d, 0.0);
                 }
                 // If r is the slope divided by alpha, an area dp dq covers alpha^2 pi d(r^2) dq in
-                // slope space, with d(r^2) = 2 dp / (1
-                // - p)^3. The solid angle of facet normals per area in slope space is cos^3.
+                // slope space. Here d(r^2) is 2 dp / (1 - p)^3. The solid angle of facet normals
+                // per area in slope space is cos^3.
                 let slopes = facets.alpha.powi(2) * PI * 2.0 / (1.0 - p).powi(3);
                 (d, per_facet * dot(h, self.n).powi(3) * slopes)
             }
@@ -166,7 +167,7 @@ impl Chart {
     }
 }
 
-/// Returns two tangents of `axis`, and `axis`.
+/// Returns a frame: two unit vectors orthogonal to `axis` and to each other, and `axis`.
 fn framed(axis: Vector) -> [Vector; 3] {
     let [t, b] = across(axis);
     [t, b, axis]

@@ -36,9 +36,9 @@ fn disc_share(r: f64, d: f64) -> f64 {
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Returns the fraction of a square that is inside of a straight edge in the square's plane. The
-/// square has the side `side` and is at unit distance. `d` is the distance of the edge from the
-/// square's centre, and `phi` the angle between the edge's normal and a side.
+/// Returns the fraction of a square that is inside of a straight edge in the square's plane. `side`
+/// is the length of the square's sides, `d` the distance of the edge from the square's centre, and
+/// `phi` the angle between the edge's normal and a side. If `d` is positive, the centre is inside.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
     let (c, s) = (phi.cos().abs(), phi.sin().abs());
@@ -90,8 +90,9 @@ fn half_angles() -> [f64; 7] {
     [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
 }
 
-/// Returns the largest deviation of counted fractions of a lobe in half-spaces from the closed
-/// forms, in standard deviations of the count.
+/// Counts the sampled directions of a lobe that are inside of each half-space of `edges`. Returns
+/// the largest deviation of the counted fraction from the closed form, in standard deviations of
+/// the count.
 fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
@@ -110,8 +111,9 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Returns the root mean square error of estimated fractions of a lobe in half-spaces, against the
-/// closed forms. Each fraction is estimated with its own set of `count` Sobol points.
+/// Estimates the fraction of a lobe that is inside of each half-space of `edges`. Each estimate
+/// uses its own set of `count` Sobol points. Returns the root mean square error against the closed
+/// forms.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let incident = combine(&[(-1.0, n)]);
@@ -182,8 +184,8 @@ fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
     report(19, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
-/// Checks that the fraction of a narrow cone in a half-space is that of a flat disc, within theta^2
-/// / 18.
+/// Checks that the fraction of a narrow cone in a half-space differs from that of a flat disc by at
+/// most theta^2 / 18.
 #[test]
 fn closed_form_04_the_narrow_cone_is_a_disc() {
     for theta in [2e-3, 1e-2, 0.1] {
@@ -224,8 +226,9 @@ fn extreme_20_square_in_a_half_space() {
     report(20, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
-/// Checks the density of directions to a uniform point of the square at unit distance, 1 / (side^2
-/// cos^3). It integrates to 1 and is larger towards the corners than in the middle.
+/// Checks the density 1 / (side^2 cos^3) of directions to a uniform point of the square at unit
+/// distance. Here cos is the cosine of the angle to the square's axis. The density must integrate
+/// to 1 and be larger towards the corners than in the middle.
 #[test]
 fn closed_form_05_density_of_the_square() {
     for side in [0.01, 0.5, 3.0] {
@@ -248,9 +251,9 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Returns the largest difference between the fractions of two lobes that are inside of a straight
-/// edge, over many edges. The lobes are a square of the side `side` and a cone with tan theta =
-/// 0.2.
+/// Compares two lobes by the fraction of each that is inside of a straight edge. Returns the
+/// largest difference of the two fractions over many edges. The lobes are a square of the side
+/// `side` and a cone with tan theta = 0.2.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
     let mut largest: f64 = 0.0;
@@ -267,7 +270,7 @@ fn largest_difference(side: f64) -> f64 {
 /// Compares square lobes of four sizes with the cone lobe of radius 0.2, by the largest difference
 /// between the fractions inside of a straight edge. The square with the area of the cone differs
 /// least. The expected differences are computed for a flat disc instead of the cone, and rounded.
-/// Those for the cone differ from them by at most 0.0025.
+/// With the cone, the differences change by at most 0.0025.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;

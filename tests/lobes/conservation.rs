@@ -1,5 +1,5 @@
 //! Conservation of energy and reciprocity of the reflection models. Every lobe, highlight and
-//! masking has the properties that [`crate::lobes::properties`] lists.
+//! masking must have the properties that [`crate::lobes::properties`] lists.
 
 use crate::lobes::properties::{BsdfProperties, Energy, ReflectionModel, transmission_properties};
 use crate::lobes::setup::*;
@@ -32,8 +32,8 @@ fn variants_match_words_of_fields() {
 }
 
 /// Checks energy and reciprocity of the interface, reflection and transmission together, for light
-/// from outside and from inside. Also checks that each property that a Fresnel mode is declared not
-/// to have is violated.
+/// from outside and from inside. A Fresnel mode that is declared not to have one of these
+/// properties must violate it.
 #[test]
 fn transparent_surfaces_have_declared_properties() {
     for mode in Fresnel::ALL {
@@ -329,8 +329,9 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
     assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }
 
-/// Checks that the value of a lobe in a sampled direction, divided by its density, is the weight of
-/// the sample. This holds whether directions below the surface are mirrored up or absorbed.
+/// Checks that the value of a lobe in a sampled direction, divided by the density of this
+/// direction, is the weight of the sample. This must hold both if directions below the surface are
+/// mirrored up and if they are absorbed.
 #[test]
 fn value_over_density_is_the_weight_of_the_sample() {
     let n = tilted_normal();

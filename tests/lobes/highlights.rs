@@ -9,7 +9,7 @@ fn shiny(exponent: f64) -> Material {
     Material { diffuse: 0.0, specular: 0.7, exponent, ..Material::default() }
 }
 
-/// Returns a unit vector, rounded to the precision of `L`, and the same rounded numbers in double
+/// Returns `v`, normalised in the precision of `L`, and the same rounded numbers in double
 /// precision.
 fn rounded<L: SimdFloat>(v: [f64; 3]) -> (Vec3<L>, [f64; 3]) {
     let v = Vec3::<L>::of(v).normalize();
@@ -31,8 +31,8 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     if along > 0.0 { (-0.5 * alpha * tan2.ln_1p()).exp() } else { 0.0 }
 }
 
-/// Checks highlights near the mirror direction for exponents from 1 to 1e9. Their values equal
-/// those of a computation in double precision within rounding, and never exceed k_s / pi.
+/// Checks highlights near the mirror direction for exponents from 1 to 1e9. Their values must equal
+/// those of a computation in double precision within rounding, and must not exceed k_s / pi.
 fn check<L: SimdFloat>(rounding: f64) {
     let most = L::from_f64(0.7) * L::from_f64(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();

@@ -50,9 +50,9 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
     }
 }
 
-/// Checks that scrambling keeps each pair of dimensions a net: every elementary interval contains
-/// one point. This holds in the joint set (the first eight dimensions) and in the padded sets
-/// (further dimensions), whose indices are also shuffled.
+/// Checks that each pair of dimensions is still a net after scrambling: every elementary interval
+/// contains one point. This must hold in the joint set (the first eight dimensions) and in the
+/// padded sets (further dimensions), whose indices are also shuffled.
 fn nets<L: SimdFloat>() {
     for seed in [0, 1, u64::MAX] {
         for replicate in 0..2 {
@@ -208,7 +208,7 @@ const SMOOTH: Integrand = Integrand {
     },
 };
 
-/// Integrand with an edge through the pixel, at slope k.
+/// Integrand with a straight edge of slope k / 2 through the pixel.
 const EDGE: Integrand = Integrand {
     value: |x, k| f64::from(u8::from(x[1] < 0.25 + 0.5 * k * x[0])),
     exact: |k| 0.25 + 0.25 * k,

@@ -91,9 +91,9 @@ fn parallel_mirrors(depth: u32) -> Scene {
 }
 
 /// Checks two parallel emissive mirrors with the reflectance rho = 0.999. The sum of rho^k over all
-/// images is 1000. The part of it beyond the depth limit equals the reported bias. In single
-/// precision the error of the sum is at most 1e-4. Its parts are the rounding of rho by up to 3e-8,
-/// multiplied by 1000 images, and the roundings of 10,000 terms.
+/// images k is 1000. The part of the sum beyond the depth limit must equal the reported bias. In
+/// single precision the error of the sum is at most 1e-4. It has two parts: the rounding of rho by
+/// up to 3e-8, multiplied by 1000 images, and the roundings of 10,000 terms.
 #[test]
 fn extreme_26_parallel_mirrors() {
     let rho: f64 = 0.999;

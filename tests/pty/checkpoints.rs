@@ -123,7 +123,7 @@ fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
 }
 
 /// Kills a dashboard after it has written a checkpoint, and continues the render in a second
-/// dashboard. The film of the second one equals that of `zerkalo render`.
+/// dashboard. The film of the second one must equal that of `zerkalo render`.
 #[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();
@@ -161,7 +161,8 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     checkpoints.for_each(|name| assert_eq!(film(fixture.0.path().join(name)).width(), 320));
 }
 
-/// Checks that a checkpoint without its scene file opens the scene that it contains.
+/// Checks that a checkpoint can be opened without its scene file, because it contains the scene.
+/// Also checks that an incomplete checkpoint is refused.
 #[test]
 fn checkpoint_contains_its_scene() {
     let fixture = Fixture::with_room();

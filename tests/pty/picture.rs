@@ -24,8 +24,9 @@ impl Picture {
         Self { size: [info.width as usize, info.height as usize], rgb }
     }
 
-    /// Divides the picture into boxes of equal size, in `cells` columns and rows. Returns the mean
-    /// colour of the box in column and row `index`, averaged in linear light, as 8-bit sRGB.
+    /// Divides the picture into boxes of equal size, in `cells` columns and rows. `index` is column
+    /// and row of a box. Returns the mean colour of this box, averaged in linear light, as 8-bit
+    /// sRGB.
     fn averaged(&self, cells: [usize; 2], index: [usize; 2]) -> [u8; 3] {
         let edge = |i: usize, n: usize| (n * self.size[i]) as f64 / cells[i] as f64;
         let overlap = |i: usize, pixel: usize| {
@@ -152,8 +153,8 @@ fn pending_export_is_written_before_the_end() {
     Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());
 }
 
-/// Restarts the render with the stop criterion of `spp` samples per pixel and waits until the
-/// criterion is reached. Before the restart the render may have had more samples.
+/// Restarts the render, to stop at `spp` samples per pixel, and waits until it stops. The render
+/// starts anew, so `spp` may be lower than the number of samples that it already has.
 fn restart_rendering(terminal: &mut Terminal, spp: u32) {
     let condition = format!("spp {spp}");
     terminal.send("T");

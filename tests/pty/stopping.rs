@@ -197,8 +197,8 @@ fn doctor_reports_after_restoring_the_terminal() {
     }
 }
 
-/// Checks a named pipe in place of the scene file. Opening a pipe whose other end is closed blocks
-/// for ever.
+/// Checks that a named pipe in place of the scene file does not block the program. Opening a pipe
+/// whose other end is closed blocks for ever.
 #[test]
 fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     let fixture = Fixture::with_room();

@@ -1,5 +1,5 @@
-//! Acceleration structures on random scenes. The films with all of them are identical byte for
-//! byte.
+//! Acceleration structures on random scenes. The films of a scene with all structures must be
+//! identical byte for byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::test_film::TestFilm;

@@ -17,11 +17,11 @@ const GAP: f64 = 1e-5;
 /// bounding box. Scenes with wider gaps are skipped.
 const MAX_GAP: f64 = 1e-2;
 const SAMPLES: u32 = 4;
-/// Allowed change of the mean of a block of pixels by gaps, in 8-bit levels.
+/// Limit on the change of a block mean that gaps cause, in 8-bit levels.
 const FLOOR: f64 = 1.0;
 
-/// Turns off the lights that are on surfaces of objects. Such a light shines on both sides of its
-/// surface. If the object shrank, the light would be outside of it.
+/// Turns off the lights that lie on surfaces of objects. Such a light shines on both sides of the
+/// surface. If the object shrank, the light would lie outside of the object.
 fn without_lights_on_surfaces(scene: &mut Scene) {
     let forms: Vec<_> = scene.objects.iter().map(|object| object.form()).collect();
     let is_on_surface = |position: DVec3| {
@@ -38,14 +38,15 @@ fn without_lights_on_surfaces(scene: &mut Scene) {
     }
 }
 
-/// Change of the sizes of objects that touch.
+/// Changes of the sizes of all bounded objects in a scene.
 #[derive(Clone, Copy)]
 enum Change {
     /// All objects shrink, by different fractions.
     AllShrink,
-    /// Transparent objects shrink. Opaque objects shrink by a smaller fraction than these.
+    /// Transparent objects shrink. Opaque objects shrink, too, but less than the transparent ones.
     OpaqueShrink,
-    /// Transparent objects shrink. Opaque objects grow, by a smaller fraction than these shrink.
+    /// Transparent objects shrink. Opaque objects grow, but by less than the transparent ones
+    /// shrink.
     OpaqueGrow,
 }
 

@@ -31,7 +31,8 @@ const IMAGES: &[&str] = &[
     "scenes/textures/wood.png",
 ];
 
-/// Returns the files to which scenes refer, shared by all scenes.
+/// Returns the resolver that loads the files to which scenes refer. All scenes share the loaded
+/// files.
 pub fn library() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
     AssetResolver::new(Path::new(NAME), ASSETS.get_or_init(Arc::default).clone())

@@ -30,8 +30,9 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// Compares block means of two sets of pictures. Two pictures with the same seed have the same
-/// samples. The test therefore uses the differences of these pairs.
+/// Compares the block means of two sets of pictures, which have the same list of seeds. Two
+/// pictures with the same seed have the same samples, so that most of their noise cancels in their
+/// difference. The test therefore uses these differences.
 pub fn paired(
     size: [u32; 2],
     names: [&str; 2],

@@ -15,13 +15,13 @@ use zerkalo::render::schedule::{Step, Stop};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Number of seeds of the first comparison.
+/// Number of seeds of the first comparison of a scene, which a second one may follow.
 const SEEDS: u64 = 8;
 /// Samples per pixel of the uniform pictures, in both replicates (halves of the samples) together.
 const SAMPLES: u32 = 32;
 /// Number of pictures whose mean is the reference.
 const REFERENCE_PICTURES: u64 = 8;
-/// Samples per pixel of each picture of the reference in the first comparison.
+/// Samples per pixel of each picture of the reference, in the first comparison of a scene.
 const REFERENCE: u32 = 128;
 /// Ratio of the second comparison to the first, in the number of seeds and in the sample count of
 /// the reference. A scene that differs in the first comparison is compared a second time with other
@@ -39,8 +39,8 @@ const MAX_REFERENCE_ERROR: f64 = 0.125;
 /// Largest allowed number of rays of an adaptive picture, divided by that of a uniform one with the
 /// same true error.
 const MAX_RAY_RATIO: f64 = 1.5;
-/// Number of rays after which a picture that has not reached its noise target is stopped, divided
-/// by the mean number of rays of the uniform pictures.
+/// Limit on the rays of a picture with a noise target, divided by the mean number of rays of the
+/// uniform pictures.
 const STOP_FACTOR: u64 = 4;
 /// Largest amount by which a measurement may exceed its limit in the second comparison, in standard
 /// errors. For ratios of errors, a value of Student's t is first converted to the equally probable
@@ -218,8 +218,8 @@ impl Reference {
 struct Errors {
     truths: Vec<f64>,
     reports: Vec<f64>,
-    /// Sum of the squared reported contributions of single pixels. It is computed as the sum over
-    /// pictures of the squared reported error, divided by the number of effective pixels.
+    /// Sum over all pixels of the squared contribution to the reported error. It is computed as the
+    /// sum over pictures of the squared reported error, divided by the number of effective pixels.
     squares: f64,
     /// Mean squared error of the reference.
     reference: f64,
@@ -308,8 +308,9 @@ fn dishonest(
 }
 
 /// Renders pictures with each of `seeds` and compares them with a reference, the mean of several
-/// pictures of `reference_samples` samples per pixel. Returns the differences of at least
-/// `max_deviation`, or the reason for which there is no comparison.
+/// pictures of `reference_samples` samples per pixel. Returns a text for each difference, or the
+/// reason for which there is no comparison. A measurement beyond its limit counts as a difference
+/// if it exceeds the limit by at least `max_deviation` standard errors.
 fn differences(
     scene: &Scene,
     seeds: Range<u64>,

@@ -282,7 +282,7 @@ fn spot(numbers: &mut Numbers, position: DVec3, target: DVec3) -> Spot {
     Spot { position: position.to_array(), direction, outer_angle, inner_angle }
 }
 
-/// Scales the whole scene, translates it, or both, in some of the cases.
+/// Scales the whole scene with a probability of 1/3, and translates it with a probability of 1/3.
 fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     let scale = match numbers.below(3) {
         0 => log(numbers, 1e-4, 1e4),

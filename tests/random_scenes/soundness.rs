@@ -1,5 +1,5 @@
 //! Soundness of random scenes: no panic, no invalid sample, finite noise. In scenes without random
-//! choices both replicates (halves of the samples) are equal.
+//! choices both replicates (halves of the samples) must be equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::layouts::Layout;
@@ -11,7 +11,8 @@ use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
-/// Returns the precision that `auto` selects, and double precision if that is another one.
+/// Returns the precisions to be tested: double precision, and `auto` if it selects single
+/// precision.
 fn precisions(scene: &Scene) -> impl Iterator<Item = Precision> {
     let is_double =
         matches!(AnyWorld::compile(scene, &world::Options::default()), AnyWorld::Double(_));
@@ -98,7 +99,8 @@ fn many_replicates() {
     compare_many("replicates", replicates_are_equal);
 }
 
-/// Checks a light 1e-5 above a floor that is 10 wide. Its samples are bright and valid.
+/// Checks that samples are valid on a floor, 10 wide, under a light at the height 1e-5. These
+/// samples are very bright.
 #[test]
 fn light_close_to_floor_has_no_bad_sample() {
     let scene = parsed(

@@ -47,14 +47,14 @@ pub struct Worst {
 }
 
 impl Worst {
-    /// Starts a comparison of `count` numbers, whose standard errors have `freedom` degrees of
-    /// freedom.
+    /// Starts a comparison of `count` pairs of numbers. The standard error of each difference has
+    /// `freedom` degrees of freedom.
     pub fn new(count: usize, freedom: usize) -> Self {
         Self { count: count as f64, freedom: freedom as f64, z: 0.0, what: String::new() }
     }
 
-    /// Records a difference with its standard error. `floor` is the difference that rounding may
-    /// cause. `what` returns a description of the difference.
+    /// Records a difference with its standard error. `floor` is the allowed part of the difference,
+    /// such as that by rounding. `what` returns a description of the difference.
     pub fn note(&mut self, difference: f64, floor: f64, error: f64, what: impl FnOnce() -> String) {
         let excess = (difference.abs() - floor).max(0.0);
         let t = if excess == 0.0 { 0.0 } else { excess / error };

@@ -1,5 +1,5 @@
 //! Adaptive renders of random scenes with different numbers of threads, whose films and sample
-//! counts are equal.
+//! counts must be equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::test_film::TestFilm;

@@ -1,5 +1,5 @@
-//! Time that edits of large scene files take. The tests compare processor times of one run, as
-//! ratios.
+//! Time that edits of large scene files take. Each test compares ratios of processor times, all
+//! from the same run.
 
 use super::*;
 use std::fmt::Write;

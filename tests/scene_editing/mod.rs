@@ -1,5 +1,5 @@
-//! Edits written to scene files: only changed values are written, and the text reads back as the
-//! scene.
+//! Edits written to scene files: only changed values may be written, and the text must read back as
+//! the scene.
 
 mod large;
 mod layouts;

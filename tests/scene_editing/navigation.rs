@@ -9,8 +9,8 @@ fn aimed() -> Camera {
     Camera { eye: [0.6, 1.4, 4.5], target: Some([0.0, 0.8, -0.5]), ..Camera::default() }
 }
 
-/// Returns the camera of the mirror room with a direction instead of a target, and the distance of
-/// that target from the eye.
+/// Returns the camera of the mirror room with a direction instead of a target. Also returns the
+/// distance of the omitted target from the eye.
 fn free() -> (Camera, f64) {
     let view = aimed().view().unwrap();
     let direction = Some(view.to_array());

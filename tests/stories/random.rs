@@ -1,5 +1,5 @@
-//! Ten thousand random key and mouse events on three scenes. The model stays valid, and every edit
-//! can be undone.
+//! Ten thousand random key and mouse events on three scenes. The model must stay valid, and it must
+//! be possible to undo every edit.
 
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::collections::HashSet;

@@ -1,5 +1,5 @@
-//! Keys that change the roughness: they change the mirror's pixels and leave all others equal in
-//! every bit.
+//! Keys that change the roughness of a mirror: they must change the pixels that show the mirror and
+//! leave all others equal in every bit.
 
 use crate::stories::simulated_dashboard::Desk;
 use crate::support::test_film::TestFilm;
@@ -24,8 +24,9 @@ fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
-/// Renders the scene with another colour and a higher ambient coefficient of the materials for
-/// whose names `of` returns `true`. The pixels whose paths hit these materials change.
+/// Renders the scene with changes to each material for whose name `of` returns `true`: another
+/// colour and a higher ambient coefficient. Compared with [`picture`], this changes the pixels
+/// whose paths hit one of these materials.
 fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {

@@ -73,8 +73,9 @@ pub struct Desk {
     pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// `true` if requests of the dashboard to load the file are answered. If it is `false`, they
-    /// are ignored, because each load restarts the undo history.
+    /// `true` if requests of the dashboard to load the file are answered, `false` if they are
+    /// ignored. The test of random events ignores them, because each load restarts the undo
+    /// history.
     pub reads: bool,
 }
 

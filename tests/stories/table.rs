@@ -32,7 +32,7 @@ fn every_command_has_a_label_of_its_own() {
 }
 
 /// Compares docs/keys.md with the command table. `ZERKALO_BLESS=1 cargo test --test program
-/// stories::` rewrites the file.
+/// stories::` rewrites docs/keys.md.
 #[test]
 fn keys_page_matches_command_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");

@@ -1,5 +1,5 @@
-//! Stories (user input and expected state) of `zerkalo watch`. Reports change the table of files,
-//! and no key edits the scene or starts a render.
+//! Stories (user input and expected state) of `zerkalo watch`. Reports must change the table of
+//! files, and no key may edit the scene or start a render.
 
 use crate::stories::simulated_dashboard::Desk;
 use std::time::Duration;

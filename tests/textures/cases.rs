@@ -1,5 +1,6 @@
 //! Textured objects, each in two forms: as a scene file, and for the direct evaluation. The
-//! pictures of both must be equal. The pictures of variants of the object must differ.
+//! pictures of both forms must be equal. The direct evaluation of a variant of the object must give
+//! another picture.
 
 use crate::common::Numbers;
 use crate::support::{picture, rendered};
@@ -187,8 +188,9 @@ pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2
 
 pub const ALLOWED: [f64; 2] = [0.001, 0.01];
 
-/// Smallest fraction of pixels in which the picture of a variant must differ from the direct
-/// evaluation. It is at least eight times [`ALLOWED`], the fractions for the object itself.
+/// Smallest fraction of pixels in which the direct evaluation of a variant must differ from the
+/// program's picture of the object. It is at least eight times [`ALLOWED`], the largest fractions
+/// for the object itself.
 pub const TOLD: f64 = 0.08;
 
 pub fn check(case: &Case, desk: &Desk) {
@@ -206,7 +208,8 @@ pub fn check(case: &Case, desk: &Desk) {
     }
 }
 
-/// Returns variants of a textured object whose pictures must differ, each with its name.
+/// Returns variants of a textured object whose direct evaluations must differ from the object's
+/// picture, each with its name.
 fn variants(case: &Case) -> Vec<(Case, &'static str)> {
     let with = |change: &dyn Fn(&mut Case)| {
         let mut other = case.clone();

@@ -207,7 +207,7 @@ fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     DVec3::from(codes.map(|c| f64::from(c) / 255.0))
 }
 
-/// Returns `value` of the four nearest pixels, interpolated bilinearly.
+/// Returns the bilinear interpolation of `value` between the four pixels nearest to `uv`.
 fn bilinear(image: &RgbImage, clamp: bool, uv: DVec2, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let (x, y) = (uv.x * f64::from(image.width()) - 0.5, uv.y * f64::from(image.height()) - 0.5);
     let (i, j) = (x.floor(), y.floor());

@@ -197,7 +197,7 @@ fn texture_edits_read_each_file_once() {
 }
 
 /// Checks a flat face that lies exactly in the boundary between two checker fields or two pixels of
-/// the texture. It has one colour, which is the same in both precisions.
+/// the texture. It must have one colour, which is the same in both precisions.
 #[test]
 fn faces_in_edges_of_a_texture_have_one_color() {
     let checker =
