@@ -116,11 +116,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
     #[inline(always)]
     fn density(&self, tan2: L) -> L {
         let inverse_alpha2 = L::splat(self.inverse_alpha2);
-        if self.ggx {
-            ggx_d(tan2, inverse_alpha2)
-        } else {
-            beckmann_d(tan2, inverse_alpha2)
-        }
+        if self.ggx { ggx_d(tan2, inverse_alpha2) } else { beckmann_d(tan2, inverse_alpha2) }
     }
 
     /// Returns the numerator and the denominator of G. For V-cavities G is min(1, 2 N.H min(N.V,
