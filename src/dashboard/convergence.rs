@@ -11,8 +11,8 @@ pub struct Point {
     pub noise_codes: f64,
 }
 
-/// History of the noise of one picture, from the renderer's reports. If the history exceeds a fixed
-/// number of points, every second one of the later points is removed.
+/// History of the noise of one picture, from the renderer's reports. It keeps at most 400 points:
+/// when there are more, every second point after the first 100 is removed.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     /// Points of the convergence plot in order of increasing time.
@@ -21,14 +21,14 @@ pub struct Convergence {
     samples: u64,
 }
 
-/// Largest number of stored points of the convergence plot, more than a plot has columns. Points
-/// are removed when it is exceeded.
+/// Largest number of stored points of the convergence plot, more than a plot has columns. A further
+/// point causes the removal of some of them.
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the render time in seconds at which the noise fell to `codes` 8-bit levels. The time
-    /// is interpolated between two reports by a power law. Returns `None` if the latest noise is
-    /// above `codes`, or if no stored noise is above `codes`.
+    /// Returns the render time in seconds at which the noise last fell to `codes` 8-bit levels. The
+    /// time is interpolated between two reports by a power law. Returns `None` if the latest noise
+    /// is above `codes`, or if no stored noise is above `codes`.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
         // Only the last fall to `codes` counts, because switching on a light raises the noise
         // again.

@@ -11,8 +11,8 @@ const MOST: usize = 400;
 pub struct Editor {
     /// Text and cursor.
     pub input: Input,
-    /// Reason why the text was refused, in one or two sentences. It is shown until the text
-    /// changes.
+    /// Reason why the text was refused, in one or two sentences, shown until the text changes.
+    /// `None` if there is none.
     pub problem: Option<String>,
 }
 
@@ -57,7 +57,7 @@ impl Editor {
         true
     }
 
-    /// Inserts the first line of pasted text without control characters.
+    /// Inserts the first line of the pasted `text` at the cursor, without its control characters.
     pub fn paste(&mut self, text: &str) {
         let line = text.trim_start_matches(['\n', '\r']).lines().next().unwrap_or_default();
         for c in line.chars() {

@@ -37,7 +37,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     })
 }
 
-/// Returns the hints for the state `line`, sorted by position.
+/// Returns the hints for the state `line`, sorted by their positions in the hint line.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     let mut hints: Vec<_> = COMMANDS
         .iter()
@@ -48,7 +48,7 @@ fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     hints
 }
 
-/// Returns the hints for the model's state, sorted by position.
+/// Returns the hints for the model's state, sorted by their positions in the hint line.
 pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }

@@ -23,14 +23,14 @@ pub struct Request {
     pub film: [u32; 2],
     /// Panel with the keyboard focus.
     pub focus: Focus,
-    /// `true` if only the picture is visible.
+    /// `true` in full screen: no panel except the picture's is visible.
     pub fullscreen: bool,
     /// `true` if the table of watched files takes the place of the outline and the inspector.
     pub watching: bool,
 }
 
-/// Areas of the panels on the screen, borders included. The area of a panel is `None` if the panel
-/// is hidden for lack of room.
+/// Areas of the panels on the screen, borders included. The area of a side panel is `None` if the
+/// panel is hidden, for lack of room or in full screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
     /// Area of the panel with the rendered picture.
@@ -96,8 +96,8 @@ pub fn layout(request: &Request) -> Option<Layout> {
 
 /// Divides the side column of the screen into three panels, from top to bottom: the outline (the
 /// list of all parts of the scene), the inspector (properties of the selection) and the convergence
-/// plot. Panels without room are `None`. The table of watched files takes the place of the outline
-/// and the inspector.
+/// plot. Panels without room are `None`. In `zerkalo watch` the first panel is the table of watched
+/// files, and the second is `None`.
 fn side_panels(side: Rect, request: &Request) -> [Option<Rect>; 3] {
     let rows = side.height;
     let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
@@ -196,8 +196,8 @@ mod tests {
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
     }
 
-    /// Checks that the picture fills the width or the height of its panel, and that each of its
-    /// cells shows a film pixel. Its width and height have the film's aspect ratio, except for
+    /// Checks that the picture fills the width or the height of its panel, and that each cell of
+    /// the picture shows a film pixel. The picture must have the film's aspect ratio, except for
     /// rounding to whole half cells (a half cell is the upper or lower half of a cell).
     #[test]
     fn picture_keeps_aspect_ratio_of_film() {

@@ -65,7 +65,8 @@ pub enum Message {
 pub struct OrphanedEdits {
     /// Scene with the unsaved edits.
     pub scene: Arc<Scene>,
-    /// Time from the last write of the edits to the recovery file until this offer to recover them.
+    /// Age of the recovery file that contains the edits, at the time when their recovery is
+    /// offered.
     pub age: Duration,
     /// `true` if the scene file has changed since the edits were written.
     pub changed: bool,
@@ -80,7 +81,8 @@ pub struct Exported {
     pub size: [usize; 2],
     /// Mean number of samples per pixel of the image.
     pub spp: f64,
-    /// Estimated RMSE of the displayed picture in 8-bit levels; `None` without an estimate.
+    /// Estimated RMSE of the image after the display transform, in 8-bit levels; `None` without an
+    /// estimate.
     pub noise_codes: Option<f64>,
     /// Argument of scp that copies the image file, such as `user@host:path`.
     pub scp: String,
@@ -105,8 +107,8 @@ impl Format {
     }
 }
 
-/// Channel of the render that the picture shows: the rendered picture itself, a statistic of each
-/// tile, or a property of the first hits.
+/// Channel of the render that the picture's panel shows: the rendered picture itself, a statistic
+/// of each tile, or a property of the first hits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
     /// Rendered picture (beauty pass).
@@ -155,7 +157,7 @@ pub enum Effect {
     Show(Arc<Scene>),
     /// Use this display transform (exposure and tone curve) to measure noise and to write images.
     Display(Display),
-    /// Render until these stop criteria are reached.
+    /// Render until the first of these stop criteria is reached.
     Stop(Stop),
     /// Put into all later snapshots the data that the view requests: pictures at the view's
     /// resolution, and the values of one film pixel. The resolution is in half cells (upper or
@@ -190,8 +192,9 @@ pub enum Effect {
     /// Write the samples of this scene as a checkpoint. Its file gets the next free name derived
     /// from the scene's name.
     Checkpoint(Arc<Scene>),
-    /// Render the scene at another size until `stop`, while the main render continues, and write
-    /// the picture to the next free file name.
+    /// Render the scene at a size of the user's choice until the first of the criteria `stop` is
+    /// reached, while the main render continues. Write the picture to a file with the next free
+    /// name.
     ExportSized {
         /// Scene to render; its film has the requested size.
         scene: Arc<Scene>,
@@ -205,8 +208,8 @@ pub enum Effect {
     /// Cancel the render of [`Effect::ExportSized`]. No image is written then, unless the write has
     /// already begun.
     CancelExport,
-    /// Write the scene with its unsaved edits to the recovery file. The next start of the program
-    /// offers to recover them. `None` removes the file.
+    /// Write the scene with its unsaved edits to the recovery file. If the program crashes or a
+    /// signal ends it, its next start offers to recover the edits. `None` removes the file.
     Autosave(Option<Arc<Scene>>),
     /// Recover the offered edits of a crashed run of the program. They become unsaved edits of the
     /// scene.

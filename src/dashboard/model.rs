@@ -46,7 +46,7 @@ pub struct File {
     /// Scene as it was last read from or written to its file. If there is no file, the scene with
     /// which the program started.
     pub saved: Arc<Scene>,
-    /// Errors in the current contents of the scene file; `None` if they are valid.
+    /// Errors in the current contents of the scene file; `None` if the contents are valid.
     pub broken: Option<SceneErrors>,
     /// `true` if the scene file has been unreadable since the start. There is no scene then, and
     /// the dashboard shows only the errors in `broken`.
@@ -121,7 +121,7 @@ pub struct WatchTable {
     pub scroll: usize,
 }
 
-/// Export that renders at another size in the background.
+/// Export that renders in the background, at a size of the user's choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunningExport {
     /// Width and height of the exported image in pixels.
@@ -162,7 +162,7 @@ pub struct Model {
     pub focus: Focus,
     /// Mode of the picture's panel, which determines the effect of arrow keys.
     pub mode: Mode,
-    /// `true` if only the picture is visible.
+    /// `true` in full screen: no panel except the picture's is visible.
     pub fullscreen: bool,
     /// Index of the first visible line of the outline, the list of all parts of the scene.
     pub outline_scroll: usize,
@@ -173,7 +173,8 @@ pub struct Model {
     pub overlay: Option<Overlay>,
     /// Exposure and tone curve of the displayed picture.
     pub display: Display,
-    /// Channel of the render that the picture shows.
+    /// Channel of the render that the picture's panel shows, such as the rendered picture or the
+    /// noise.
     pub channel: DisplayChannel,
     /// Comparison of the live picture with a pinned one: an earlier picture that the user has
     /// stored.
@@ -199,7 +200,8 @@ pub struct Model {
     pub link: Option<LinkStatus>,
     /// Notice that replaces the hint line for a while.
     pub notice: Option<Notice>,
-    /// Export that renders at another size in the background; `None` if there is none.
+    /// Export that renders in the background, at a size of the user's choice; `None` if there is
+    /// none.
     pub export: Option<RunningExport>,
     /// Path of the last exported image; `None` before the first export.
     pub last_export: Option<PathBuf>,
@@ -211,14 +213,14 @@ pub struct Model {
     /// undo step if they have the same label and little time passes between them. `None` if the
     /// next edit starts a new undo step.
     pub last_edit: Option<Duration>,
-    /// `true` if the program quits after the pending save.
+    /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
     /// Unsaved edits that a crashed run of the program has left, and that the user has neither
     /// recovered nor discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene that was last passed to
-    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave); it need not be passed
-    /// again. `None` if there were no unsaved edits.
+    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave). It is passed again only
+    /// after an edit. `None` if there were no unsaved edits.
     pub autosaved: Option<Arc<Scene>>,
     /// Size of the pictures that were last requested from the renderer, in columns and rows of half
     /// cells. A half cell is the upper or lower half of a terminal cell. `None` before the first
@@ -245,10 +247,10 @@ pub(super) fn first_line(errors: &SceneErrors) -> String {
 }
 
 impl Model {
-    /// Creates the model of a dashboard that renders `scene` with `threads` threads until the
-    /// criteria `stop` are reached. `scene` is an error if the scene file cannot be read. `path` is
-    /// the path of the scene file; without a path, `name` is shown as the file name. The event loop
-    /// later sets the screen size and the colours, and renders [`Model::scene`] unless
+    /// Creates the model of a dashboard that renders `scene` with `threads` threads until the first
+    /// of the criteria `stop` is reached. `scene` is an error if the scene file cannot be read.
+    /// `path` is the path of the scene file; without a path, `name` is shown as the file name. The
+    /// event loop later sets the screen size and the colours, and renders [`Model::scene`] unless
     /// [`File::unreadable`] is `true`.
     pub fn new(
         path: Option<PathBuf>,

@@ -100,11 +100,11 @@ pub struct Pick {
     pub cursor: usize,
     /// Index of the first visible entry of the list.
     pub scroll: usize,
-    /// Function that uses the name of the picked entry.
+    /// Function that is called with the name of the picked entry.
     pub(super) take: fn(&mut UpdateContext<'_>, &str),
 }
 
-/// Form for a new object or light. The picture previews the result while the form is open.
+/// Form for a new object or light, which the picture previews while the form is open.
 #[derive(Clone, Debug)]
 pub struct Form {
     /// Title of the form, such as `new sphere`.
@@ -137,7 +137,7 @@ pub struct Prompt {
     pub(super) apply: fn(&mut UpdateContext<'_>, &str) -> Result<(), String>,
 }
 
-/// Question with a few answers, each with a letter.
+/// Question to the user, with a few answers. Each answer has a letter that chooses it.
 #[derive(Clone, Debug)]
 pub struct Question {
     /// Text of the question, one or two sentences.
@@ -159,7 +159,7 @@ pub enum Answer {
     Quit,
     /// Read the scene file again; unsaved edits are lost.
     Load,
-    /// Overwrite the file at this path; the scene file if the path is `None`.
+    /// Save the scene over the file at this path, or over the scene file if the path is `None`.
     Overwrite(Option<PathBuf>),
     /// Open the prompt for another path to save to.
     SaveAs,

@@ -99,13 +99,13 @@ impl Model {
     }
 
     /// Returns the area of the lines of the outline, the list of all parts of the scene. Returns
-    /// `None` if the outline is hidden for lack of room.
+    /// `None` if the outline is hidden.
     pub fn outline_rows(&self) -> Option<Rect> {
         self.layout()?.outline.map(|area| area.inner(BORDER))
     }
 
     /// Returns two areas of the panel of watched files: one for the rows of its table, one for
-    /// details on the row under the cursor. Returns `None` if the panel is hidden for lack of room.
+    /// details on the row under the cursor. Returns `None` if the panel is hidden.
     pub fn watch_rows(&self) -> Option<(Rect, Rect)> {
         let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
@@ -115,7 +115,7 @@ impl Model {
     }
 
     /// Returns two areas of the inspector: one for its lines, one for help on the field under the
-    /// cursor. Returns `None` if the inspector is hidden for lack of room.
+    /// cursor. Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))

@@ -45,12 +45,13 @@ pub struct OutlineEntry {
     pub note: String,
 }
 
-/// Line of the inspector or of a form that shows the value of a property, or one number of it.
+/// Line of the inspector or of a form: shows the value of a property, or one number of this value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
     /// Part of the scene that the property belongs to.
     pub subject: Target,
-    /// Property that the line shows. It may show only one number of the value, see `component`.
+    /// Property that the line shows. The line may show only one number of the value, see
+    /// `component`.
     pub property: Property,
     /// Index of the number that the line shows, if the property's value is a list of numbers.
     /// `None` for any other value.
@@ -91,7 +92,7 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
 }
 
 /// Returns the index of the line that selects `subject` in the outline, the list of all parts of
-/// the scene. Returns `None` if there is none.
+/// the scene. Returns `None` if no line selects it.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
     let selects = |line: &OutlineLine| line.entry().is_some_and(|entry| entry.subject == *subject);
     lines.iter().position(selects)
@@ -171,8 +172,8 @@ impl Model {
 }
 
 /// Returns the index of a line near `wanted` that shows a property. This is the first such line at
-/// or after `wanted`. If there is none, it is the last one before `wanted`. Returns 0 if no line
-/// shows a property.
+/// or after `wanted`, or the last such line before `wanted` if there is none after it. Returns 0 if
+/// no line shows a property.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].entry().is_some();
     (wanted..lines.len())

@@ -30,7 +30,8 @@ pub struct Environment {
     pub multiplexer: Option<Multiplexer>,
 }
 
-/// Capabilities of the terminal. A field is `None` if the terminal has not replied to its request.
+/// Capabilities of the terminal. A field is `None` if the terminal has not replied to the request
+/// for it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Capabilities {
     /// Environment variables that describe the terminal.

@@ -114,7 +114,8 @@ impl Decoder {
     }
 
     /// Returns the longest time to wait for the next byte of the current sequence. After this time
-    /// the caller calls [`Decoder::give_up`]. Returns `None` between sequences.
+    /// the caller calls [`Decoder::give_up`]. Returns `None` between sequences, and after a pause
+    /// in a paste until more of the paste arrives.
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,

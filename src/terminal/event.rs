@@ -6,7 +6,8 @@ use std::str::FromStr;
 /// Key without modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// Character as typed. The modifier `shift` is `false` for a capital letter.
+    /// Character as typed, such as `a` or `A`. The modifier `shift` is `false` even for a capital
+    /// letter.
     Char(char),
     /// Enter key.
     Enter,

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 /// 1002), with decimal coordinates (mode 1006).
 pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J";
 
-/// Bytes that restore the terminal. They first end a frame (synchronised update) that was cut off
-/// and reset colours and attributes. Then they undo the parts of [`ENTER`] in the opposite order.
+/// Bytes that restore the terminal. They first end an incomplete frame (synchronised update). Then
+/// they reset colours and attributes, and undo the parts of [`ENTER`] in the opposite order.
 pub const LEAVE: &str = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
 
 /// Longest time for which restoration of the terminal waits for a slow terminal that is still
@@ -255,8 +255,8 @@ mod tests {
         parts.replace(']', "LEAVE").replace('[', ENTER).replace("LEAVE", LEAVE)
     }
 
-    /// Checks the bytes against the commands of crossterm, which has no commands for the modes of
-    /// paste and mouse without its event reader.
+    /// Checks `ENTER` and `LEAVE` against the commands of crossterm, which has no commands for the
+    /// modes of paste and mouse without its event reader.
     #[test]
     fn enter_and_leave_consist_of_commands_of_crossterm() {
         use crossterm::cursor::{Hide, Show};

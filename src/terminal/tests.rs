@@ -1,5 +1,5 @@
 //! Tests of the decoding of terminal input: keys and replies in any order, divided between reads at
-//! any byte. No key is lost, and no reply is decoded as a key.
+//! any byte. No key may be lost, and no reply may be decoded as a key.
 
 use crate::terminal::cells::Colors;
 use crate::terminal::event::{Button, Code, MouseKind};

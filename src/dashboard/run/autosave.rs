@@ -16,17 +16,17 @@ const MAX_DELAY: Duration = Duration::from_secs(1);
 /// Autosave of a scene: writes unsaved edits to a recovery file. At the start of the program it
 /// also looks for recovery files with unsaved edits of crashed runs (orphaned edits).
 pub struct Autosave {
-    /// Recovery file of this run of the program.
+    /// Writer and finder of the recovery files of the scene.
     pub recovery: Recovery,
     /// State folder of the user (XDG), for recovery files that cannot be written beside the scene
     /// file.
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// Newest scene that this run of the program has written to the recovery file; `None` if it has
-    /// written none.
+    /// Scene that this run of the program last wrote to the recovery file. `None` while the file
+    /// has no edits of this run.
     kept: Option<Arc<Scene>>,
-    /// Orphaned edits that the user has neither recovered nor discarded. The last entry is offered
-    /// next.
+    /// Unsaved edits of crashed runs that the user has neither recovered nor discarded: one entry
+    /// for each run. The last entry is offered next.
     found: Vec<Orphan>,
     /// Cause of the failure if the last write to the recovery file has failed, otherwise `None`. If
     /// several writes fail in succession, the user is warned only of the first.

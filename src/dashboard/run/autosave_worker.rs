@@ -1,5 +1,5 @@
-//! Thread that writes the recovery file. It reads no other file, so that edits are kept even if the
-//! disk of the scene file does not respond.
+//! Thread that writes the recovery file. It neither reads nor writes the scene file, so that edits
+//! are kept even if an access to the scene file blocks.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
@@ -21,8 +21,8 @@ pub enum AutosaveJob {
     Saving(Arc<Scene>, Sender<()>),
     /// Record that the scene was written to the scene file at this path.
     Saved(Arc<Scene>, PathBuf),
-    /// Recover the edits of the last [`Message::OrphanedEdits`], which a crashed run of the program
-    /// has left. They become unsaved edits of the scene.
+    /// Recover the edits in the last [`Message::OrphanedEdits`]. A crashed run of the program has
+    /// left these edits. They become unsaved edits of the scene.
     Recover,
     /// Discard the edits of the last [`Message::OrphanedEdits`].
     Discard,
@@ -103,8 +103,8 @@ impl AutosaveWorker {
         }
     }
 
-    /// Calls `call` with the scene file, or with its path if it is unreadable. The path is empty
-    /// for a scene without a file.
+    /// Calls `call` with the scene file as last read or written, or with its path if it has never
+    /// been readable. The path is empty for a scene without a file.
     fn with_file<R>(
         &mut self,
         call: impl FnOnce(&mut Autosave, Result<&SceneFile, &Path>) -> R,

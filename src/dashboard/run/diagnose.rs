@@ -37,8 +37,9 @@ pub struct TerminalReport {
     pub rate: Option<f64>,
 }
 
-/// Queries the capabilities of the terminal of stdin and stdout, and restores its state. If
-/// `measure` is `true`, also measures the transfer rate, which takes a second or more.
+/// Queries the capabilities of the terminal at stdin and stdout. If `measure` is `true`, also
+/// measures the transfer rate, which takes a second or more. The state of the terminal is restored
+/// afterwards.
 ///
 /// # Errors
 /// Fails if there is no terminal, or the terminal is closed during the query.

@@ -69,7 +69,7 @@ pub trait Effects {
 }
 
 /// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
-/// thread of the scene file and the exports.
+/// thread that reads and writes the scene file, and the exports.
 pub struct EffectRunner {
     /// Renderer of the scene.
     pub session: Session,

@@ -11,7 +11,7 @@ const MOST: u32 = 100_000;
 
 /// Creates a file by calling `write` with the first unused path of `STEM-1.EXTENSION`,
 /// `STEM-2.EXTENSION` and so on. Returns this path. `write` must create the file atomically and
-/// fail if the path exists; no name ever refers to an incomplete file then.
+/// fail if the path exists, so that no name ever refers to an incomplete file.
 ///
 /// # Errors
 /// Fails with the error of `write`, or with a message if no name is unused.
@@ -45,9 +45,9 @@ pub fn full(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
-/// Returns the argument of scp that copies `path` from this machine: `user@host:/absolute/path`. If
-/// the port of the SSH connection is not 22, the argument is preceded by `-P PORT `. Path and port
-/// are quoted for a shell where necessary.
+/// Returns the argument of scp that copies the file at `path` from this machine:
+/// `user@host:/absolute/path`. If the port of the SSH connection is not 22, the argument is
+/// preceded by `-P PORT `. Path and port are quoted for a shell where necessary.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));

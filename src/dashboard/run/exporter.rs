@@ -1,4 +1,5 @@
-//! Exports of image files: the current picture, or a separate render at another size.
+//! Exports of image files: the current picture, or a separate render at a size of the user's
+//! choice.
 
 use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::export_paths::{numbered, scp};
@@ -19,14 +20,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Interval at which the progress of a render at another size is polled.
+/// Interval at which the progress of a render for an exported image is polled.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Writer of exported images and checkpoints. It holds the settings that all exports of a scene
 /// share.
 #[derive(Clone)]
 pub struct Exporter {
-    /// Scene file, whose text is written to the metadata of exported images.
+    /// Scene file as last read or written. The metadata of exported images contain its name and a
+    /// hash of the scene.
     pub file: SharedFile,
     /// Path of a scene file that was unreadable at the start; `None` if it was readable.
     pub unreadable_path: Option<PathBuf>,
@@ -76,8 +78,8 @@ impl Exporter {
         numbered(&self.stem(), "zk", |path| checkpoint.write(path, Existing::Refuse))
     }
 
-    /// Returns the beginning of the names of exported files: the name of the scene file as last
-    /// read or written.
+    /// Returns the beginning of the names of exported files: the name of the scene file without its
+    /// extension.
     fn stem(&self) -> String {
         match self.file.get() {
             Some(file) => stem(file.path(), file.document().name()),
@@ -99,13 +101,13 @@ impl Exporter {
     }
 }
 
-/// Export that renders at another size in a separate thread.
+/// Export that renders the scene at a size of the user's choice, in a separate thread.
 pub struct ResizedExport {
     cancelled: Arc<AtomicBool>,
     worker: Worker,
 }
 
-/// Request for an export at another size.
+/// Request for an export at a size of the user's choice.
 pub struct ExportRequest {
     /// Scene with the requested film size.
     pub scene: Arc<Scene>,

@@ -50,7 +50,7 @@ pub(super) enum Job {
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
-    /// Shared handle of the scene file as it was last read or written.
+    /// Contents of the scene file as last read or written, shared between threads.
     pub shared: SharedFile,
     /// Newest scene with unsaved edits; `None` if all edits are saved.
     unsaved: Option<Arc<Scene>>,
@@ -113,7 +113,8 @@ impl Files {
     }
 
     /// Schedules an autosave of a scene with unsaved edits. The recovery file is written after a
-    /// pause in editing, or when the program ends. `None` removes the recovery file.
+    /// pause in editing, after a second of continued edits, or when the program ends. `None`
+    /// removes the recovery file.
     pub fn autosave(&mut self, scene: Option<Arc<Scene>>) {
         self.unsaved.clone_from(&scene);
         self.give_autosave(AutosaveJob::Note(scene));
@@ -161,7 +162,7 @@ impl Files {
     }
 }
 
-/// Dropping the handle waits for pending writes as [`Files::finish`] does.
+/// Waits for pending writes when the handle is dropped, as [`Files::finish`] does.
 impl Drop for Files {
     fn drop(&mut self) {
         let _ = self.finish();

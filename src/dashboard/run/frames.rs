@@ -18,8 +18,8 @@ use std::time::Duration;
 /// Sequences that start and end a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// Upper bound of the number of bytes of an acknowledgement request. This is a request of the
-/// cursor position, which has at most 14 bytes inside of tmux.
+/// Upper bound of the number of bytes of an acknowledgement request, that is, of a request of the
+/// cursor position. Inside of tmux such a request has 14 bytes.
 const ACK_REQUEST_BYTES: usize = 16;
 
 /// Pipeline of frames to the terminal: drawing, difference, flow control, output.
@@ -208,8 +208,8 @@ impl FramePipeline {
 
     /// Draws the model if `changed` is `true`, and sends as many of the changed cells as the
     /// connection has room for. `answers` is `true` if the frame responds to user input.
-    /// `image_epoch` is a counter that increases when another picture replaces the present one;
-    /// refinement does not increase it. Must be called only if no frame is being written.
+    /// `image_epoch` is a counter that increases when another picture replaces the present one, but
+    /// not when more samples refine it. Must be called only if no frame is being written.
     pub fn draw(
         &mut self,
         model: &Model,

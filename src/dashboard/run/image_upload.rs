@@ -42,8 +42,9 @@ impl ImageUpload {
     }
 
     /// Returns `true` if the next output may be a part of the image. This is so if the upload has
-    /// begun, or if the half blocks (the image's coarse preview in terminal cells) are visible.
-    /// `waits` is `true` if some cells of the screen have not been sent yet.
+    /// begun, or if the image's coarse preview (half blocks in terminal cells) is visible. `waits`
+    /// is `true` if some cells of the screen have not been sent yet; without such cells the preview
+    /// is visible.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }

@@ -70,8 +70,8 @@ impl Dashboard {
     }
 
     /// Restores the terminal and stops the process by `stop`. Sets up the terminal again when the
-    /// shell continues it. Returns the exit status if the program is to end instead, otherwise
-    /// `None`.
+    /// shell continues the process. Returns the exit status if the program is to end instead,
+    /// otherwise `None`.
     pub(super) fn suspend(&mut self, stop: fn() -> rustix::io::Result<()>) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);

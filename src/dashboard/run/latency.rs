@@ -26,9 +26,9 @@ struct Answered {
     after: Duration,
 }
 
-/// Recorder of input latencies. It always tracks the input events that await a response, because
-/// the frame with the response is sent without waiting for the frame interval. It stores latencies
-/// only on request.
+/// Recorder of input latencies. It always tracks the input events that await a response: the event
+/// loop sends the frame with the response at once, without waiting for the frame interval. The
+/// recorder stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,

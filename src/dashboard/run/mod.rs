@@ -52,7 +52,7 @@ pub use diagnose::{TerminalReport, diagnose};
 pub struct Setup {
     /// Scene file. For an unreadable file, its path and the errors in it.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// Checkpoint of this scene whose render is continued; `None` for a new render.
+    /// Checkpoint from which the render of this scene continues; `None` for a new render.
     pub checkpoint: Option<Checkpoint>,
     /// Folder for recovery files that cannot be written beside their scene file; `None` if there is
     /// none.
@@ -87,12 +87,13 @@ pub struct Ended {
     /// Exit status if a signal or the loss of the terminal has ended the dashboard; `None` if the
     /// user has quit.
     pub signalled: Option<u8>,
-    /// Image or error of each export that ended after the screen was restored.
+    /// Result of each export that ended after the screen was restored: the image, or the error.
     pub exported: Vec<Result<Exported, String>>,
     /// Path of the recovery file with unsaved edits, which the next start of the program offers to
     /// recover. `None` if all edits are saved. If unsaved edits are lost, an error with the reason.
     pub kept: Result<Option<PathBuf>, String>,
-    /// Path or error of each checkpoint that was written after the screen was restored.
+    /// Result of each write of a checkpoint that ended after the screen was restored: the path of
+    /// the file, or the error.
     pub checkpoints: Vec<Result<PathBuf, String>>,
     /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
@@ -105,7 +106,8 @@ impl Ended {
     }
 }
 
-/// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal arrives.
+/// Runs a dashboard on the terminal at stdin and stdout until the user quits, a terminating signal
+/// arrives or the terminal is lost.
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
     let (scene, file) = match file {
@@ -130,8 +132,9 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     run_on_terminal(Box::new(effects), done, model, terminal, trace)
 }
 
-/// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
-/// is the number of threads that compute noise estimates and pictures. No thread traces rays.
+/// Shows `films`, which other processes write, until the user quits, a terminating signal arrives
+/// or the terminal is lost. `threads` is the number of threads that compute noise estimates and
+/// pictures. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
     let (results, done) = unbounded();

@@ -1,9 +1,11 @@
-//! Handle of the scene file as last read or written, shared between threads.
+//! Contents of the scene file as last read or written, shared between threads.
 
 use crate::scene::{Recovery, SceneFile};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Shared handle of the scene file as last read or written. No lock is held during disk access.
+/// State of the scene file, shared between threads: its contents as last read or written, and the
+/// writer of its recovery files in the user's state folder. The lock is not held during disk
+/// access.
 #[derive(Clone)]
 pub struct SharedFile(Arc<Mutex<State>>);
 
@@ -13,19 +15,19 @@ struct State {
 }
 
 impl SharedFile {
-    /// Creates a handle without a scene file. `elsewhere` is the writer of recovery files in the
-    /// state folder.
+    /// Creates the state before the scene file has been read. `elsewhere` is the writer of recovery
+    /// files in the user's state folder.
     pub fn new(elsewhere: Recovery) -> Self {
         Self(Arc::new(Mutex::new(State { file: None, elsewhere })))
     }
 
-    /// Returns the scene file as last read or written. Returns `None` if it has never been
-    /// readable.
+    /// Returns the contents of the scene file as last read or written. Returns `None` if the file
+    /// has never been readable.
     pub fn get(&self) -> Option<Arc<SceneFile>> {
         self.state().file.clone()
     }
 
-    /// Sets the scene file that [`SharedFile::get`] returns.
+    /// Sets the contents that [`SharedFile::get`] returns.
     pub fn put(&self, file: &SceneFile) {
         let file = Some(Arc::new(file.clone()));
         self.state().file = file;

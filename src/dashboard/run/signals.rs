@@ -17,8 +17,8 @@ use std::time::Duration;
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Longest time from a terminating signal to the end of the dashboard, even if the renderer is
-/// busy. It is shorter than the grace period. The remaining time suffices to report where unsaved
-/// edits are kept.
+/// busy. It is so much shorter than the grace period that the program can still report where
+/// unsaved edits are kept.
 pub(super) const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Number that is added to the number of a signal to form the exit status, as in shells.

@@ -26,8 +26,8 @@ pub struct WatchRunner {
 }
 
 impl WatchRunner {
-    /// Starts the thread that reads the watched film files. It sends its reports to `results`, as
-    /// do effects.
+    /// Starts the thread that reads the watched film files. Its reports are sent to `results`, as
+    /// are the results of effects.
     pub fn new(films: WatchedFilms, threads: usize, results: Sender<Message>) -> io::Result<Self> {
         let reports = results.clone();
         let session = WatchSession::new(films, threads, move |report| {

@@ -83,7 +83,8 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    /// Widens the camera's view angle by `steps` steps. Negative steps narrow it.
+    /// Widens the camera's view by `steps` steps of about 5 % of its width. Negative steps narrow
+    /// it.
     pub(super) fn view_angle(&mut self, steps: i32) {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();

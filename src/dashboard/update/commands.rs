@@ -68,7 +68,7 @@ pub struct Command {
     pub(super) over_image: bool,
     /// `true` if the command also runs in `zerkalo watch`, where nothing is edited or rendered.
     pub while_watching: bool,
-    /// Function that returns `true` if the command can run on the model.
+    /// Function that returns `true` if the command can run in the present state of the model.
     pub(super) available: fn(&Model) -> bool,
     /// Function that runs the command.
     pub(super) run: fn(&mut UpdateContext<'_>),

@@ -29,8 +29,8 @@ impl UpdateContext<'_> {
     }
 
     /// Starts the input of a value for the property under the cursor. `typed` is the character that
-    /// the user has typed, if any. It opens a text editor that contains the character. A space is
-    /// an exception: it changes a switch or a choice to its next value, and has no effect on other
+    /// the user has typed, if any. A text editor that contains this character opens. A space is an
+    /// exception: it changes a switch or a choice to its next value, and has no effect on other
     /// properties. If `typed` is `None`, a switch is toggled, a choice outside of a form opens its
     /// list, and any other property opens a text editor with the present value.
     pub(super) fn open_field(&mut self, typed: Option<char>) {

@@ -105,7 +105,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Updates the command palette's list of commands after a change of its text.
+    /// Updates the command palette's list of commands after a change of the search text.
     fn text_changed(&mut self) {
         if let Some(Overlay::CommandPalette(_)) = self.model.overlay {
             self.search();

@@ -15,8 +15,8 @@ impl UpdateContext<'_> {
     }
 
     /// Focuses the camera on the point at the pixel probe. Without a pixel probe, focuses on the
-    /// middle of the selection. If the selection has no middle either, focuses on the point at the
-    /// centre of the picture.
+    /// middle of the selection, or on the point at the centre of the picture if the selection has
+    /// no bounds.
     pub(super) fn focus(&mut self) {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let selection = bounds(self.scene(), &self.model.selection);
@@ -50,7 +50,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns a description of the camera's aperture and focus for the status line.
+/// Returns a description of the camera's aperture and focus for a notice.
 fn lens_text(camera: &Camera) -> String {
     let distance = number(round_significant(camera.focus_depth(), 4));
     match camera.aperture {

@@ -20,9 +20,9 @@ impl UpdateContext<'_> {
         self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
     }
 
-    /// Returns the part of the scene that a command on lights changes: the selected light, ambient
-    /// light or background. If none of these is selected, it is the first light. Fails if there is
-    /// no light.
+    /// Returns the part of the scene that a command on lights changes. This is the selection if it
+    /// is a light, the ambient light or the background; otherwise it is the first light. Fails if
+    /// there is no light.
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),

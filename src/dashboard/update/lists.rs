@@ -53,8 +53,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor of the open overlay or the focused panel by `pages` pages. A page is one
-    /// row less than the visible rows.
+    /// Moves the cursor of the open overlay or the focused panel by `pages` pages. A page is the
+    /// number of visible rows minus 1.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,
@@ -78,7 +78,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens or confirms the entry under the cursor, in the open overlay or the focused panel.
+    /// Confirms the entry under the cursor of the open overlay. Without an overlay, opens the entry
+    /// under the cursor of the focused panel.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
@@ -150,7 +151,8 @@ impl UpdateContext<'_> {
         COMMANDS.iter().enumerate().filter(move |(_, row)| row.while_watching || !watching)
     }
 
-    /// Updates the command palette's list to the commands that match its text, best match first.
+    /// Updates the command palette's list to the commands that match the search text, best match
+    /// first.
     pub(super) fn search(&mut self) {
         let offered = self.offered();
         let Some(Overlay::CommandPalette(palette)) = &mut self.model.overlay else { return };

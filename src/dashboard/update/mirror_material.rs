@@ -1,4 +1,4 @@
-//! Dashboard commands that change the roughness, reflection or lobe of the mirror. This is a
+//! Dashboard commands that change the roughness, reflection or lobe of the mirror. The mirror is a
 //! reflecting material of the selection if there is one, otherwise a reflecting material elsewhere
 //! in the scene.
 

@@ -72,7 +72,8 @@ enum Direction {
 }
 
 impl Direction {
-    /// Returns the direction as a unit vector: to the right, upwards, forwards.
+    /// Returns the direction as a unit vector, with its components to the right, upwards and
+    /// forwards.
     fn unit(self) -> [f64; 3] {
         match self {
             Self::Left => [-1.0, 0.0, 0.0],
@@ -223,7 +224,8 @@ impl UpdateContext<'_> {
         changed
     }
 
-    /// Ends the gesture in progress, so that the next edit starts a new undo step.
+    /// Ends the undo step of the latest edits, such as those of a drag: the next edit starts a new
+    /// one.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;

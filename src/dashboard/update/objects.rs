@@ -53,8 +53,8 @@ impl UpdateContext<'_> {
     }
 
     /// Moves the selection by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). It moves vertically if `upright` is `true`, otherwise in the ground plane.
-    /// The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
+    /// terminal cells). The movement is vertical if `upright` is `true`, otherwise in the ground
+    /// plane. The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();

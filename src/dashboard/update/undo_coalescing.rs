@@ -1,5 +1,5 @@
 //! Undo coalescing: the rule that decides which successive edits form one undo step.
-//! [`History`](crate::scene::History) merges their steps.
+//! [`History`](crate::scene::History) merges such edits.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ pub(super) enum Coalesce {
 
 impl Coalesce {
     /// Returns `true` if an edit may form one undo step with the previous edit. `age` is the time
-    /// since the previous edit, or `None` if that edit does not repeat.
+    /// since the previous edit, or `None` if the rule for that edit was not [`Self::Repeat`].
     pub(super) fn joins(self, age: Option<Duration>) -> bool {
         match self {
             Self::Single => false,

@@ -37,8 +37,8 @@ pub struct Fields<'a> {
     pub active: bool,
 }
 
-/// Draws the inspector, or nothing if the panel is hidden for lack of room. Returns the position of
-/// the text cursor, or `None` if the cursor is hidden.
+/// Draws the inspector, or nothing if the panel is hidden. Returns the position of the text cursor,
+/// or `None` if the cursor is hidden.
 pub fn inspector(
     model: &Model,
     layout: &Layout,

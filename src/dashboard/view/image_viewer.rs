@@ -48,8 +48,8 @@ pub fn draw(
 }
 
 /// Returns two texts: a description of the image (size and progress of the upload), and a hint. The
-/// hint names the command that lists what the terminal needs to show sharper images. It is empty if
-/// the terminal supports an image protocol.
+/// hint names the command that lists what the terminal needs to show sharper images. The hint is
+/// empty if the terminal supports an image protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.size;
     let whole = format!("{width}×{height}");

@@ -12,7 +12,7 @@ use crate::scene::edit::Target;
 use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
-/// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is folded.
+/// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.outline else { return };
     let active = is_active(model, Focus::Outline);

@@ -47,8 +47,8 @@ impl Painter<'_> {
     }
 
     /// Draws the scroll bar of the overlay's list. `len` is the number of its lines, and `scroll`
-    /// the index of the first visible one. Returns two values for each visible line: its row of the
-    /// screen and its index.
+    /// the index of the first visible one. Returns two values for each visible line: its row in the
+    /// area of the list and its index.
     fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = (u16, usize)> + use<> {
         window(self.place.list, scroll, len, self.theme.border(true), self.buffer)
     }

@@ -210,7 +210,7 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
 }
 
 /// Scales an image to the given width and height without interpolation. After a change of the
-/// terminal's size, this adapts the last picture until the renderer returns one of the new size.
+/// terminal's size, the last picture is scaled until the renderer returns one of the new size.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;

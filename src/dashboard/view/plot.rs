@@ -45,7 +45,8 @@ impl Axis {
     }
 
     /// Returns the values of the axis's ticks. These are powers of ten. If the ends of the axis
-    /// differ by less than a factor of 50, twice and five times the powers have ticks, too.
+    /// differ by less than a factor of 50, two times and five times each power of ten have ticks,
+    /// too.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;

@@ -34,7 +34,7 @@ pub fn cut(text: &str, width: usize) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Removes the first `skipped` columns of `text`.
+/// Returns `text` without its first `skipped` columns.
 pub fn skip(text: &str, skipped: usize) -> &str {
     let mut used = 0;
     let start = text.char_indices().find(|(_, c)| {

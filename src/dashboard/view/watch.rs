@@ -22,7 +22,7 @@ const SHARE: usize = 5;
 /// Width, in terminal columns, of the table column with the number of samples in each file.
 const SAMPLES: usize = 12;
 
-/// Draws the table of watched files. Draws nothing if the panel is folded.
+/// Draws the table of watched files. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let (Some(table), Some(area)) = (&model.watch, layout.outline) else { return };
     let Some((rows, details)) = model.watch_rows() else { return };

@@ -21,7 +21,7 @@ pub struct QuantisedPalette {
 }
 
 impl QuantisedPalette {
-    /// Creates a palette of `colors`, 1 to 65,535 of them.
+    /// Creates a palette of `colors`, of which there must be 1 to 65,535.
     pub fn new(colors: Vec<Oklab>) -> Self {
         Self { colors, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }

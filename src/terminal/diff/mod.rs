@@ -153,7 +153,7 @@ impl FrameDiff {
         frame
     }
 
-    /// Appends the bytes of every cell that differs from the terminal's contents to `out`, without
+    /// Appends to `out` the bytes of every cell that differs from the terminal's contents, without
     /// limit.
     fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
         for (x, y, cell) in self.shown.diff_iter(target.cells) {
@@ -163,8 +163,8 @@ impl FrameDiff {
         self.pending = Pending::default();
     }
 
-    /// Appends rows of text that differ from the terminal's contents to `out`: as many as fit into
-    /// `room` bytes, but at least one. Returns `true` if no such rows remain.
+    /// Appends to `out` the rows of text that differ from the terminal's contents: as many as fit
+    /// into `room` bytes, but at least one. Returns `true` if no such rows remain.
     fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(target.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));

@@ -31,7 +31,8 @@ struct CellColors {
     visible: bool,
 }
 
-/// Perceptual differences of all cells in the area of the picture.
+/// Perceptual differences between the target frame and the terminal, for all cells in the area of
+/// the picture.
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
     area: Rect,

@@ -49,7 +49,8 @@ impl Fixture {
         fixture
     }
 
-    /// Paints both halves of every cell with `color`. The lower half has slightly more red.
+    /// Paints both halves of every picture cell with `color`, the lower half with slightly more
+    /// red.
     fn paint(&mut self, color: impl Fn(u16, u16) -> [u8; 3]) {
         for at in PICTURE.positions() {
             let [r, g, b] = color(at.x - PICTURE.x, at.y - PICTURE.y);

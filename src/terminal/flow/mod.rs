@@ -52,7 +52,7 @@ const MAX_LOSSES: u32 = 3;
 const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
 /// Weight of a new measurement in the connection's rate, which is an exponential moving average.
 const NEW_WEIGHT: f64 = 0.3;
-/// Time after user input in which the user is treated as active.
+/// Time after user input during which the user is treated as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
 /// Interval at which the length of the kernel's TCP send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
@@ -173,9 +173,9 @@ struct InFlight {
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the previous frame was sent. `None` if there is no previous frame. Also `None`
-    /// if the connection was idle between the previous frame and these bytes: the acknowledgement
-    /// of that frame arrived before a reply to these bytes was possible.
+    /// Time at which the previous frame was sent. `None` if there is no previous frame, or if the
+    /// connection was idle between that frame and the measured bytes: the acknowledgement of that
+    /// frame arrived before a reply to these bytes was possible.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
@@ -549,7 +549,7 @@ impl FlowControl {
         self.in_flight.front().map(|frame| frame.sent + LOST_AFTER)
     }
 
-    /// Removes all frames in flight, whose acknowledgements are lost.
+    /// Removes all frames in flight. Their acknowledgements are no longer expected.
     fn forget_frames(&mut self) {
         self.in_flight.clear();
         self.last_acked = None;

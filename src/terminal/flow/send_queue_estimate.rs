@@ -3,12 +3,13 @@
 
 use std::time::Duration;
 
-/// Time after sending a frame in which the TCP send queue is not measured. Another process, such as
-/// `sshd`, passes the bytes of the frame on, and during this time they may not have reached the
-/// queue.
+/// Time after the sending of a frame during which the TCP send queue is not measured. Another
+/// process, such as `sshd`, passes the bytes of the frame on, and during this time they may not
+/// have reached the queue.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Time after the start of a busy period in which measurements of the TCP send queue are ignored,
-/// if the round trip is unknown. A queue that is empty so soon may not have received the bytes yet.
+/// Time after the start of a busy period during which measurements of the TCP send queue are
+/// ignored, if the round trip is unknown. A queue that is empty so soon may not have received the
+/// bytes yet.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
 /// Shortest time over which the rate is measured. The rate is the number of bytes that leave the
 /// TCP send queue in this time, divided by the time.
@@ -17,7 +18,7 @@ const SAMPLE: Duration = Duration::from_millis(100);
 /// Estimate of the TCP send queue's length and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
 pub struct SendQueueEstimate {
-    /// Number of bytes in the send queue: the last measurement plus the bytes sent since.
+    /// Estimated number of bytes in the send queue: the last measurement plus the bytes sent since.
     pub bytes: f64,
     /// Time of the last measurement of the send queue; `None` before the first one.
     pub measured_at: Option<Duration>,

@@ -91,7 +91,7 @@ fn input_waits_for_one_frame_only() {
     flow.record_input(now);
     flow.forget_frames();
     flow.sent(now, 9000, true, 0);
-    // While that frame of 9000 bytes is in flight, a frame with the effect of one key may be sent,
+    // While the frame of 9000 bytes is in flight, a frame with the effect of one key may be sent,
     // but not one with the effect of the next key.
     assert!(flow.allowance(now + ms(40), false).is_none());
     let effect = flow.allowance(now + ms(1), true).unwrap();

@@ -15,8 +15,8 @@ const CHUNK: usize = 1024;
 /// the number as an indexed foreground colour.
 pub const IMAGE: u8 = 163;
 
-/// Unicode placeholder of kitty's graphics protocol: character of a cell that shows a part of an
-/// image.
+/// Unicode placeholder of kitty's graphics protocol: a character in place of which the terminal
+/// shows a part of an image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
 /// Code points of the combining marks that encode the row of a placeholder: the beginning of the

@@ -79,7 +79,7 @@ pub struct ViewerImage {
 }
 
 impl Protocol {
-    /// Chooses the best image protocol of the terminal.
+    /// Returns the best image protocol that the terminal supports, or half blocks if there is none.
     pub fn of(terminal: &Capabilities) -> Self {
         match terminal.environment.multiplexer {
             None if terminal.kitty_graphics => Self::Kitty,
