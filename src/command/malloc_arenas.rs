@@ -25,6 +25,7 @@ pub fn limit() {
     let _ = Command::new(program).arg0(name).args(arguments).env(VARIABLE, "1").exec();
 }
 
-/// Does nothing on systems other than Linux with glibc. Their allocators have no arenas per thread.
+/// Does nothing on systems other than Linux with glibc: the variable `MALLOC_ARENA_MAX` is one of
+/// glibc.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn limit() {}

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
 /// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the
-/// pilot traces a third to a half of the rays of the whole render. The noise that it predicts for
-/// the whole render is within 10 % of the final noise.
+/// pilot traces a third to a half of the rays of the whole render. The final noise then differs
+/// from the noise target, for which the pilot predicts the counts, by at most 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {

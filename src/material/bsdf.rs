@@ -1,5 +1,5 @@
 //! Compiled BSDF: its construction from a material, evaluation of highlights, sampling of
-//! reflections.
+//! reflections. Rough transmission is sampled in `rough_interface.rs`.
 
 use crate::lanes::{Float, Frame, SimdFloat, Vec3};
 use crate::material::fresnel::Reflectance;

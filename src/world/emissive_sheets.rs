@@ -184,9 +184,10 @@ impl CompiledObjects<'_> {
         Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
     }
 
-    /// Finds the contact of the emissive object number `object`, whose sheet is `sheet`, with the
-    /// object `carrier`. Returns `None` if the sheet does not lie on `carrier` at any of the tested
-    /// points.
+    /// Tests if the flat emissive object number `object` lies on the object `carrier`. Returns the
+    /// height of the surface of `carrier` above the plane of the object, and the side on which the
+    /// object is visible. `sheet` describes the plane of the object. Returns `None` if no tested
+    /// point of the object is on `carrier`.
     fn contact(
         &mut self,
         (object, sheet): (usize, &Sheet),

@@ -8,9 +8,9 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Surfaces on which the lamp at (0, 3, 0) lies, each with the distance from the y axis beyond
-/// which the lamp lights points of the plane y = 4, above the surface. Infinity means that the lamp
-/// lights no such points.
+/// Ceilings that contain the point lamp at (0, 3, 0). The number determines which points above the
+/// ceiling, at y = 4, the lamp lights: those farther from the y axis than this distance. It is 0 for
+/// a thin surface (all points), and infinity for a solid that hides all of them.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),

@@ -42,12 +42,13 @@ impl Plans {
 pub(super) type ShardFiles = BTreeMap<u32, (PathBuf, PartShard)>;
 
 /// Checks that the film files `inputs` can be merged. Returns two values: their common plan, and
-/// the file of each shard. A plan may continue the merged film of another plan. That film then
-/// counts as the base, the samples that the plan started from.
+/// the file of each shard. One input may be the merged film that the plan started from. It is
+/// changed to an input of this plan that holds only the shard `BASE`.
 ///
 /// # Errors
 ///
-/// Fails if the files belong to different plans or if two of them hold the same shard.
+/// Fails if there is no input, if the files belong to different plans, if two of them hold the same
+/// shard, or if the merged film lacks shards of its own plan.
 pub(super) fn join(inputs: &mut [MergeInput]) -> Result<(Arc<Plan>, ShardFiles), String> {
     let plan = common_plan(inputs)?;
     let mut shards = ShardFiles::new();

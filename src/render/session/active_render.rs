@@ -127,7 +127,9 @@ impl ActiveRender {
         Ok(Self { first_hit_ray_seconds, ..Self::new(state, schedule, started) })
     }
 
-    /// Continues the render of `checkpoint`, whose samples are shown as a picture of `scene`.
+    /// Continues the render of `checkpoint` for `scene`. The scene may differ from that of the
+    /// checkpoint in ways that need no new samples, such as colours of lights. The picture is then
+    /// relit.
     ///
     /// # Errors
     /// Returns the reason why the checkpoint cannot be used for this scene.

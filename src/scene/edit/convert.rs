@@ -257,14 +257,14 @@ pub(super) fn switch_falloff(
 }
 
 /// Multiplies the intensity of `light` by `factor`. If the product is out of range, the intensity
-/// is kept. Returns a note with the old and the new intensity.
+/// is kept. Returns a note for the user on the old and the new intensity.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = round_significant(light.intensity * factor, 3);
-    let old = light.intensity;
-    if NumberRange::LIGHT.holds(fitted) {
-        light.intensity = fitted;
+    let (old, new) = (number(light.intensity), number(fitted));
+    if !NumberRange::LIGHT.holds(fitted) {
+        return format!("Intensity {old} stays: {new}, as bright as before, is out of range.");
     }
-    let (old, new) = (number(old), number(light.intensity));
+    light.intensity = fitted;
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 

@@ -35,9 +35,10 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub has_bsdf: L::Mask,
     /// Lanes whose BSDF reflects light that arrives directly from lights.
     pub direct_mask: L::Mask,
-    /// Lanes whose BSDF has highlights of lights.
+    /// Lanes whose BSDF has a highlight model: a specular term that is evaluated for light that
+    /// arrives directly from lights.
     pub highlight_mask: L::Mask,
-    /// Lanes whose BSDF has a reflection lobe.
+    /// Lanes whose BSDF has a reflection lobe, from which reflected rays are sampled.
     pub reflecting: L::Mask,
     /// Lanes whose hit point gets no light from any light, because a coincident surface is in front
     /// of it; see [`Self::shade`].
