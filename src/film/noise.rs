@@ -228,6 +228,16 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Returns this estimate, but takes `rmse_linear` and `rmse_codes` from `other` where they are
+    /// larger there. The other fields do not change.
+    pub(crate) fn larger(self, other: Self) -> Self {
+        Self {
+            rmse_linear: self.rmse_linear.max(other.rmse_linear),
+            rmse_codes: self.rmse_codes.max(other.rmse_codes),
+            ..self
+        }
+    }
+
     /// Combines the estimates of all tiles. If all tiles have equal numbers of samples, the error
     /// is estimated from all pixels. Otherwise tiles were selected by the estimates from one half
     /// of the pixels (the black ones of a checkerboard). The error is then the larger of two

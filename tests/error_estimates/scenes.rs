@@ -107,7 +107,7 @@ fn balls(n: &mut Numbers, size: [u32; 2], count: u32, radiance: f64) -> Balls {
     Balls { balls: (0..count).map(ball).collect(), radiance, background: 0.01 }
 }
 
-fn balls_text(balls: &Balls, size: [u32; 2]) -> String {
+pub fn balls_text(balls: &Balls, size: [u32; 2]) -> String {
     let mut text = head(size, &format!("{:?}", [balls.background; 3]), 1.0);
     write!(text, "[materials.m]\ncolor = {:?}\ndiffuse = 0.0\n", [balls.radiance; 3]).unwrap();
     for ([x, y, z], radius) in &balls.balls {

@@ -247,7 +247,8 @@ impl Schedule {
         allocation.explore(EXPLORATION * budget);
 
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
-        let mut error = over_picture(self.noise.map_or(0.0, |noise| criterion.of_picture(noise)));
+        let noise = self.largest_recent_noise();
+        let mut error = over_picture(noise.map_or(0.0, |noise| criterion.of_picture(noise)));
         let target = self.target().filter(|(c, _)| *c == criterion);
         let enough = target.map_or(-1.0, |(_, target)| over_picture(target));
         let mut heap: BinaryHeap<Candidate> =

@@ -1,7 +1,18 @@
 //! End of a render by its stop criteria, and the estimated time until the end.
 
-use crate::render::schedule::tile::Tile;
+use crate::film::Noise;
+use crate::render::schedule::tile::{DOUBLINGS, Tile};
 use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
+
+/// Number of effective pixels (see [`Noise::effective_pixels`]) below which a single noise estimate
+/// does not end a render.
+///
+/// A render that ends with the first estimate below its target ends too early, and reports too
+/// small an error, if this estimate is too low by chance. Ratio of true to reported RMSE at the end
+/// of simulated renders whose estimates are exact but for chance: 2.2 with 3 effective pixels, 1.49
+/// with 6, 1.22 with 12. If the estimates before the latest three doublings of the samples must be
+/// below the target as well, the ratio is 1.56, 1.23 and 1.11.
+const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
 impl Schedule {
     /// Returns a lower and an upper estimate of the seconds left until the first stop criterion is
@@ -70,7 +81,7 @@ impl Schedule {
 
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
-        if let Some(noise) = self.noise.filter(|_| self.min_samples_reached()) {
+        if let Some(noise) = self.largest_recent_noise().filter(|_| self.min_samples_reached()) {
             if stop.noise_codes.is_some_and(|t| noise.rmse_codes <= t) {
                 return Some(StoppedBy::Noise);
             }
@@ -85,6 +96,23 @@ impl Schedule {
         // replicate.
         let started = self.samples > 0;
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
+    }
+
+    /// Returns the estimate of the picture's error on which the end of the render depends. With
+    /// many effective pixels it is the latest estimate. With fewer than [`FEW_PIXELS_TO_STOP`] it
+    /// is the largest of the latest estimate and of the estimates before each of the latest three
+    /// doublings of the sample counts, scaled to the present counts. Estimates on both sides of a
+    /// doubling are nearly independent of each other. Returns `None` before the first estimate.
+    pub(super) fn largest_recent_noise(&self) -> Option<Noise> {
+        let latest = self.noise?;
+        if self.settings.criterion.of(latest.effective_pixels) >= FEW_PIXELS_TO_STOP {
+            return Some(latest);
+        }
+        let earlier = |doublings: u32| {
+            let tiles = self.tiles.iter();
+            Noise::of_tiles(tiles.map(|tile| tile.earlier_estimate(doublings as usize)))
+        };
+        Some((0..=DOUBLINGS).filter_map(earlier).fold(latest, Noise::larger))
     }
 
     /// Returns `true` if the error target is met except in tiles that have reached their largest

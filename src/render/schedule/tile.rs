@@ -1,12 +1,12 @@
 //! State of one tile in the schedule: sample counts and noise estimates.
 
-use crate::film::TileNoise;
-use crate::render::schedule::Criterion;
+use crate::film::{Mse, TileNoise};
+use crate::render::schedule::{Criterion, USUAL_SLOPE};
 use crate::render::wave::JobReport;
 
 /// Largest number of doublings of a tile's sample count over which the slope of its error is
 /// fitted.
-const DOUBLINGS: u32 = 3;
+pub(super) const DOUBLINGS: u32 = 3;
 
 /// Sample counts and noise estimates of one tile.
 #[derive(Clone, Debug)]
@@ -94,6 +94,19 @@ impl Tile {
         all.map(move |e| {
             (f64::from(e.samples), [e.allocation, e.reported].map(|mse| criterion.of(mse)))
         })
+    }
+
+    /// Returns the noise estimate that the tile had before its latest `doublings` doublings of the
+    /// sample count, scaled to the present sample count as [`USUAL_SLOPE`] predicts. Returns the
+    /// oldest estimate, scaled, if there were fewer doublings, and `None` if there is no estimate.
+    pub fn earlier_estimate(&self, doublings: usize) -> Option<TileNoise> {
+        let latest = self.error?;
+        let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
+        let growth = f64::from(latest.samples) / f64::from(earlier.samples);
+        let factor = growth.powf(-2.0 * USUAL_SLOPE);
+        let scaled = |mse: Mse| Mse { linear: factor * mse.linear, codes: factor * mse.codes };
+        let (reported, allocation) = (scaled(earlier.reported), scaled(earlier.allocation));
+        Some(TileNoise { reported, allocation, ..latest })
     }
 
     /// Returns two noise estimates: the one before and the one after the latest doubling of the
