@@ -25,8 +25,9 @@ mod watch;
 pub use cpu::require as require_cpu;
 pub use malloc_arenas::limit as limit_arenas;
 
-use crate::scene::Document;
+use crate::scene::{Document, Scene};
 use crate::value::sanitized;
+use crate::world::{self, Precision, requires_double};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -159,6 +160,16 @@ fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
         warn(&format!("warning: {warning}"));
     }
     Ok(document)
+}
+
+/// Warns on stderr if `options` demand single precision and the picture of `scene` requires double.
+fn warn_of_precision(scene: &Scene, options: &world::Options) {
+    if options.precision == Precision::Single && requires_double(scene) {
+        warn(
+            "warning: --precision single: the sizes or distances of this scene require double precision; \
+             parts of the picture may be wrong. Remedy: --precision auto",
+        );
+    }
 }
 
 /// Escapes control characters in each line of `message`. File names in the message may contain

@@ -3,7 +3,7 @@
 use crate::command::args::PlanArgs;
 use crate::command::part_file;
 use crate::command::progress::style;
-use crate::command::{Failure, print_line, read_scene_and_warn};
+use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
 use crate::disk::{self, check_writable};
 use crate::film::file::FilmReader;
 use crate::film::{Estimator, Noise};
@@ -68,6 +68,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler },
         display: args.picture.display(),
     };
+    warn_of_precision(&scene, &options.world);
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
     let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));

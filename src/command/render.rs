@@ -6,7 +6,7 @@ use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
-use crate::command::{Failure, print_line, read_scene, shard, warn};
+use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
 use crate::disk::{self, WriteError, check_writable};
 use crate::film::ImageOutput;
 use crate::process_memory::resident_memory;
@@ -61,6 +61,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         adaptive: !args.uniform,
     };
     let mut options = options(args);
+    warn_of_precision(&scene, &options.world);
     options.world.merge_lights = division.is_some_and(|division| division.merge_lights);
     let job = Job { args, scene, options, output: &output, provenance, signals, started };
     let rendered = match division.filter(|division| division.regions.count > 1) {

@@ -51,6 +51,17 @@ macro_rules! dispatch {
     };
 }
 
+/// Returns `true` if the errors of single precision would be visible in the picture of `scene`:
+/// [`Precision::Auto`] then chooses double precision.
+pub fn requires_double(scene: &Scene) -> bool {
+    !single_suffices(scene, &RecenteredGeometry::new(scene))
+}
+
+fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> bool {
+    let RecenteredGeometry { origin, forms, extent } = geometry;
+    precision::single_suffices(scene, forms, *origin, *extent)
+}
+
 impl AnyWorld {
     /// Compiles `scene`, which must have no validation errors, with the given options.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
@@ -58,10 +69,7 @@ impl AnyWorld {
         let single = match options.precision {
             Precision::Single => true,
             Precision::Double => false,
-            Precision::Auto => {
-                let RecenteredGeometry { origin, forms, extent } = &geometry;
-                precision::single_suffices(scene, forms, *origin, *extent)
-            }
+            Precision::Auto => single_suffices(scene, &geometry),
         };
         if single {
             Self::Single(World::compile(scene, &geometry, options.merge_lights))

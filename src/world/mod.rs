@@ -20,7 +20,7 @@ mod truncation_bias;
 #[allow(clippy::module_inception, reason = "the file of `World`, in the folder of the same name")]
 mod world;
 
-pub use any_world::{AnyWorld, Options, Precision};
+pub use any_world::{AnyWorld, Options, Precision, requires_double};
 pub use integrator::first_hit::FirstHit;
 pub use integrator::path::{Counts, Path, Radiance};
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};

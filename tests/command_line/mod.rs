@@ -292,6 +292,21 @@ fn precision_option_is_used() {
 }
 
 #[test]
+fn single_precision_warns_in_a_scene_that_requires_double() {
+    let desk = Desk::new();
+    let scene = fs::read_to_string(desk.path("scene.toml")).unwrap();
+    let warning = |run: &Run| run.err.contains("warning: --precision single");
+    let render = ["render", "scene.toml", "-o", "a.png", "--spp", "2", "--precision", "single"];
+    assert!(!warning(&desk.run(&render)));
+    let earth = "[materials.earth]\ncolor = [0.5, 0.5, 0.5]\n\
+                 [[object]]\nmaterial = \"earth\"\n\
+                 shape.sphere = { center = [0.0, -6.371e6, 0.0], radius = 6.37e6 }\n";
+    fs::write(desk.path("scene.toml"), format!("{scene}\n{earth}")).unwrap();
+    let run = desk.run(&render);
+    assert!(run.status == 0 && warning(&run), "{}", run.err);
+}
+
+#[test]
 fn starter_scene_is_valid() {
     let desk = Desk::new();
     let run = desk.run(&["new", "mine.toml"]);
