@@ -380,7 +380,7 @@ mod tests {
     /// nearest neighbours alone takes quadratic time for most sets in [`FAMILIES`]: over a minute
     /// for 100,000 boxes.
     ///
-    /// cargo test --release --lib -- --ignored --nocapture builds_of_coincident_boxes
+    /// cargo test --release --test scene -- --ignored --nocapture builds_of_coincident_boxes
     #[test]
     #[ignore = "takes a minute, and needs an optimised build"]
     fn builds_of_coincident_boxes_take_linear_time() {

@@ -301,18 +301,23 @@ mod tests {
     /// Returns the mean of each cell of the downsampled picture, computed for comparison from the
     /// overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
-        let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
+        let (width, height) = (film.width(), film.height());
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let values: Vec<[f64; 3]> = pixels.map(|(x, y)| film.pixel(x, y, mix)).collect();
+        // Pixels that overlap a cell, each with the length of the overlap.
+        let overlaps = |cell: usize, cells: usize, pixels: usize| -> Vec<(usize, f64)> {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
-            (edge(cell + 1).min((pixel + 1) as f64) - edge(cell).max(pixel as f64)).max(0.0)
+            let overlap = |p: usize| edge(cell + 1).min((p + 1) as f64) - edge(cell).max(p as f64);
+            (0..pixels).map(|p| (p, overlap(p))).filter(|(_, length)| *length > 0.0).collect()
         };
         let cell = |col, row| {
             let (mut sum, mut area) = ([0.0; 3], 0.0);
-            for (x, y) in (0..film.height()).flat_map(|y| (0..film.width()).map(move |x| (x, y))) {
-                let part =
-                    overlap(col, cols, x, film.width()) * overlap(row, rows, y, film.height());
-                let value = film.pixel(x, y, mix);
-                (0..3).for_each(|c| sum[c] += part * value[c]);
-                area += part;
+            for (y, tall) in overlaps(row, rows, height) {
+                for (x, wide) in overlaps(col, cols, width) {
+                    let value = values[y * width + x];
+                    (0..3).for_each(|c| sum[c] += wide * tall * value[c]);
+                    area += wide * tall;
+                }
             }
             sum.map(|s| s / area)
         };

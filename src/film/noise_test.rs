@@ -68,9 +68,10 @@ fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
         let mut rng = Rng(1000 + seed);
         let mut film = film(64, 48, &[2f64.powi(28)]);
         fill(&mut film, n, |x, y, _| pixels[y * 64 + x].sum(n, stratified, &mut rng).to_vec());
+        let picture: Vec<[f64; 3]> = (0..48).flat_map(|y| film.pixels_of_row(y, &mix)).collect();
         let (mut linear, mut codes) = (0.0, 0.0);
         for (i, pixel) in pixels.iter().enumerate() {
-            let (got, truth) = (film.pixel(i % 64, i / 64, &mix), pixel.mean());
+            let (got, truth) = (picture[i], pixel.mean());
             let (got_codes, true_codes) = (display.codes(got), display.codes(truth));
             for c in 0..3 {
                 linear += (got[c] - truth[c]).powi(2) / (3.0 * 64.0 * 48.0);

@@ -182,7 +182,7 @@ fn shape_examples_and_tables_are_valid() {
         assert_eq!(shape.key(), *key);
         assert_eq!(shape.faults(), [], "{key}");
         // The file names in examples are relative to the root folder of the project.
-        let name = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../{}.toml"), key);
+        let name = format!(concat!(env!("ZERKALO_ROOT"), "{}.toml"), key);
         let scene = Scene::parse(&format!("[[object]]\n{text}\n"), &name);
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
 

@@ -21,6 +21,9 @@ pub trait TestFilm {
     /// both replicates (halves of the samples), or black without samples.
     fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3];
 
+    /// Returns the radiance of each pixel of the row `y`, as [`Self::pixel`] does.
+    fn pixels_of_row(&self, y: usize, weights: &LightWeights) -> Vec<[f64; 3]>;
+
     /// Returns the film as bytes. Films with equal samples have equal bytes, in whatever order the
     /// samples were added.
     fn bytes(&self) -> Vec<u8>;
@@ -28,9 +31,13 @@ pub trait TestFilm {
 
 impl TestFilm for Film {
     fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3] {
+        self.pixels_of_row(y, weights)[x]
+    }
+
+    fn pixels_of_row(&self, y: usize, weights: &LightWeights) -> Vec<[f64; 3]> {
         let mut row = Vec::new();
         self.row(y, Replicates::Both, weights, &mut row);
-        row[x]
+        row
     }
 
     fn bytes(&self) -> Vec<u8> {

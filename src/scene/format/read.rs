@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn parts_of_a_file_give_the_scene_and_the_errors_of_the_whole() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let root = Path::new(env!("ZERKALO_ROOT"));
         for folder in ["scenes", "tests/bad-scenes"] {
             let mut count = 0;
             for entry in fs::read_dir(root.join(folder)).unwrap() {

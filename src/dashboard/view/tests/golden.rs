@@ -10,7 +10,7 @@ const SIZES: [[u16; 2]; 5] = [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11]
 
 #[test]
 fn screens_match_golden_files() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");
+    let folder = Path::new(env!("ZERKALO_ROOT")).join("tests/screens");
     let bless = std::env::var_os("ZERKALO_BLESS").is_some();
     let mut different = Vec::new();
     for (name, make) in STATES {
@@ -44,7 +44,7 @@ fn screens_match_golden_files() {
 /// that the golden test draws.
 #[test]
 fn every_screen_has_its_state() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");
+    let folder = Path::new(env!("ZERKALO_ROOT")).join("tests/screens");
     for entry in std::fs::read_dir(folder).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         let state = name.strip_suffix(".txt").unwrap_or_default();

@@ -1,5 +1,5 @@
 //! Screens with rendered pictures, written to files of terminal sequences for visual inspection.
-//! `ZERKALO_SCREENS=folder cargo test --lib paint -- --ignored` writes the files. `cat` shows such
+//! `ZERKALO_SCREENS=folder cargo test --test application paint -- --ignored` writes the files. `cat` shows such
 //! a file in a terminal that has the size of the screen.
 
 use crate::dashboard::model::{Colors, Model};

@@ -1,7 +1,7 @@
 //! Tests that drawing neither panics nor emits control characters, in any state, size and colour
 //! depth.
 
-use crate::dashboard::model::Colors;
+use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use proptest::prelude::*;
@@ -29,13 +29,21 @@ proptest! {
 /// those at which the layout changes.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
-    for (_, make) in STATES {
-        for width in (0..46).chain([71, 72, 73, 99, 100]) {
-            for height in (0..20).step_by(1 + usize::from(width > 41)) {
-                let mut model = tracing([width, height]);
-                make(&mut model);
-                drawn(&model);
+    let draw = |states: &[(&str, fn(&mut Model))]| {
+        for (_, make) in states {
+            for width in (0..46).chain([71, 72, 73, 99, 100]) {
+                for height in (0..20).step_by(1 + usize::from(width > 41)) {
+                    let mut model = tracing([width, height]);
+                    make(&mut model);
+                    drawn(&model);
+                }
             }
         }
-    }
+    };
+    // In two threads: no other test draws so long.
+    let (left, right) = STATES.split_at(STATES.len() / 2);
+    std::thread::scope(|scope| {
+        scope.spawn(|| draw(left));
+        draw(right);
+    });
 }
