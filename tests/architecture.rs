@@ -113,12 +113,11 @@ const CRATES: &[(&str, &[&str])] = &[
     ("exr", &["asset", "film"]),
     ("gltf", &["asset"]),
     ("icy_sixel", &["terminal"]),
-    ("image", &["asset"]),
     ("indicatif", &["command"]),
     ("nucleo_matcher", &["dashboard"]),
     ("plotters", &["measure"]),
     ("ply_rs_bw", &["asset"]),
-    ("png", &["film"]),
+    ("png", &["asset", "film"]),
     ("ratatui", &["dashboard", "terminal"]),
     ("rayon", &["render"]),
     // `scene` uses rustix in tests only.
@@ -138,6 +137,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("unicode_width", &["dashboard", "terminal"]),
     ("vte", &["terminal"]),
     ("wide", &["lanes"]),
+    ("zune_jpeg", &["asset"]),
 ];
 
 /// Returns path and text of every Rust file under `folder`.

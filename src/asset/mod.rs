@@ -10,7 +10,9 @@
 
 mod cache;
 mod error;
+mod exif;
 mod file;
+mod hdr;
 mod image;
 mod loaded;
 mod mesh;

@@ -6,14 +6,15 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::image::{Image, check_size};
+use crate::asset::hdr::HdrFile;
+use crate::asset::image::{Image, ImageFormat, check_size};
 use crate::asset::radiance_distribution::RadianceDistribution;
 use crate::value::Fnv1a64;
-use exr::io::Tracking;
-use exr::meta::MetaData;
-use image::codecs::hdr::HdrDecoder;
-use image::codecs::openexr::OpenExrDecoder;
-use image::{ImageDecoder, ImageError, ImageFormat};
+use exr::image::RgbChannels;
+use exr::math::Vec2;
+use exr::meta::attribute::Text;
+use exr::meta::header::Header;
+use exr::prelude::traits::*;
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
 
@@ -59,23 +60,17 @@ impl RadianceMap {
     /// # Errors
     /// Fails if the file is not a valid image.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
-        let reader = Cursor::new(&source.bytes[..]);
-        match image::guess_format(&source.bytes) {
-            Ok(ImageFormat::Hdr) => {
-                let decoder = HdrDecoder::new(reader).map_err(|e| decode_error(source, &e))?;
-                let exposure = decoder.metadata().exposure.unwrap_or(1.0);
-                if !(exposure.is_finite() && exposure > 0.0) {
-                    let found = format!("the exposure of the image is {exposure}");
-                    return Err(source.fault(found, "an exposure above 0"));
-                }
-                decode(source, decoder, 1.0 / exposure)
+        match ImageFormat::of(&source.bytes) {
+            Some(ImageFormat::Hdr) => {
+                let file = HdrFile::parse(source)?;
+                check_size(source, file.size, MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
+                Self::of_pixels(source, file.size, file.pixels(source)?)
             }
-            Ok(ImageFormat::OpenExr) => {
-                check_layers(source)?;
-                let decoder = OpenExrDecoder::with_alpha_preference(reader, Some(false));
-                decode(source, decoder.map_err(|e| decode_error(source, &e))?, 1.0)
+            Some(ImageFormat::OpenExr) => {
+                let (size, pixels) = decode_exr(source)?;
+                Self::of_pixels(source, size, pixels)
             }
-            Ok(ImageFormat::Png | ImageFormat::Jpeg) => {
+            Some(ImageFormat::Png | ImageFormat::Jpeg) => {
                 let image = Image::parse(source)?;
                 check_size(source, image.size(), MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
                 let [width, height] = image.size();
@@ -83,8 +78,30 @@ impl RadianceMap {
                 let pixels = (0..height).flat_map(row).map(|(x, y)| image.color(x, y)).collect();
                 Ok(Self::new(image.size(), pixels))
             }
-            _ => Err(source.fault("this is no image of a known format", EXPECTED)),
+            None => Err(source.fault("this is no image of a known format", EXPECTED)),
         }
+    }
+
+    /// Creates the image with the pixels of the file `source`, row by row from the top. Negative
+    /// values are replaced by 0.
+    ///
+    /// # Errors
+    /// Fails if a value is infinite, too large or not a number.
+    fn of_pixels(
+        source: &FileContents,
+        size: [u32; 2],
+        mut pixels: Vec<[f32; 3]>,
+    ) -> Result<Self, AssetError> {
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            if let Some(x) = pixel.iter().find(|x| x.is_nan() || **x > MAX_RADIANCE) {
+                let (column, row) = (i % size[0] as usize, i / size[0] as usize);
+                let place = FileLocation::Part(format!("pixel {column}, {row}"));
+                let found = format!("a channel is {x}");
+                return Err(source.error(place, found, "finite numbers up to 1e15"));
+            }
+            *pixel = pixel.map(|x| x.max(0.0));
+        }
+        Ok(Self::new(size, pixels))
     }
 
     /// Adds the size and the pixels of the image to `hash`.
@@ -168,116 +185,167 @@ fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 const EXPECTED: &str = "a Radiance HDR, OpenEXR, PNG or JPEG image";
 
-/// Decodes a floating-point image file and multiplies its values by `factor`. The size is checked
-/// before memory for the pixels is allocated.
-fn decode(
-    source: &FileContents,
-    decoder: impl ImageDecoder,
-    factor: f32,
-) -> Result<RadianceMap, AssetError> {
-    let (width, height) = decoder.dimensions();
-    check_size(source, [width, height], MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
-    let mut bytes = vec![0; decoder.total_bytes() as usize];
-    decoder.read_image(&mut bytes).map_err(|e| decode_error(source, &e))?;
-    let float = |b: &[u8]| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
-    let channel = |b: &[u8]| float(b) * factor;
-    let pixel = |b: &[u8]| [channel(b), channel(&b[4..]), channel(&b[8..])];
-    let mut pixels: Vec<[f32; 3]> = bytes.chunks_exact(12).map(pixel).collect();
-    for (i, pixel) in pixels.iter_mut().enumerate() {
-        if let Some(x) = pixel.iter().find(|x| x.is_nan() || **x > MAX_RADIANCE) {
-            let (column, row) = (i % width as usize, i / width as usize);
-            let place = FileLocation::Part(format!("pixel {column}, {row}"));
-            let found = format!("a channel is {x}");
-            return Err(source.error(place, found, "finite numbers up to 1e15"));
-        }
-        *pixel = pixel.map(|x| x.max(0.0));
-    }
-    Ok(RadianceMap::new([width, height], pixels))
-}
-
-/// Checks the size of all layers of an OpenEXR file. A wrong size could make the decoder run out of
-/// memory, because it allocates a block of rows of a layer before it reads the block.
-fn check_layers(source: &FileContents) -> Result<(), AssetError> {
-    // The type of the reader is that of the decoder, so that its functions are not compiled twice.
-    let reader = Tracking::new(Cursor::new(&source.bytes[..]));
-    let data = MetaData::read_from_buffered(reader, false)
+/// Decodes the first layer of an OpenEXR file that has the channels `R G B` and is not deep. Returns
+/// the size of the display window, and its pixels. Pixels outside of the layer are black.
+fn decode_exr(source: &FileContents) -> Result<([u32; 2], Vec<[f32; 3]>), AssetError> {
+    let reader = exr::block::read(Cursor::new(&source.bytes[..]), false)
         .map_err(|error| source.fault(format!("the header cannot be read: {error}"), EXPECTED))?;
-    let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    data.headers.iter().try_for_each(|header| {
-        let size = [side(header.layer_size.0), side(header.layer_size.1)];
-        check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS)
-    })
-}
-
-fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
-    source.fault(format!("the image cannot be read: {error}"), EXPECTED)
+    let check = |size: Vec2<usize>| {
+        let size = [size.0, size.1].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
+        check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS).map(|()| size)
+    };
+    // The decoder allocates a block of rows of a layer before it reads the block.
+    for header in reader.headers() {
+        check(header.layer_size)?;
+    }
+    let is_colored = |header: &&Header| {
+        let has = |name| header.channels.find_index_of_channel(&Text::from(name)).is_some();
+        !header.deep && ["R", "G", "B"].into_iter().all(has)
+    };
+    let header = reader.headers().iter().find(is_colored).ok_or_else(|| {
+        source.fault("no layer has the channels R, G and B without deep data", EXPECTED)
+    })?;
+    let window = header.shared_attributes.display_window;
+    let size = check(window.size)?;
+    let offset = header.own_attributes.layer_position - window.position;
+    let create = move |_, _: &RgbChannels| vec![[0.0; 3]; window.size.area()];
+    let set = move |pixels: &mut Vec<[f32; 3]>, position: Vec2<usize>, (r, g, b)| {
+        let Vec2(x, y) = position.to_i32() + offset;
+        if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y))
+            && x < window.size.0
+            && y < window.size.1
+        {
+            pixels[y * window.size.0 + x] = [r, g, b];
+        }
+    };
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(create, set)
+        .first_valid_layer()
+        .all_attributes()
+        .from_chunks(reader)
+        .map_err(|error| {
+            source.fault(format!("the OpenEXR image cannot be read: {error}"), EXPECTED)
+        })?;
+    Ok((size, image.layer_data.channel_data.pixels))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::codecs::hdr::HdrEncoder;
-    use image::{DynamicImage, Rgb, Rgb32FImage};
+    use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image as Picture, Layer};
+    use exr::meta::attribute::IntegerBounds;
+    use exr::meta::header::{ImageAttributes, LayerAttributes};
+    use png::{BitDepth, ColorType, Encoder};
     use std::path::PathBuf;
 
     fn source(bytes: Vec<u8>) -> FileContents {
         FileContents { path: PathBuf::from("sky.hdr"), bytes }
     }
 
-    /// Returns a test image of 9 x 5 pixels with values from 0 to 2048, which OpenEXR stores
-    /// exactly.
-    fn floats() -> Rgb32FImage {
-        Rgb32FImage::from_fn(9, 5, |x, y| Rgb([f32::exp2(x as f32 + 3.0), 0.5, y as f32]))
+    /// Returns the pixels of a test image of 9 x 5 pixels with values from 0 to 2048, which OpenEXR
+    /// stores exactly.
+    fn floats() -> Vec<[f32; 3]> {
+        let row = |y| (0..9).map(move |x| [f32::exp2(x as f32 + 3.0), 0.5, y as f32]);
+        (0..5).flat_map(row).collect()
     }
 
-    fn hdr(image: &Rgb32FImage) -> Vec<u8> {
-        let pixels: Vec<_> = image.pixels().copied().collect();
-        let mut bytes = Vec::new();
-        let encoder = HdrEncoder::new(&mut bytes);
-        encoder.encode(&pixels, image.width() as usize, image.height() as usize).unwrap();
-        bytes
+    /// Returns a layer of 9 x 5 pixels, whose left upper corner is at `position`.
+    fn layer(
+        names: [&'static str; 3],
+        pixels: &[[f32; 3]],
+        position: (i32, i32),
+    ) -> Layer<AnyChannels<FlatSamples>> {
+        let samples = |c: usize| FlatSamples::F32(pixels.iter().map(|pixel| pixel[c]).collect());
+        let channels = [0, 1, 2].map(|c| AnyChannel::new(names[c], samples(c)));
+        let channels = AnyChannels::sort(channels.into_iter().collect());
+        let attributes =
+            LayerAttributes { layer_position: position.into(), ..LayerAttributes::named(names[0]) };
+        Layer::new((9, 5), attributes, Encoding::SMALL_LOSSLESS, channels)
     }
 
-    fn encoded(image: DynamicImage, format: ImageFormat) -> Vec<u8> {
+    fn exr(pixels: &[[f32; 3]]) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
-        image.write_to(&mut bytes, format).unwrap();
+        let picture = Picture::from_layer(layer(["R", "G", "B"], pixels, (0, 0)));
+        picture.write().to_buffered(&mut bytes).unwrap();
         bytes.into_inner()
+    }
+
+    /// Returns a Radiance file of 9 x 5 pixels. The pixels in column `x` have the value 2^x.
+    fn hdr() -> Vec<u8> {
+        let row = (0..9).flat_map(|x| [128, 128, 128, 129 + x]);
+        let mut bytes = b"#?RADIANCE
+FORMAT=32-bit_rle_rgbe
+
+-Y 5 +X 9
+"
+        .to_vec();
+        bytes.extend((0..5).flat_map(|_| row.clone()));
+        bytes
     }
 
     #[test]
     fn radiance_is_decoded_from_every_format() {
-        let exr = encoded(floats().into(), ImageFormat::OpenExr);
-        let map = RadianceMap::parse(&source(exr)).unwrap();
+        let map = RadianceMap::parse(&source(exr(&floats()))).unwrap();
         assert_eq!(map.size, [9, 5]);
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
-        // The channels of a pixel in a Radiance file share an exponent. Only channels of similar
-        // magnitude are therefore stored exactly.
-        let simple = Rgb32FImage::from_fn(9, 5, |x, _| Rgb([f32::exp2(x as f32); 3]));
-        let map = RadianceMap::parse(&source(hdr(&simple))).unwrap();
+        let map = RadianceMap::parse(&source(hdr())).unwrap();
         assert_eq!(map.pixels[9 + 8], [256.0; 3]);
-        let exposed = String::from_utf8_lossy(&hdr(&simple)[..11]).replace('\n', "\nEXPOSURE=4\n");
-        let bytes = [exposed.as_bytes(), &hdr(&simple)[11..]].concat();
+        let bytes = [
+            &hdr()[..11],
+            b"EXPOSURE=4
+",
+            &hdr()[11..],
+        ]
+        .concat();
         let map = RadianceMap::parse(&source(bytes)).unwrap();
         assert_eq!(map.pixels[9 + 8], [64.0; 3]);
-        let levels = image::RgbImage::from_pixel(3, 2, image::Rgb([255, 0, 188]));
-        let map = RadianceMap::parse(&source(encoded(levels.into(), ImageFormat::Png))).unwrap();
+        let mut png = Vec::new();
+        let mut encoder = Encoder::new(&mut png, 3, 2);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
+        encoder.write_header().unwrap().write_image_data(&[255, 0, 188].repeat(6)).unwrap();
+        let map = RadianceMap::parse(&source(png)).unwrap();
         let [r, g, b] = map.pixels[5];
         assert!(r == 1.0 && g == 0.0 && (b - 0.503).abs() < 1e-3, "{b}");
     }
 
     #[test]
     fn negative_radiance_is_black_and_infinite_radiance_an_error() {
-        let mut image = floats();
-        image.put_pixel(3, 2, Rgb([-1.0, 0.25, 0.5]));
-        let file =
-            |image: &Rgb32FImage| source(encoded(image.clone().into(), ImageFormat::OpenExr));
-        let map = RadianceMap::parse(&file(&image)).unwrap();
+        let mut pixels = floats();
+        pixels[2 * 9 + 3] = [-1.0, 0.25, 0.5];
+        let map = RadianceMap::parse(&source(exr(&pixels))).unwrap();
         assert_eq!(map.pixels[2 * 9 + 3], [0.0, 0.25, 0.5]);
         for bad in [f32::NAN, f32::INFINITY, 2e15] {
-            image.put_pixel(3, 2, Rgb([0.0, bad, 0.0]));
-            let error = RadianceMap::parse(&file(&image)).unwrap_err().to_string();
+            pixels[2 * 9 + 3] = [0.0, bad, 0.0];
+            let error = RadianceMap::parse(&source(exr(&pixels))).unwrap_err().to_string();
             assert!(error.contains("pixel 3, 2"), "{error}");
         }
+    }
+
+    #[test]
+    fn first_exr_layer_with_colors_is_shown_in_its_window() {
+        // The first layer has other channels. Of the second one, the window has the columns 0 to 6
+        // and the rows 1 to 4, and two columns to the left of it.
+        let other = layer(["X", "Y", "Z"], &floats(), (0, 0));
+        let colored = layer(["R", "G", "B"], &floats(), (2, -1));
+        let window = IntegerBounds::from_dimensions((9, 4));
+        let picture = Picture::from_layers(ImageAttributes::new(window), vec![other, colored]);
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write().to_buffered(&mut bytes).unwrap();
+        let map = RadianceMap::parse(&source(bytes.into_inner())).unwrap();
+        assert_eq!(map.size, [9, 4]);
+        for (i, pixel) in map.pixels.iter().enumerate() {
+            let (x, y) = (i % 9, i / 9);
+            let expected = if x < 2 { [0.0; 3] } else { floats()[9 * (y + 1) + x - 2] };
+            assert_eq!(*pixel, expected, "{x}, {y}");
+        }
+        let mut bytes = Cursor::new(Vec::new());
+        let grey = Picture::from_layer(layer(["X", "Y", "Z"], &floats(), (0, 0)));
+        grey.write().to_buffered(&mut bytes).unwrap();
+        let found = RadianceMap::parse(&source(bytes.into_inner())).unwrap_err().found;
+        assert!(found.contains("no layer has"), "{found}");
     }
 
     #[test]
@@ -324,7 +392,7 @@ mod tests {
         let header = |size: &str| format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n");
         for (size, words) in [
             ("-Y 60000 +X 60000", "60000 x 60000"),
-            ("-Y 4294967295 +X 4294967295", "cannot be read"),
+            ("-Y 4294967295 +X 4294967295", "4294967295 x 4294967295"),
             ("-Y 8000 +X 4000", "more than its"),
             ("-Y 0 +X 4", "4 x 0"),
             ("-Y 4", "cannot be read"),
@@ -333,14 +401,13 @@ mod tests {
             let found = found(header(size).into_bytes());
             assert!(found.contains(words), "{size}: {found}");
         }
-        let whole = [hdr(&floats()), encoded(floats().into(), ImageFormat::OpenExr)];
-        for bytes in whole {
+        for bytes in [hdr(), exr(&floats())] {
             for kept in [0, 1, 8, 12, 30, bytes.len() / 2, bytes.len() - 1] {
                 assert!(!found(bytes[..kept].to_vec()).is_empty(), "{kept} bytes");
             }
         }
         // The next file declares a layer that is wider than the limit.
-        let mut wide = encoded(floats().into(), ImageFormat::OpenExr);
+        let mut wide = exr(&floats());
         let window = b"dataWindow\0box2i\0\x10\0\0\0";
         let start = wide.windows(window.len()).position(|bytes| bytes == window).unwrap();
         let right = start + window.len() + 8;
