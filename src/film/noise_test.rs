@@ -31,11 +31,12 @@ impl Pixel {
         let hits = if self.normal {
             (count * self.chance + 0.3 * count.sqrt() * rng.normal()).max(0.0)
         } else {
-            let draw = |i: u32| match stratified {
-                true => (f64::from(i) + rng.unit()) / count,
-                false => rng.unit(),
-            };
-            (0..n).map(draw).filter(|u| *u < self.chance).count() as f64
+            let is_hit = |_: &u32| rng.unit() < self.chance;
+            match stratified {
+                // All random numbers below the stratum that contains `chance` are hits.
+                true => (count * self.chance + rng.unit()).floor(),
+                false => (0..n).filter(is_hit).count() as f64,
+            }
         };
         [0, 1, 2].map(|c| count * self.dark[c] + hits * LIGHT[c])
     }
