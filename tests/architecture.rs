@@ -104,6 +104,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
 /// External crates, each with the folders that may use it.
 const CRATES: &[(&str, &[&str])] = &[
     ("base64", &["asset", "terminal"]),
+    ("bytemuck", &["asset"]),
     ("clap", &["command"]),
     ("colorous", &["terminal"]),
     ("crc32fast", &["film"]),

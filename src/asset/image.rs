@@ -17,7 +17,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 pub const MAX_SIDE: u32 = 32_768;
 
 /// Largest number of pixels of a texture image: 64 Mi. An image of this size takes at most 402 MB
-/// of memory after decoding, and at most 940 MB during decoding.
+/// of memory after decoding, and at most 810 MB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
@@ -200,35 +200,45 @@ fn decode_png(source: &FileContents) -> Result<(Image, Orientation), AssetError>
     let exif = reader.info().exif_metadata.as_deref();
     let orientation = exif.map_or(Orientation::UPRIGHT, Orientation::of_exif);
     let length = reader.output_buffer_size();
-    let mut bytes = vec![0; length.ok_or_else(|| decode_error(source, "PNG", "it is too large"))?];
-    reader.next_frame(&mut bytes).map_err(error)?;
+    let length = length.ok_or_else(|| decode_error(source, "PNG", "it is too large"))?;
     let (color, depth) = reader.output_color_type();
+    let texels = if depth == BitDepth::Sixteen {
+        let mut words = vec![0u16; length / 2];
+        reader.next_frame(bytemuck::cast_slice_mut(&mut words)).map_err(error)?;
+        words.iter_mut().for_each(|word| *word = u16::from_be(*word));
+        Texels::Words(without_alpha(words, color))
+    } else {
+        let mut bytes = vec![0; length];
+        reader.next_frame(&mut bytes).map_err(error)?;
+        Texels::Bytes(without_alpha(bytes, color))
+    };
     let channels = match color {
         ColorType::Grayscale | ColorType::GrayscaleAlpha => 1,
         ColorType::Rgb | ColorType::Rgba | ColorType::Indexed => 3,
     };
-    let sample_bytes = if depth == BitDepth::Sixteen { 2 } else { 1 };
-    truncate_pixels(&mut bytes, color.samples() * sample_bytes, channels * sample_bytes);
-    let texels = if sample_bytes == 2 {
-        let words = bytes.as_chunks().0.iter().map(|word| u16::from_be_bytes(*word));
-        Texels::Words(words.collect())
-    } else {
-        Texels::Bytes(bytes)
-    };
     Ok((Image { size, channels, texels }, orientation))
 }
 
-/// Keeps the first `kept` bytes of each pixel in `bytes`. A pixel has `length` bytes.
-fn truncate_pixels(bytes: &mut Vec<u8>, length: usize, kept: usize) {
-    if kept == length {
-        return;
+/// Returns the levels of all channels except alpha. `levels` are those of all channels.
+fn without_alpha<T: Copy>(mut levels: Vec<T>, color: ColorType) -> Vec<T> {
+    match color {
+        ColorType::GrayscaleAlpha => remove_last::<2, _>(&mut levels),
+        ColorType::Rgba => remove_last::<4, _>(&mut levels),
+        ColorType::Grayscale | ColorType::Rgb | ColorType::Indexed => {}
     }
-    let count = bytes.len() / length;
-    for i in 1..count {
-        bytes.copy_within(i * length..i * length + kept, i * kept);
+    levels
+}
+
+/// Removes every `N`th element of `elements`.
+fn remove_last<const N: usize, T: Copy>(elements: &mut Vec<T>) {
+    let count = elements.len() / N;
+    for i in 0..count {
+        for j in 0..N - 1 {
+            elements[i * (N - 1) + j] = elements[i * N + j];
+        }
     }
-    bytes.truncate(count * kept);
-    bytes.shrink_to_fit();
+    elements.truncate(count * (N - 1));
+    elements.shrink_to_fit();
 }
 
 /// Decodes a JPEG file and the orientation in its EXIF data. Colours become red, green and blue.

@@ -5,7 +5,9 @@ use crate::agreement::compounds::Leaf;
 use crate::agreement::meshes::Triangles;
 use crate::agreement::surfaces::Piece;
 use crate::agreement::tracer::{Mutation, Tracer};
+use crate::support::png_file::PngImage;
 use glam::{DMat3, DVec2, DVec3};
+use png::BitDepth;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use zerkalo::material::{
@@ -32,13 +34,18 @@ impl Pixels {
     /// Opens an image by the name that a shipped scene uses.
     pub fn open(file: &str) -> Result<Self, String> {
         let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(file);
-        let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let image = image.to_rgb32f();
-        let (width, height) = image.dimensions();
-        let rows = (0..height).rev().flat_map(|y| (0..width).map(move |x| (x, y)));
-        let code = |(x, y)| DVec3::from(image.get_pixel(x, y).0.map(f64::from));
-        let size = DVec2::new(f64::from(width), f64::from(height));
-        Ok(Self { size, codes: rows.map(code).collect() })
+        let image = PngImage::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        assert_eq!(image.depth, BitDepth::Eight, "{}", path.display());
+        let code = |level: u8| f64::from(f32::from(level) / 255.0);
+        let color = |levels: &[u8]| match levels {
+            [grey] => DVec3::splat(code(*grey)),
+            _ => DVec3::from([0, 1, 2].map(|c| code(levels[c]))),
+        };
+        let samples = image.color.samples();
+        let rows = image.levels.chunks(image.width as usize * samples).rev();
+        let codes = rows.flat_map(|row| row.chunks(samples)).map(color).collect();
+        let size = DVec2::new(f64::from(image.width), f64::from(image.height));
+        Ok(Self { size, codes })
     }
 
     /// Returns the pixel at a column and a row, which may be beyond the edges of the image.

@@ -1,8 +1,8 @@
 //! Small valid files of every format that the program reads. Together they contain every feature
 //! that the readers support.
 
-use image::{DynamicImage, ImageFormat};
-use std::io::Cursor;
+use crate::support::png_file::PngImage;
+use png::{BitDepth, ColorType};
 use zerkalo::film::Display;
 use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
 use zerkalo::sampling::SamplerKind;
@@ -182,24 +182,21 @@ pub fn gltf() -> Vec<Vec<u8>> {
     vec![description(&uri).0.into()]
 }
 
-fn encoded(image: DynamicImage, format: ImageFormat) -> Vec<u8> {
-    let mut bytes = Cursor::new(Vec::new());
-    image.write_to(&mut bytes, format).unwrap();
-    bytes.into_inner()
-}
-
-fn picture(width: u32, height: u32) -> image::RgbImage {
-    image::RgbImage::from_fn(width, height, |x, y| {
-        image::Rgb([(x * 37) as u8, (y * 91) as u8, (x * y) as u8])
-    })
-}
-
 /// Returns PNG images: coloured, grey, 16 bits, with alpha.
 pub fn png() -> Vec<Vec<u8>> {
-    let image = DynamicImage::ImageRgb8(picture(33, 17));
-    [image.to_luma8().into(), image.to_rgba8().into(), image.to_luma16().into(), image]
-        .map(|i| encoded(i, ImageFormat::Png))
-        .into()
+    let image = |color: ColorType, depth: BitDepth| {
+        let level = |x: u32, y: u32, channel| [x * 37, y * 91, x * y, 255][channel] as u8;
+        let samples = color.samples() * if depth == BitDepth::Sixteen { 2 } else { 1 };
+        let row = |y| (0..33).flat_map(move |x| (0..samples).map(move |i| level(x, y, i % 4)));
+        let levels = (0..17).flat_map(row).collect();
+        PngImage { width: 33, height: 17, color, depth, levels }.bytes()
+    };
+    vec![
+        image(ColorType::Grayscale, BitDepth::Eight),
+        image(ColorType::Rgba, BitDepth::Eight),
+        image(ColorType::Grayscale, BitDepth::Sixteen),
+        image(ColorType::Rgb, BitDepth::Eight),
+    ]
 }
 
 /// Corrects the checksum (CRC-32 of type and data) of every PNG chunk that can be found.
@@ -222,10 +219,26 @@ pub fn repair_png(bytes: &mut [u8]) {
     }
 }
 
-/// Returns JPEG images: coloured and grey.
+/// Returns JPEG images: coloured, grey, progressive and in CMYK.
 pub fn jpeg() -> Vec<Vec<u8>> {
-    let image = DynamicImage::ImageRgb8(picture(50, 40));
-    [image.to_luma8().into(), image].map(|i| encoded(i, ImageFormat::Jpeg)).into()
+    let files: [&[u8]; 4] = [
+        include_bytes!("../images/color.jpg"),
+        include_bytes!("../images/grey.jpg"),
+        include_bytes!("../images/progressive.jpg"),
+        include_bytes!("../images/cmyk.jpg"),
+    ];
+    files.map(Vec::from).into()
+}
+
+/// Returns Radiance images: with runs of components, with repeated pixels, without compression.
+pub fn hdr() -> Vec<Vec<u8>> {
+    let header = "#?RADIANCE\n# a sky\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 20\n";
+    let component = |c: u8| [&[144, c], &[4, 1, 2, 3, c][..]].concat();
+    let exponent = [148, 129];
+    let runs = [&[2, 2, 0, 20], &[3, 4, 5].map(component).concat()[..], &exponent].concat();
+    let repeats = [[9, 8, 7, 129], [1, 1, 1, 17], [6, 5, 4, 130], [1, 1, 1, 1]].concat();
+    let plain: Vec<u8> = (0..20).flat_map(|x| [x, 2 * x, 3 * x, 120 + x]).collect();
+    [runs, repeats, plain].map(|row| [header.as_bytes(), &row.repeat(4)].concat()).into()
 }
 
 /// Returns the scene files that come with the program.

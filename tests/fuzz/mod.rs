@@ -178,6 +178,16 @@ fn jpeg() {
 }
 
 #[test]
+fn hdr() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.hdr");
+    assert_mixed(read_mutations("hdr", &files::hdr(), |bytes| {
+        write(&path, bytes);
+        Assets::default().radiance_map(&path).is_ok()
+    }));
+}
+
+#[test]
 fn toml() {
     let seeds = files::toml();
     // The path is in the folder `scenes`, because some scenes refer to meshes relative to it.

@@ -1,6 +1,7 @@
 //! Renders that tests drive wave by wave (sets of concurrent jobs), without a clock or channels.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
+pub mod png_file;
 pub mod test_film;
 
 use crate::common::NAME;

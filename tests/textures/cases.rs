@@ -3,10 +3,10 @@
 //! another picture.
 
 use crate::common::Numbers;
+use crate::support::png_file::RgbImage;
 use crate::support::{picture, rendered};
 use crate::textures::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
 use glam::{DAffine3, DVec3};
-use image::RgbImage;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use tempfile::TempDir;
@@ -28,12 +28,12 @@ impl Desk {
         let mut random = |w, h, grey| {
             RgbImage::from_fn(w, h, |_, _| {
                 let [r, g, b, _] = (rng.bits() as u32).to_le_bytes();
-                image::Rgb(if grey { [r; 3] } else { [r, g, b] })
+                if grey { [r; 3] } else { [r, g, b] }
             })
         };
         let (colors, heights) = (random(7, 5, false), random(6, 9, true));
-        colors.save(folder.path().join("colors.png")).unwrap();
-        heights.save(folder.path().join("heights.png")).unwrap();
+        colors.save(&folder.path().join("colors.png"));
+        heights.save(&folder.path().join("heights.png"));
         Self { folder, colors, heights }
     }
 

@@ -2,8 +2,8 @@
 //! space, mapping formula, texture lookup, Lambert's law. It has no code in common with the
 //! program.
 
+use crate::support::png_file::RgbImage;
 use glam::{DAffine3, DVec2, DVec3};
-use image::RgbImage;
 use std::f64::consts::{PI, TAU};
 
 /// Width and height of the pictures in pixels.
@@ -200,16 +200,16 @@ fn coordinates(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec2 {
 /// Returns the pixel in column `i` and row `j`, counted from below. Both may be outside of the
 /// image.
 fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
-    let (w, h) = (f64::from(image.width()), f64::from(image.height()));
+    let (w, h) = (f64::from(image.width), f64::from(image.height));
     let wrap = |i: f64, n: f64| if clamp { i.clamp(0.0, n - 1.0) } else { i - n * (i / n).floor() };
     let (i, j) = (wrap(i, w), wrap(j, h));
-    let codes = image.get_pixel(i as u32, (h - 1.0 - j) as u32).0;
+    let codes = image.pixel(i as u32, (h - 1.0 - j) as u32);
     DVec3::from(codes.map(|c| f64::from(c) / 255.0))
 }
 
 /// Returns the bilinear interpolation of `value` between the four pixels nearest to `uv`.
 fn bilinear(image: &RgbImage, clamp: bool, uv: DVec2, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
-    let (x, y) = (uv.x * f64::from(image.width()) - 0.5, uv.y * f64::from(image.height()) - 0.5);
+    let (x, y) = (uv.x * f64::from(image.width) - 0.5, uv.y * f64::from(image.height) - 0.5);
     let (i, j) = (x.floor(), y.floor());
     let mut sum = DVec3::ZERO;
     for (di, wi) in [(0.0, 1.0 - (x - i)), (1.0, x - i)] {
@@ -234,7 +234,7 @@ fn color(object: &TexturedObject, uv: DVec2) -> DVec3 {
             colors[square.rem_euclid(2.0) as usize]
         }
         Some(Colors::Image(image)) if lay.nearest => {
-            let (w, h) = (f64::from(image.width()), f64::from(image.height()));
+            let (w, h) = (f64::from(image.width), f64::from(image.height));
             linear(pixel(image, lay.clamp, (uv.x * w).floor(), (uv.y * h).floor()))
         }
         Some(Colors::Image(image)) => bilinear(image, lay.clamp, uv, linear),
@@ -251,7 +251,7 @@ fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
         let grey = |c: DVec3| DVec3::splat(c.element_sum() / 3.0);
         height * bilinear(image, object.lay.clamp, uv, grey).x
     };
-    let (du, dv) = (1.0 / f64::from(image.width()), 1.0 / f64::from(image.height()));
+    let (du, dv) = (1.0 / f64::from(image.width), 1.0 / f64::from(image.height));
     let (across, along) = (DVec2::new(du, 0.0), DVec2::new(0.0, dv));
     let slope = DVec2::new(
         (at(uv + across) - at(uv - across)) / (2.0 * du),

@@ -1,10 +1,10 @@
 //! Images and mesh of the shipped scenes with textures. These functions generate them.
 
+use crate::support::png_file::{PngImage, RgbImage};
 use glam::DVec3;
-use image::{GrayImage, ImageFormat, Luma, Rgb, RgbImage};
+use png::{BitDepth, ColorType};
 use std::f64::consts::TAU;
 use std::fs;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use zerkalo::asset::Assets;
 
@@ -50,7 +50,7 @@ fn wood() -> RgbImage {
         let tone = if gap { 0.45 * tone } else { tone };
         // Few tones keep the file small.
         let tone = (tone * 48.0).round() / 48.0;
-        Rgb([code(1.12 * tone), code(0.78 * tone), code(0.47 * tone)])
+        [code(1.12 * tone), code(0.78 * tone), code(0.47 * tone)]
     })
 }
 
@@ -70,13 +70,17 @@ fn brick(u: f64, v: f64) -> (f64, i64) {
     (round * 0.8 + 0.1 * rough, (row * 4.0 + column) as i64)
 }
 
-fn brick_heights() -> GrayImage {
+fn brick_heights() -> PngImage {
     const SIDE: u32 = 256;
-    GrayImage::from_fn(SIDE, SIDE, |x, y| {
-        let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
-        let steps = (brick(at(x), at(y)).0 * 64.0).round() / 64.0;
-        Luma([code(steps)])
-    })
+    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
+    let level = |x, y| code((brick(at(x), at(y)).0 * 64.0).round() / 64.0);
+    PngImage {
+        width: SIDE,
+        height: SIDE,
+        color: ColorType::Grayscale,
+        depth: BitDepth::Eight,
+        levels: (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| level(x, y))).collect(),
+    }
 }
 
 fn bricks() -> RgbImage {
@@ -85,10 +89,10 @@ fn bricks() -> RgbImage {
         let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
         let (height, number) = brick(at(x), at(y));
         if height < 0.35 {
-            return Rgb([196, 188, 176]);
+            return [196, 188, 176];
         }
         let tone = 0.8 + 0.35 * (hashed(number, 11) - 0.5);
-        Rgb([code(0.78 * tone), code(0.40 * tone), code(0.29 * tone)])
+        [code(0.78 * tone), code(0.40 * tone), code(0.29 * tone)]
     })
 }
 
@@ -104,15 +108,15 @@ fn sheet() -> RgbImage {
         let arrow = b.abs() < 0.3 && a.abs() < if b > 0.0 { 0.3 - b } else { 0.08 };
         let line = a.abs() > 0.47 || b.abs() > 0.47;
         if line {
-            return Rgb([250, 250, 245]);
+            return [250, 250, 245];
         }
         let odd = (i + j).rem_euclid(2.0) == 1.0;
         if odd && arrow {
-            return Rgb([250, 250, 245]);
+            return [250, 250, 245];
         }
         let dim = if odd { 0.75 } else { 1.0 };
         let [r, g] = [i, j].map(|k| 0.25 + 0.7 * k / 7.0);
-        Rgb([code(r * dim), code(g * dim), code((1.15 - 0.5 * r - 0.5 * g) * dim)])
+        [code(r * dim), code(g * dim), code((1.15 - 0.5 * r - 0.5 * g) * dim)]
     })
 }
 
@@ -169,23 +173,21 @@ fn shipped(name: &str) -> PathBuf {
 #[test]
 fn texture_files_match_generators() {
     let bless = std::env::var_os("ZERKALO_BLESS").is_some();
-    let images: [(&str, image::DynamicImage); 4] = [
-        ("wood.png", wood().into()),
-        ("bricks.png", bricks().into()),
-        ("brick-heights.png", brick_heights().into()),
-        ("sheet.png", sheet().into()),
+    let images = [
+        ("wood.png", PngImage::from(&wood())),
+        ("bricks.png", PngImage::from(&bricks())),
+        ("brick-heights.png", brick_heights()),
+        ("sheet.png", PngImage::from(&sheet())),
     ];
     for (name, made) in images {
         let path = shipped("textures").join(name);
         if bless {
-            let mut bytes = Cursor::new(Vec::new());
-            made.write_to(&mut bytes, ImageFormat::Png).unwrap();
-            fs::write(&path, bytes.into_inner()).unwrap();
+            made.save(&path);
         }
-        let stored = image::open(&path).unwrap();
-        assert_eq!(stored.color(), made.color(), "{name}");
-        let (a, b) = (stored.as_bytes(), made.as_bytes());
-        assert!(a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 1), "{name}");
+        let stored = PngImage::open(&path).unwrap();
+        assert_eq!((stored.color, stored.depth), (made.color, made.depth), "{name}");
+        let (a, b) = (stored.levels, made.levels);
+        assert!(a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 1), "{name}");
         let bytes = fs::metadata(&path).unwrap().len();
         assert!(bytes < 60_000, "{name}: {bytes} bytes");
     }

@@ -1,8 +1,9 @@
 //! Limits of bumps and textures, textures without effect, rejected files.
 
+use crate::support::png_file::{PngImage, RgbImage};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
-use image::{ImageBuffer, Luma};
+use png::{BitDepth, ColorType};
 use std::fs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -45,8 +46,15 @@ fn bump_without_height_changes_no_bit() {
 fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();
     // Heights from 0 to 1 over 64 pixels, in 16 bits.
-    let ramp = ImageBuffer::from_fn(64, 2, |x, _| Luma([((x * 65535 + 31) / 63) as u16]));
-    ramp.save(folder.path().join("ramp.png")).unwrap();
+    let row = (0..64u32).flat_map(|x| (((x * 65535 + 31) / 63) as u16).to_be_bytes());
+    let ramp = PngImage {
+        width: 64,
+        height: 2,
+        color: ColorType::Grayscale,
+        depth: BitDepth::Sixteen,
+        levels: row.clone().chain(row).collect(),
+    };
+    ramp.save(&folder.path().join("ramp.png"));
     let (height, width) = (0.7, 2.0);
     // The ramp rises from the centre of the first pixel to that of the last.
     let slope: f64 = height / (width * 63.0 / 64.0);
@@ -116,9 +124,7 @@ fn textures_without_effect_are_not_compiled() {
 fn texture_edits_read_each_file_once() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["a.png", "b.png"] {
-        image::RgbImage::from_pixel(3, 2, image::Rgb([9, 99, 199]))
-            .save(folder.path().join(name))
-            .unwrap();
+        RgbImage::from_fn(3, 2, |_, _| [9, 99, 199]).save(&folder.path().join(name));
     }
     let path = folder.path().join("scene.toml");
     let text = "# A ball.\n[materials.m]\ncolor = [1, 1, 1] # white\n\n\
@@ -238,9 +244,8 @@ fn faces_in_edges_of_a_texture_have_one_color() {
         ),
     ];
     let folder = tempfile::tempdir().unwrap();
-    let rows =
-        ImageBuffer::from_fn(1, 2, |_, y| image::Rgb([255 * y as u8, 255 - 255 * y as u8, 0]));
-    rows.save(folder.path().join("rows.png")).unwrap();
+    let rows = RgbImage::from_fn(1, 2, |_, y| [255 * y as u8, 255 - 255 * y as u8, 0]);
+    rows.save(&folder.path().join("rows.png"));
     let views = cases.iter().flat_map(|(shape, texture, views)| {
         views.iter().map(move |target| (*shape, texture, *target))
     });
