@@ -1,9 +1,9 @@
 //! Tests that drawing neither panics nor emits control characters, in any state, size and colour
 //! depth.
 
-use crate::dashboard::model::{Colors, Model};
+use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::drawn;
-use crate::dashboard::view::tests::states::{STATES, tracing};
+use crate::dashboard::view::tests::states::{Named, STATES, tracing};
 use proptest::prelude::*;
 
 proptest! {
@@ -29,7 +29,7 @@ proptest! {
 /// those at which the layout changes.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
-    let draw = |states: &[(&str, fn(&mut Model))]| {
+    let draw = |states: &[Named]| {
         for (_, make) in states {
             for width in (0..46).chain([71, 72, 73, 99, 100]) {
                 for height in (0..20).step_by(1 + usize::from(width > 41)) {
