@@ -292,13 +292,7 @@ FORMAT=32-bit_rle_rgbe
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
         let map = RadianceMap::parse(&source(hdr())).unwrap();
         assert_eq!(map.pixels[9 + 8], [256.0; 3]);
-        let bytes = [
-            &hdr()[..11],
-            b"EXPOSURE=4
-",
-            &hdr()[11..],
-        ]
-        .concat();
+        let bytes = [&hdr()[..11], b"EXPOSURE=4\n", &hdr()[11..]].concat();
         let map = RadianceMap::parse(&source(bytes)).unwrap();
         assert_eq!(map.pixels[9 + 8], [64.0; 3]);
         let mut png = Vec::new();

@@ -1,6 +1,6 @@
 //! Screens with rendered pictures, written to files of terminal sequences for visual inspection.
-//! `ZERKALO_SCREENS=folder cargo test --test application paint -- --ignored` writes the files. `cat` shows such
-//! a file in a terminal that has the size of the screen.
+//! `ZERKALO_SCREENS=folder cargo test --test application paint -- --ignored` writes the files.
+//! `cat` shows such a file in a terminal that has the size of the screen.
 
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
