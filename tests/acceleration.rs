@@ -15,7 +15,7 @@ use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// Picture size in pixels. Neither side is a multiple of a tile's side.
-const SIZE: [u32; 2] = [53, 37];
+const SIZE: [u32; 2] = [37, 35];
 
 fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
     let expected = accelerated(scene, Acceleration::Auto, precision, count).film.bytes();
@@ -35,7 +35,7 @@ fn shipped_scenes_are_equal_under_every_acceleration() {
 #[test]
 fn shipped_scenes_are_equal_under_every_acceleration_in_double_precision() {
     for (name, scene) in all_shipped() {
-        same(&name, &sized(scene, [32, 24]), Precision::Double, 5);
+        same(&name, &sized(scene, [24, 18]), Precision::Double, 5);
     }
 }
 

@@ -77,8 +77,8 @@ mod tests {
                 "[[object]]\nshape.{shape}\ntransform = [{{ scale = {stretch} }}, {{ rotate_x = 30.0 }}, \
                  {{ rotate_z = 20.0 }}]\n"
             ))[0];
-            let surface: Vec<DVec3> = (0..400)
-                .flat_map(|i| (0..400).map(move |j| (f64::from(i) / 400.0, f64::from(j) / 399.0)))
+            let surface: Vec<DVec3> = (0..250)
+                .flat_map(|i| (0..250).map(move |j| (f64::from(i) / 250.0, f64::from(j) / 249.0)))
                 .flat_map(|(u, v)| {
                     let (sin, cos) = (TAU * u).sin_cos();
                     match form {

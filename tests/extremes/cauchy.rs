@@ -195,7 +195,8 @@ fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
     (center + p * half, d.normalize())
 }
 
-const LINES: usize = 62 << 14;
+/// Number of lines through each shape in the tests that always run.
+const LINES: usize = 1 << 18;
 /// Number of lines traced together. It is small because the allocator returns large blocks of
 /// memory to the system after each use, which takes time.
 const BLOCK: usize = 1 << 9;
@@ -218,10 +219,20 @@ fn tally<L: SimdFloat>(
     tally
 }
 
-/// Checks the laws of Cauchy and Crofton on all kinds of convex shapes: the share of lines that hit
-/// a shape, and the mean length of chords.
 #[test]
 fn extreme_07_cauchy() {
+    check_cauchy(LINES);
+}
+
+#[test]
+#[ignore = "a million lines: cargo test --test engine extremes:: -- --ignored"]
+fn extreme_07_cauchy_at_length() {
+    check_cauchy(4 * LINES);
+}
+
+/// Checks the laws of Cauchy and Crofton on all kinds of convex shapes: the share of lines that hit
+/// a shape, and the mean length of chords.
+fn check_cauchy(lines: usize) {
     let mut worst = [0f64; 2];
     let mut inconsistent = 0;
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
@@ -232,12 +243,12 @@ fn extreme_07_cauchy() {
         };
         let share = surface / (4.0 * PI * radius * radius);
         let chord = 4.0 * volume / surface;
-        let double = tally::<Double>(&form, 2.0 * radius, 80 + i as u64, LINES, |n| {
+        let double = tally::<Double>(&form, 2.0 * radius, 80 + i as u64, lines, |n| {
             through_ball(n, center, radius)
         });
         worst[0] = worst[0].max(double.check(name, share, chord));
         assert_eq!(double.inconsistent, 0, "{name}: both ends of a line must agree");
-        let single = tally::<Single>(&form, 2.0 * radius, 180 + i as u64, LINES, |n| {
+        let single = tally::<Single>(&form, 2.0 * radius, 180 + i as u64, lines, |n| {
             through_ball(n, center, radius)
         });
         worst[1] = worst[1].max(single.check(name, share, chord));
@@ -247,7 +258,7 @@ fn extreme_07_cauchy() {
         let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
         assert!(
             single.inconsistent as f64 <= limit,
-            "{name}: {} lines of {LINES}",
+            "{name}: {} lines of {lines}",
             single.inconsistent
         );
     }
@@ -330,13 +341,23 @@ fn slivers() -> Vec<(&'static str, Form)> {
 
 #[test]
 fn extreme_13_slivers() {
+    check_slivers(LINES);
+}
+
+#[test]
+#[ignore = "a million lines: cargo test --test engine extremes:: -- --ignored"]
+fn extreme_13_slivers_at_length() {
+    check_slivers(4 * LINES);
+}
+
+fn check_slivers(lines: usize) {
     let mut worst = 0f64;
     for (i, (name, form)) in slivers().into_iter().enumerate() {
         let (low, high) = form.bounds().unwrap();
         let (surface, volume) = surface_and_volume(&form).unwrap();
         let half = 0.55 * (high - low);
         let outer = 8.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
-        let found = tally::<Double>(&form, 4.0, 1300 + i as u64, LINES, |n| {
+        let found = tally::<Double>(&form, 4.0, 1300 + i as u64, lines, |n| {
             through_box(n, 0.5 * (low + high), half)
         });
         worst = worst.max(found.check(name, surface / outer, 4.0 * volume / surface));

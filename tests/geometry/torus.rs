@@ -144,8 +144,8 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
 #[test]
 fn torus_hits_are_roots_of_the_quartic() {
     for tube in TUBES {
-        hits_are_roots::<Single>(tube, 10_000);
-        hits_are_roots::<Double>(tube, 10_000);
+        hits_are_roots::<Single>(tube, 5_000);
+        hits_are_roots::<Double>(tube, 5_000);
     }
 }
 

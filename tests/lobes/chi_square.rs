@@ -14,7 +14,7 @@ const GRID: [usize; 2] = [16, 24];
 /// Number of cells per bin and coordinate in the midpoint rule that integrates densities. A cell
 /// has one point, or eight points per coordinate if the density jumps in the cell.
 const FINE: usize = 8;
-const COUNT: u32 = 80_000;
+const COUNT: u32 = 56_000;
 
 /// Map between directions and coordinates in [0, 1]^2. The map is fitted to a lobe so that no bin
 /// is nearly empty or contains nearly all directions. It follows from geometry alone, without the

@@ -402,9 +402,11 @@ fn matches_reference(scene: &Scene) -> Verdict {
     }
 }
 
+/// Compares one scene of each layout. None of them needs a second comparison, which takes 64 times as
+/// long as the first.
 #[test]
 fn samples() {
-    compare("samples", 0..8, matches_reference);
+    compare("samples", 16..24, matches_reference);
 }
 
 #[test]
@@ -413,10 +415,10 @@ fn many_samples() {
     compare_many("samples", matches_reference);
 }
 
-/// Compares scenes whose pictures are mostly empty.
+/// Compares scenes whose pictures are mostly empty. None of them needs a second comparison.
 #[test]
 fn sparse_samples() {
-    compare("samples", seeds_of(Layout::Sparse, 0..6), matches_reference);
+    compare("samples", seeds_of(Layout::Sparse, 5..11), matches_reference);
 }
 
 #[test]

@@ -68,13 +68,13 @@ fn replicates_are_equal(scene: &Scene) -> Verdict {
 
 #[test]
 fn soundness() {
-    compare("soundness", 0..160, sound);
+    compare("soundness", 0..80, sound);
 }
 
 /// Checks scenes whose objects have positions and sizes from 1e-6 to 1e6.
 #[test]
 fn wild_soundness() {
-    compare("soundness", seeds_of(Layout::Wild, 20..320), sound);
+    compare("soundness", seeds_of(Layout::Wild, 20..170), sound);
 }
 
 #[test]
@@ -85,12 +85,12 @@ fn many_soundness() {
 
 #[test]
 fn replicates() {
-    compare("replicates", 0..96, replicates_are_equal);
+    compare("replicates", 0..48, replicates_are_equal);
 }
 
 #[test]
 fn wild_replicates() {
-    compare("replicates", seeds_of(Layout::Wild, 12..312), replicates_are_equal);
+    compare("replicates", seeds_of(Layout::Wild, 12..162), replicates_are_equal);
 }
 
 #[test]

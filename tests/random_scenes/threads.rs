@@ -61,7 +61,7 @@ fn same_outcome(scene: &Scene) -> Verdict {
 
 #[test]
 fn threads() {
-    compare("threads", 0..48, same_outcome);
+    compare("threads", 0..24, same_outcome);
 }
 
 #[test]
