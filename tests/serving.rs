@@ -294,7 +294,7 @@ fn relit_film_equals_render_of_the_edited_scene() {
         matches!(key.path[0].as_str(), "light" | "ambient" | "background" | "materials")
     };
     let mild: Vec<&Key> = all.iter().filter(mild).collect();
-    for round in 0..400 {
+    for round in 0..200 {
         let mut changed = plain.clone();
         let mut what = String::new();
         for _ in 0..2 + round % 3 {

@@ -42,6 +42,9 @@ enum Tree {
 pub struct Body {
     pub leaves: Vec<Leaf>,
     tree: Tree,
+    /// Centre and radius of a ball around an object of one simple shape, in scene coordinates;
+    /// `None` for a compound, an infinite shape or a mesh.
+    ball: Option<(DVec3, f64)>,
 }
 
 /// Distance from a crossing to each of two tested points, one before and one behind it, in lengths
@@ -53,17 +56,6 @@ const ASIDE: f64 = 1e-7;
 pub type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Returns `true` if the ball around the shape shows that a ray does not hit the shape before
-    /// the distance `end`.
-    fn is_beside(&self, origin: DVec3, direction: DVec3, end: f64) -> bool {
-        self.scene_ball.is_some_and(|(center, radius)| {
-            // Distance to the point of the ray that is nearest to the centre.
-            let (a, f) = (direction.length_squared(), center - origin);
-            let nearest = (f.dot(direction) / a).clamp(0.0, end);
-            (f - direction * nearest).length_squared() > radius * radius
-        })
-    }
-
     /// Passes the crossings of a line with the surface to `take`: the distance of each, and the
     /// index of the piece or triangle.
     fn crossings(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64, usize)) {
@@ -146,7 +138,8 @@ impl Body {
         let place = object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
         let mut leaves = Vec::new();
         let tree = grow(&object.shape, &object.material, place, &mut leaves)?;
-        Ok(Self { leaves, tree })
+        let ball = if let [leaf] = &leaves[..] { leaf.scene_ball } else { None };
+        Ok(Self { leaves, tree, ball })
     }
 
     /// Returns the closest hit of a ray between the distances `from` and `end`: distance, unit
@@ -154,9 +147,12 @@ impl Body {
     /// outwards on a solid, and to the front on a flat shape or a mesh. Distances are in lengths of
     /// `direction`.
     pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64, end: f64) -> Option<Meeting> {
+        if misses(self.ball, origin, direction, end) {
+            return None;
+        }
         let (mut end, mut nearest) = (end, None);
         for (i, leaf) in self.leaves.iter().enumerate() {
-            if leaf.is_beside(origin, direction, end) {
+            if self.leaves.len() > 1 && misses(leaf.scene_ball, origin, direction, end) {
                 continue;
             }
             let normal = |t, facet| leaf.normal(origin, direction, t, facet);
@@ -218,6 +214,17 @@ impl Body {
             Tree::Difference(list) => inside(&list[0]) && !list[1..].iter().any(inside),
         }
     }
+}
+
+/// Returns `true` if a ray does not reach `ball`, centre and radius of a ball, before the distance
+/// `end`. Returns `false` without a ball.
+fn misses(ball: Option<(DVec3, f64)>, origin: DVec3, direction: DVec3, end: f64) -> bool {
+    ball.is_some_and(|(center, radius)| {
+        // Distance to the point of the ray that is nearest to the centre.
+        let (a, f) = (direction.length_squared(), center - origin);
+        let nearest = (f.dot(direction) / a).clamp(0.0, end);
+        (f - direction * nearest).length_squared() > radius * radius
+    })
 }
 
 /// Returns centre and radius of a ball around all `pieces`. Returns `None` if there are no pieces,

@@ -339,17 +339,17 @@ fn extreme_30_noise_target_is_reached() {
 /// Checks that `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels before rounding to
 /// integers, against a reference of another seed. The program stops by its own noise estimate. With
 /// a few dozen tiles this estimate has a standard error of about 6 %: at 96 x 72 pixels (30 tiles),
-/// 24 seeds gave 0.40 to 0.56 levels. The picture of this test therefore has 300 tiles.
+/// 24 seeds gave 0.40 to 0.56 levels. The picture of this test therefore has 180 tiles.
 #[test]
 fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
-    let scene = sized(shipped("mirror-room.toml"), [320, 240]);
+    let scene = sized(shipped("mirror-room.toml"), [240, 180]);
     let display = Display::default();
     let pool = pool(2);
     let codes = |rendering: &RenderState| -> Vec<f64> {
         picture(rendering, Replicates::Both).iter().flat_map(|rgb| display.codes(*rgb)).collect()
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
-    let reference_spp = 1280;
+    let reference_spp = 1408;
     let stop = Stop { spp: Some(reference_spp), ..Stop::default() };
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_codes;
@@ -360,7 +360,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
         let mut rendering = begin(&scene, seed, Precision::Auto);
         let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
-        let spp = rendering.film.samples() / (320 * 240);
+        let spp = rendering.film.samples() / (240 * 180);
         assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
         let got = codes(&rendering);
         let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();

@@ -1,5 +1,6 @@
 //! Tests of lights with a size, and of many lights.
 
+use crate::agreement::REFERENCE_SAMPLES;
 use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
@@ -11,7 +12,7 @@ use zerkalo::scene::{RayTypes, Scene};
 /// `mutations`, changed versions of the scene, must disagree.
 fn alike(file: &str, mutations: &[(&str, Change)]) {
     let original = shipped(file);
-    row(file, |tested| agrees(&original, tested, 128), mutations);
+    row(file, |tested| agrees(&original, tested, REFERENCE_SAMPLES), mutations);
 }
 
 fn lamp(scene: &mut Scene) -> &mut Light {
@@ -106,7 +107,7 @@ fn d9_environment() {
     // A diffuse bounce that leaves the scene must add no light of the environment.
     let mut bouncing = shipped("environment.toml");
     bouncing.trace.max_diffuse_depth = 2;
-    agrees(&bouncing, &bouncing, 128).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
+    agrees(&bouncing, &bouncing, REFERENCE_SAMPLES).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
 }
 
 #[test]

@@ -115,19 +115,15 @@ fn check_hit(ray: &PixelRay, near: f64, shapes: &[AnalyticShape], hit: &FirstHit
                 // Number of steps over which an implicit function of value 1 keeps its sign,
                 // because its slope is at most `slope`. The factor 0.999 covers rounding.
                 let steps_per_value = 0.999 * STEPS as f64 / ((last - first).abs() * slope);
-                let mut next = 1;
-                for k in 1..=STEPS {
-                    if k < next {
-                        continue;
-                    }
+                let mut k = 1;
+                while k <= STEPS {
                     let t = first + (last - first) * k as f64 / STEPS as f64;
                     let f = inside(point_at(t));
-                    if (f < 0.0) == side {
-                        next = k + 1 + (f.abs() * steps_per_value) as usize;
-                    }
-                    if f.abs() > 4.0 * tolerance && (f < 0.0) != side {
+                    let same = (f < 0.0) == side;
+                    if f.abs() > 4.0 * tolerance && !same {
                         return Err(format!("the ray crosses object {i} before {depth}"));
                     }
+                    k += 1 + if same { (f.abs() * steps_per_value) as usize } else { 0 };
                 }
             }
             AnalyticShape::Thin(intersect) => {

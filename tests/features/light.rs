@@ -1,5 +1,6 @@
 //! Tests of materials, lights and shading formulas.
 
+use crate::agreement::REFERENCE_SAMPLES;
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::features::row::{Verdict, ensure, material, object, row};
@@ -302,7 +303,7 @@ fn c3_what_the_tracks_lacked() {
     let tracks = shipped("reflecting-tracks-lit.toml");
     row(
         "reflecting-tracks-lit.toml",
-        |tested| agrees(&tracks, tested, 16),
+        |tested| agrees(&tracks, tested, REFERENCE_SAMPLES),
         &[
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[2].on = false),

@@ -13,7 +13,7 @@ use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
 /// Samples per pixel of each replicate (half of the samples) in the picture of a mutation.
-const MUTATION_SAMPLES: u32 = SAMPLES / 4;
+const MUTATION_SAMPLES: u32 = SAMPLES / 2;
 
 /// Compares the program's picture of `tested` statistically with the reference tracer's picture of
 /// `original`. The reference tracer traces `samples` samples per pixel. The picture of a mutation

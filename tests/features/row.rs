@@ -15,6 +15,11 @@ pub type Change<'a> = &'a dyn Fn(&mut Scene);
 /// Checks that `check` passes for the shipped scene `file` and fails for each of `mutations`.
 /// `check` renders the given scene and compares it with an expectation from an independent source.
 pub fn row(file: &str, check: impl Fn(&Scene) -> Verdict, mutations: &[(&str, Change)]) {
+    checked_row(file, &check, mutations);
+}
+
+/// Implements [`row`] once for all types of checks, which shortens the compilation.
+fn checked_row(file: &str, check: &dyn Fn(&Scene) -> Verdict, mutations: &[(&str, Change)]) {
     let original = shipped(file);
     if let Err(error) = check(&original) {
         panic!("{file}: {error}");

@@ -10,11 +10,11 @@ use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};
 
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
-const GRID: [usize; 2] = [16, 24];
+const GRID: [usize; 2] = [12, 18];
 /// Number of cells per bin and coordinate in the midpoint rule that integrates densities. A cell
 /// has one point, or eight points per coordinate if the density jumps in the cell.
-const FINE: usize = 8;
-const COUNT: u32 = 56_000;
+const FINE: usize = 11;
+const COUNT: u32 = 40_000;
 
 /// Map between directions and coordinates in [0, 1]^2. The map is fitted to a lobe so that no bin
 /// is nearly empty or contains nearly all directions. It follows from geometry alone, without the

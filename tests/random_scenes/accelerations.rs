@@ -40,7 +40,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
 
 #[test]
 fn accelerations() {
-    compare("accelerations", 0..56, same_bytes);
+    compare("accelerations", 0..40, same_bytes);
 }
 
 #[test]

@@ -418,7 +418,7 @@ fn many_samples() {
 /// Compares scenes whose pictures are mostly empty. None of them needs a second comparison.
 #[test]
 fn sparse_samples() {
-    compare("samples", seeds_of(Layout::Sparse, 5..11), matches_reference);
+    compare("samples", seeds_of(Layout::Sparse, 5..9), matches_reference);
 }
 
 #[test]
