@@ -179,7 +179,7 @@ mod tests {
             ("both", [1.0, 1.0], 256, 0.46),
         ] {
             let (mut error, mut independent) = (0.0, 0.0);
-            for _ in 0..4000 {
+            for _ in 0..2000 {
                 let angle = [0, 1].map(|_| std::f64::consts::TAU * unit(random()));
                 let normal = [0, 1, 2, 3].map(|d| {
                     weights[d / 2]

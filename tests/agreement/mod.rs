@@ -382,7 +382,10 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
             scene.trace.below_horizon = BelowHorizon::Absorb;
             if lobe.contains("alpha") {
                 let few = |scene: &Scene| rendered(scene, 8, SamplerKind::Sobol);
-                assert!(few(&scene) == few(&folded), "{name}: depends on directions below the surface");
+                assert!(
+                    few(&scene) == few(&folded),
+                    "{name}: depends on directions below the surface"
+                );
             } else {
                 check_agreement(&name, &scene, FEW_SAMPLES, REFERENCE_SAMPLES);
             }

@@ -292,7 +292,7 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
     }
     for scene in &scenes {
         let mut fits = false;
-        for megabytes in (30..=150).step_by(20) {
+        for megabytes in (30..=150).step_by(40) {
             let limit = format!("ulimit -v {}", 1000 * megabytes);
             let command =
                 format!("exec \"$0\" render {scene} -o a.png --spp 2 --size 64x48 --threads 2");

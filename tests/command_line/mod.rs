@@ -364,7 +364,7 @@ fn help_names_every_option_and_exit_status() {
 #[test]
 fn progress_in_a_log_is_lines() {
     let desk = Desk::new();
-    let run = desk.render("a.png", &["--time", "1.3"]);
+    let run = desk.render("a.png", &["--time", "1.3", "--threads", "1"]);
     assert_eq!(run.status, 0);
     for part in [" %", "spp", "Msamples/s", "noise", "left\n"] {
         assert!(run.err.contains(part), "no {part:?} in {:?}", run.err);

@@ -107,7 +107,8 @@ fn d9_environment() {
     // A diffuse bounce that leaves the scene must add no light of the environment.
     let mut bouncing = shipped("environment.toml");
     bouncing.trace.max_diffuse_depth = 2;
-    agrees(&bouncing, &bouncing, REFERENCE_SAMPLES).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
+    agrees(&bouncing, &bouncing, REFERENCE_SAMPLES)
+        .unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
 }
 
 #[test]

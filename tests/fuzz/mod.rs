@@ -7,7 +7,7 @@ mod mutate;
 use crate::support::test_film::TestFilm;
 use mutate::Random;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 use zerkalo::asset::Assets;
 use zerkalo::disk::Existing;
@@ -21,8 +21,10 @@ use zerkalo::render::{Checkpoint, Options, SampleInputs};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 
-/// Number of mutations that are read for each format.
-const CASES: u64 = 5_000;
+/// Number of mutations that are read for each format; `ZERKALO_CASES` sets another one.
+static CASES: LazyLock<u64> = LazyLock::new(|| {
+    std::env::var("ZERKALO_CASES").map_or(3_000, |n| n.parse().expect("a number of cases"))
+});
 
 /// Longest allowed time for reading one file. The fastest of up to five attempts counts, because
 /// other programs may slow down the others.
@@ -38,14 +40,14 @@ fn peak_kib() -> u64 {
     line.and_then(|l| l.trim().split(' ').next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Reads `CASES` mutations of the files `seeds` and returns the number of accepted ones. `read`
+/// Reads [`CASES`] mutations of the files `seeds` and returns the number of accepted ones. `read`
 /// returns `true` if it accepts a file; it must accept the unchanged files.
 fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> u64 {
     for (i, seed) in seeds.iter().enumerate() {
         assert!(read(seed), "seed {i} of {name} is not good");
     }
     let mut accepted = 0;
-    for case in 0..CASES {
+    for case in 0..*CASES {
         let mut random = Random::new(case << 8 | name.len() as u64);
         let seed = &seeds[random.below(seeds.len())];
         let other = &seeds[random.below(seeds.len())];
@@ -69,7 +71,8 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
         }
         assert!(spent < LONGEST, "{name} case {case} took {spent:?}");
     }
-    println!("{name}: {accepted} of {CASES} accepted, peak memory {} MiB", peak_kib() >> 10);
+    let cases = *CASES;
+    println!("{name}: {accepted} of {cases} accepted, peak memory {} MiB", peak_kib() >> 10);
     assert!(peak_kib() < MEMORY_KIB, "{name}: {} MiB", peak_kib() >> 10);
     accepted
 }
@@ -77,7 +80,8 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
 /// Checks that some mutations are accepted and some are refused. If none were accepted, the first
 /// check in the reader might refuse all of them, and later checks would not be tested.
 fn assert_mixed(accepted: u64) {
-    assert!(accepted > CASES / 50 && accepted < CASES, "{accepted} of {CASES} were accepted");
+    let cases = *CASES;
+    assert!(accepted > cases / 50 && accepted < cases, "{accepted} of {cases} were accepted");
 }
 
 /// Writes a new file at `path` in place of the old one. If the old file were truncated instead,
@@ -135,7 +139,7 @@ fn mtl() {
         write(&folder.path().join("a.mtl"), bytes);
         accepts_mesh(&path)
     });
-    assert_eq!(accepted, CASES, "colours that cannot be read are left out");
+    assert_eq!(accepted, *CASES, "colours that cannot be read are left out");
 }
 
 #[test]
@@ -208,7 +212,8 @@ fn plan() {
         parsed.extend(plan.clone().ok().filter(|_| parsed.len() < 100));
         plan.is_ok()
     });
-    assert!(accepted > 20 && accepted < CASES, "{accepted} of {CASES} were accepted");
+    let cases = *CASES;
+    assert!(accepted > 20 && accepted < cases, "{accepted} of {cases} were accepted");
     for plan in parsed {
         let again = Plan::parse(Path::new("a.plan"), plan.text().as_bytes()).unwrap();
         assert_eq!(again, plan);

@@ -157,7 +157,8 @@ const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22"
 /// requests if `replies` is `true`.
 fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
     let (folder, size) = (fixture.0.path(), [120, 36]);
-    let terminal = Terminal::start(&Start { command: &[PROGRAM], folder, size, env: SSH, replies });
+    let command = &[PROGRAM, "--threads", "1"];
+    let terminal = Terminal::start(&Start { command, folder, size, env: SSH, replies });
     wait_for_picture(&terminal);
     terminal
 }

@@ -71,7 +71,9 @@ fn checkpoint_is_watched_while_its_render_runs() {
     let fixture = Fixture::with_room();
     let mut render = Command::new(PROGRAM)
         .args(["render", "room.toml", "-o", "a.png", "--size", "160x120", "--noise", "1e-6"])
-        .args(["--checkpoint", "a.zk", "--checkpoint-interval", "0.3"])
+        .args(["--checkpoint", "a.zk", "--checkpoint-interval", "0.3", "--threads", "1"])
+        // Ends the render of a test that fails.
+        .args(["--time", "60"])
         .current_dir(fixture.0.path())
         .stderr(std::process::Stdio::null())
         .spawn()

@@ -73,13 +73,13 @@ fn check_growth(fewest: usize, limit: f64) {
     }
 }
 
-/// Checks the growth of the time of an edit from 2,000 to 8,000 objects. The limit for a doubling
+/// Checks the growth of the time of an edit from 1,000 to 4,000 objects. The limit for a doubling
 /// is halfway between linear (2) and quadratic (4), on a logarithmic scale. The growth is not
 /// exactly linear, because only small scenes fit into the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {
-    check_growth(2_000, 8_f64.sqrt());
+    check_growth(1_000, 8_f64.sqrt());
 }
 
 /// Checks that the time of an edit is proportional to the number of objects, up to 100,000. Run

@@ -92,7 +92,7 @@ fn of_several_scenes_only_the_newest_is_compiled() {
 #[test]
 fn newest_scene_is_never_lost() {
     let mut session = session(endless());
-    for round in 0..300u64 {
+    for round in 0..120u64 {
         let mut newest = 0;
         for edit in 0..=round % 4 {
             newest = session.set_scene(scene(64 + 16 * (edit as u32 % 2)));
@@ -108,7 +108,7 @@ fn newest_scene_is_never_lost() {
 #[test]
 fn wait_ignores_messages_of_snapshots_already_taken() {
     let mut session = session(Stop { spp: Some(8), ..Stop::default() });
-    for _ in 0..20 {
+    for _ in 0..8 {
         session.set_scene(scene(64));
         let end = Instant::now() + PATIENCE;
         loop {

@@ -240,7 +240,7 @@ mod tests {
         for protocol in
             [Protocol::Kitty, Protocol::KittyThroughTmux, Protocol::Sixel(16), Protocol::Blocks]
         {
-            for size in [[64, 48], [1200, 800], [1, 700], [999, 2]] {
+            for size in [[64, 48], [1100, 300], [1, 700], [999, 2]] {
                 let viewport = ImageViewport { protocol, ..WINDOW };
                 let pixels = vec![[9, 8, 7]; size[0] * size[1]];
                 let image = ViewerImage::of(size, &pixels, &viewport).unwrap();

@@ -242,7 +242,7 @@ mod tests {
             panic!("no buffer for {} balls", balls.len());
         };
         let mut count = 0;
-        for round in 0..3000 {
+        for round in 0..1200 {
             // Groups of start points. In the first four rounds out of six they are on a sphere with
             // a radius from 0.01 to 10,000 around a random point. In the fifth they are on the
             // outside of one ball, in the sixth on the outside of two balls.

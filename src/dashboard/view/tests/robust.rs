@@ -32,7 +32,7 @@ fn every_state_draws_at_threshold_sizes() {
     let draw = |states: &[Named]| {
         for (_, make) in states {
             for width in (0..46).chain([71, 72, 73, 99, 100]) {
-                for height in (width % 2..20).step_by(2) {
+                for height in (width % 3..20).step_by(3) {
                     let mut model = tracing([width, height]);
                     make(&mut model);
                     drawn(&model);

@@ -88,7 +88,7 @@ fn noise_target_is_reached_without_overshoot() {
 #[test]
 fn estimate_stays_unbiased_when_it_decides() {
     for effective in [16, 64, 256] {
-        let (mut ratio, runs) = (0.0, 8);
+        let (mut ratio, runs) = (0.0, 5);
         for seed in 0..runs {
             let truth = clustered(600, 0.3).into_iter().enumerate();
             let truth = truth.map(|(i, t)| Truth { sigma: t.sigma + 10.0 * (i % 7) as f64, ..t });
