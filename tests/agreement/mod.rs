@@ -204,7 +204,7 @@ fn deliberate_errors_are_detected() {
         let name = format!("{lobe:?}");
         // A view in which most blocks show blurred edges.
         let mirror = compare::zoomed(&scene, [0.0, 1.0, -2.0], 20.0);
-        check_detection(&[Mutation::WiderLobe], &name, &mirror, 8 * REFERENCE_SAMPLES);
+        check_detection(&[Mutation::WiderLobe], &name, &mirror, 12 * REFERENCE_SAMPLES);
         check_detection(&[Mutation::LobeDensity], &name, &scene, REFERENCE_SAMPLES);
     }
 }

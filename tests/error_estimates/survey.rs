@@ -172,7 +172,7 @@ fn assert_honest(outcomes: &[Outcome]) {
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 25, 35];
     // A smaller noise target needs a reference with more samples.
-    let reference_count = |number| (160.0 / target_of(number)) as u32;
+    let reference_count = |number| (96.0 / target_of(number)) as u32;
     let outcomes = cheap.map(|number| examine(number, reference_count(number), 1, 1));
     assert_honest(&outcomes);
 }

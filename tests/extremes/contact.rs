@@ -202,7 +202,7 @@ fn contact_is_the_limit_of_a_gap() {
                 let (place, folder) = (DAffine3::IDENTITY, folder.path());
                 let setting = Setting { upper, lower, materials, place, folder };
                 for precision in [Precision::Single, Precision::Double] {
-                    setting.check(precision, 512);
+                    setting.check(precision, 256);
                 }
             }
         }
@@ -235,7 +235,7 @@ fn transformed_contact_is_the_limit_of_a_gap() {
                     let folder = folder.path();
                     let setting = Setting { upper, lower, materials, place, folder };
                     for precision in [Precision::Single, Precision::Double] {
-                        setting.check(precision, 512);
+                        setting.check(precision, 256);
                     }
                 }
             }
