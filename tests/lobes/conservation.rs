@@ -4,7 +4,7 @@
 use crate::lobes::properties::{BsdfProperties, Energy, ReflectionModel, transmission_properties};
 use crate::lobes::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use zerkalo::lanes::{Double, Frame, Vec3};
+use zerkalo::lanes::{Double, Frame, SimdFloat, Vec3};
 use zerkalo::material::{
     Bsdf, FIELDS, Fresnel, Highlight, Interface, Lobe, Masking, Material, ReflectionLobe,
 };
@@ -200,9 +200,10 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
              shape.plane = {{ point = [0.0, 0.0, 0.0], normal = {n:?} }}",
             combine(&[(-1.0, l)])
         );
-        let world = World::<f64>::new(&scene(&text));
+        let world = World::<Double>::new(&scene(&text));
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
-        trace(&world, &Sampler::new(settings, world.camera_dimensions()), (0, 0), 0, 0)[0][0][0]
+        let sampler = Sampler::new(settings, world.camera_dimensions());
+        trace(&world, &sampler, (0, 0), 0, Double::mask(true))[0][0][0]
     };
     for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
         // A light of intensity 1 gives the irradiance pi on a surface that faces it. `there` and
