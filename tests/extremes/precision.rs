@@ -12,6 +12,8 @@ use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SIZE: [u32; 2] = [24, 18];
+/// Picture size in pixels for scenes of a [`Family`].
+const FAMILY_SIZE: [u32; 2] = [32, 24];
 /// Number of samples per pixel in each of the two replicates (halves of the samples). Rounding
 /// diverts some paths, as often to one side of an edge as to the other. With this number of
 /// samples, diverted paths add no visible noise.
@@ -230,9 +232,9 @@ fn auto_takes_double_where_single_would_show() {
     for Family { name, text, least, visible } in FAMILIES {
         let (mut single_before, mut p, mut worst) = (true, 0.25, 0.0f64);
         let mut last = 0.0;
-        let begins_single = takes_single(&sized(parsed(&text(0.25)), [32, 24]));
+        let begins_single = takes_single(&sized(parsed(&text(0.25)), FAMILY_SIZE));
         while p >= least {
-            let scene = sized(parsed(&text(p)), [32, 24]);
+            let scene = sized(parsed(&text(p)), FAMILY_SIZE);
             let single = takes_single(&scene);
             last = error(&scene, SAMPLES);
             println!(
