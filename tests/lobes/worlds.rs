@@ -132,7 +132,7 @@ fn physical() -> Scene {
         std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room-physical.toml"))
             .unwrap();
     let mut scene = scene(&text);
-    scene.film.size = [32, 24];
+    scene.film.size = [48, 36];
     scene
 }
 
@@ -149,8 +149,8 @@ fn packets_equal_samples_traced_alone() {
             (material.reflection, material.lobe) = (0.9, Lobe::Mirror);
         }
     }
-    for scene in [lobe, lambert, mirror] {
-        assert!(samples::<Single>(&scene, 16) == lone_samples::<Single>(&scene, 16));
-        assert!(samples::<Double>(&scene, 16) == lone_samples::<Double>(&scene, 16));
+    for (name, scene) in [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)] {
+        assert!(samples::<Single>(&scene, 16) == lone_samples::<Single>(&scene, 16), "{name}");
+        assert!(samples::<Double>(&scene, 16) == lone_samples::<Double>(&scene, 16), "{name}");
     }
 }
