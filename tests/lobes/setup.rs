@@ -218,7 +218,7 @@ fn cross<L: SimdFloat>(
 }
 
 /// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
-/// `first` on. Lanes that are not `active` have no meaning. The order of values is
+/// `first` on. The values of lanes outside of `active` have no meaning. The order of values is
 /// `[sample][group][channel]`.
 pub fn trace<L: SimdFloat>(
     world: &World<L>,
