@@ -62,9 +62,9 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     if let Some((_, rays, true)) = saved {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
+    let signals = Signals::watch()?;
     let render =
         start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
-    let signals = Signals::watch()?;
     let (render, signal) = trace(render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
     part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
