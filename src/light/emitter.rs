@@ -2,8 +2,7 @@
 //! densities.
 
 use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
-use crate::light::area::EmitterSurface;
-use crate::light::{Light, LightUnit};
+use crate::light::{EmissiveSurface, Light, LightUnit};
 use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -69,30 +68,29 @@ impl<S: Float> Emitter<S> {
     /// and keeps its power.
     pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
         let surface = light.surface()?;
-        let frame = surface.frame()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        let mut area = surface.area();
         let mut radiance = match light.unit {
             LightUnit::Radiance => 1.0,
-            LightUnit::Power => 1.0 / (PI * surface.area()),
+            LightUnit::Power => 1.0 / (PI * area),
         };
-        let mut area = surface.area();
         let mut center = surface.center() - origin;
-        let axes = frame.map(vector);
         let surface = match surface {
-            EmitterSurface::Sphere(sphere) => {
-                let radius = sphere.radius + lift;
-                let growth = (radius / sphere.radius).powi(2);
+            EmissiveSurface::Sphere { radius, .. } => {
+                let lifted = radius + lift;
+                let growth = (lifted / radius).powi(2);
                 (area, radiance) = (area * growth, radiance / growth);
-                Surface::Sphere { radius: S::from_f64(radius) }
+                Surface::Sphere { radius: S::from_f64(lifted) }
             }
-            EmitterSurface::Rectangle(rectangle) => {
-                center += frame[2] * lift;
-                Surface::Rectangle { axes, size: rectangle.size.map(S::from_f64) }
+            EmissiveSurface::Rectangle { axes, size, .. } => {
+                center += axes[2] * lift;
+                Surface::Rectangle { axes: axes.map(vector), size: size.map(S::from_f64) }
             }
-            EmitterSurface::Disk(disk) => {
-                center += frame[2] * lift;
-                Surface::Disk { axes, radius: S::from_f64(disk.radius) }
+            EmissiveSurface::Disk { axes, radius, .. } => {
+                center += axes[2] * lift;
+                Surface::Disk { axes: axes.map(vector), radius: S::from_f64(radius) }
             }
+            EmissiveSurface::Triangles(_) | EmissiveSurface::ConvexTriangles(_) => return None,
         };
         Some(Self {
             surface,

@@ -7,7 +7,7 @@
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
-use crate::light::Light;
+use crate::light::{Handles, Light, LightDesc, LightForm, Placement};
 use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -62,11 +62,6 @@ impl Environment {
         }
     }
 
-    /// Returns the error of reading the environment image; `None` if there was none.
-    pub(super) fn fault(&self) -> Option<ValidationError> {
-        self.file().and_then(|_| self.map.fault())
-    }
-
     /// Returns an image of the gradient, with a single column, because the radiance depends on the
     /// elevation alone.
     fn gradient(&self) -> RadianceMap {
@@ -77,6 +72,25 @@ impl Environment {
             std::array::from_fn(|c| (horizon[c] + height.abs() * (end[c] - horizon[c])) as f32)
         };
         RadianceMap::new([1, GRADIENT_ROWS], (0..GRADIENT_ROWS).map(row).collect())
+    }
+}
+
+impl LightDesc for Environment {
+    fn form(&self) -> LightForm<'_> {
+        LightForm::Environment(self)
+    }
+
+    /// Returns the error of reading the image, if there was one.
+    fn faults(&self) -> Vec<ValidationError> {
+        self.file().and_then(|_| self.map.fault()).into_iter().collect()
+    }
+
+    fn handles(&mut self) -> Handles<'_> {
+        Handles::default()
+    }
+
+    fn placed(_: &Placement) -> Self {
+        Self::default()
     }
 }
 
@@ -103,7 +117,7 @@ impl EnvironmentLight {
     /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
     /// its image is not loaded.
     pub fn new(light: &Light) -> Option<Self> {
-        let environment = light.environment.as_ref()?;
+        let environment = light.environment()?;
         let map = match environment.file() {
             Some(_) => environment.map()?.clone(),
             None => Arc::new(environment.gradient()),
@@ -180,8 +194,7 @@ mod tests {
     use crate::lanes::Double;
 
     fn light(environment: Environment) -> EnvironmentLight {
-        let light = Light { environment: Some(environment), ..Light::default() };
-        EnvironmentLight::new(&light).expect("an environment")
+        EnvironmentLight::new(&Light::new(environment)).expect("an environment")
     }
 
     fn radiance(light: &EnvironmentLight, direction: [f64; 3]) -> [f64; 3] {

@@ -7,10 +7,10 @@
 //! the surface. It therefore suffices for rays at any angle.
 
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3};
-use crate::light::EmitterSample;
 use crate::light::emitter::{
     Cone, MIN_SOLID_ANGLE, SphericalRectangle, density_of_area, local_of, towards,
 };
+use crate::light::{EmissiveSurface, EmitterSample};
 use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -19,31 +19,6 @@ use std::f64::consts::PI;
 /// in proportion to its solid angle. For this choice, the solid angles of all triangles are
 /// computed for each receiver.
 const MAX_FACES: usize = 32;
-
-/// Surface of an emissive object from which light can be sampled.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ObjectSurface {
-    /// Light-emitting sphere.
-    Sphere {
-        /// Centre of the sphere, relative to the scene's centre.
-        center: DVec3,
-        /// Radius of the sphere.
-        radius: f64,
-    },
-    /// Light-emitting rectangle.
-    Rectangle {
-        /// Centre of the rectangle, relative to the scene's centre.
-        center: DVec3,
-        /// Unit vectors across and up the rectangle, and along the normal of its front.
-        axes: [DVec3; 3],
-        /// Width and height of the rectangle.
-        size: [f64; 2],
-    },
-    /// Triangles with areas greater than 0, counter-clockwise as seen from the front.
-    Triangles(Vec<[DVec3; 3]>),
-    /// Triangles that enclose a convex solid, counter-clockwise as seen from outside.
-    ConvexTriangles(Vec<[DVec3; 3]>),
-}
 
 /// Emissive object, compiled as a light. All results are for white light of radiance 1; callers
 /// multiply them by the emission.
@@ -106,16 +81,16 @@ impl<S: Float> ObjectEmitter<S> {
     /// of the surface's size are reduced to this limit. The size is the radius of a sphere, the
     /// shorter side of a rectangle, or the square root of the total area of triangles. Returns
     /// `None` if the surface has no area.
-    pub fn new(surface: &ObjectSurface, two_sided: bool, lift: f64) -> Option<Self> {
+    pub fn new(surface: &EmissiveSurface, two_sided: bool, lift: f64) -> Option<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let (compiled, center, radius, area, size);
         match surface {
-            ObjectSurface::Sphere { center: middle, radius: r } => {
+            EmissiveSurface::Sphere { center: middle, radius: r } => {
                 (center, radius, area, size) = (*middle, *r, 4.0 * PI * r * r, *r);
                 compiled =
                     CompiledSurface::Sphere { center: vector(*middle), radius: S::from_f64(*r) };
             }
-            ObjectSurface::Rectangle { center: middle, axes, size: [width, height] } => {
+            EmissiveSurface::Rectangle { center: middle, axes, size: [width, height] } => {
                 (center, radius) = (*middle, 0.5 * width.hypot(*height));
                 (area, size) = (width * height, width.min(*height));
                 compiled = CompiledSurface::Rectangle {
@@ -124,7 +99,8 @@ impl<S: Float> ObjectEmitter<S> {
                     size: [*width, *height].map(S::from_f64),
                 };
             }
-            ObjectSurface::Triangles(triangles) | ObjectSurface::ConvexTriangles(triangles) => {
+            EmissiveSurface::Disk { .. } => return None,
+            EmissiveSurface::Triangles(triangles) | EmissiveSurface::ConvexTriangles(triangles) => {
                 let corners = || triangles.iter().flatten().copied();
                 let low = corners().fold(DVec3::INFINITY, DVec3::min);
                 let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -149,7 +125,7 @@ impl<S: Float> ObjectEmitter<S> {
                     }
                 };
                 let triangles: Vec<_> = triangles.iter().zip(areas()).map(compile).collect();
-                let convex = matches!(surface, ObjectSurface::ConvexTriangles(_));
+                let convex = matches!(surface, EmissiveSurface::ConvexTriangles(_));
                 compiled = if triangles.len() <= MAX_FACES {
                     CompiledSurface::Faces { triangles, convex }
                 } else {
@@ -529,7 +505,7 @@ mod tests {
 
     /// Returns one light-emitting surface of every kind. The points of [`points`] are in front of,
     /// behind, beside and inside of these surfaces.
-    fn surfaces() -> Vec<ObjectSurface> {
+    fn surfaces() -> Vec<EmissiveSurface> {
         let tetrahedron = [
             DVec3::new(0.0, 0.0, 0.0),
             DVec3::new(1.0, 0.1, 0.0),
@@ -539,11 +515,11 @@ mod tests {
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let [x, y, z] = DVec3::AXES;
         vec![
-            ObjectSurface::Sphere { center: DVec3::ZERO, radius: 0.6 },
-            ObjectSurface::Rectangle { center: DVec3::ZERO, axes: [x, y, z], size: [1.0, 0.4] },
-            ObjectSurface::Triangles(vec![[x, y, -x - y]]),
-            ObjectSurface::ConvexTriangles(faces.map(|face| face.map(|i| tetrahedron[i])).into()),
-            ObjectSurface::Triangles(grid()),
+            EmissiveSurface::Sphere { center: DVec3::ZERO, radius: 0.6 },
+            EmissiveSurface::Rectangle { center: DVec3::ZERO, axes: [x, y, z], size: [1.0, 0.4] },
+            EmissiveSurface::Triangles(vec![[x, y, -x - y]]),
+            EmissiveSurface::ConvexTriangles(faces.map(|face| face.map(|i| tetrahedron[i])).into()),
+            EmissiveSurface::Triangles(grid()),
         ]
     }
 
@@ -612,8 +588,8 @@ mod tests {
     fn samples_of_triangles_cover_their_solid_angle() {
         for surface in surfaces() {
             let (triangles, convex) = match &surface {
-                ObjectSurface::Triangles(triangles) => (triangles, false),
-                ObjectSurface::ConvexTriangles(triangles) => (triangles, true),
+                EmissiveSurface::Triangles(triangles) => (triangles, false),
+                EmissiveSurface::ConvexTriangles(triangles) => (triangles, true),
                 _ => continue,
             };
             let emitter = ObjectEmitter::<f64>::new(&surface, true, LIFT).unwrap();
@@ -660,8 +636,10 @@ mod tests {
 
     #[test]
     fn surfaces_without_area_are_no_emitters() {
-        let point = ObjectSurface::Triangles(vec![[DVec3::X; 3]]);
+        let point = EmissiveSurface::Triangles(vec![[DVec3::X; 3]]);
         assert!(ObjectEmitter::<f32>::new(&point, true, LIFT).is_none());
-        assert!(ObjectEmitter::<f32>::new(&ObjectSurface::Triangles(vec![]), true, LIFT).is_none());
+        assert!(
+            ObjectEmitter::<f32>::new(&EmissiveSurface::Triangles(vec![]), true, LIFT).is_none()
+        );
     }
 }

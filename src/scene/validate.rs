@@ -1,5 +1,6 @@
 //! Semantic validation of a scene: values out of range, names that are undefined or not unique.
 
+use crate::light::Light;
 use crate::material::Mapping;
 use crate::scene::Scene;
 use crate::scene::diagnostic::MAX_REPORTED;
@@ -110,7 +111,7 @@ impl Scene {
         for object in &mut self.objects {
             object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }
-        for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
+        for environment in self.lights.iter_mut().filter_map(Light::environment_mut) {
             environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
         }
         for material in self.materials.values_mut() {

@@ -3,7 +3,7 @@
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
+use crate::light::{DeltaLight, EmissiveSurface, Emitter, EnvironmentLight, Light};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -207,7 +207,7 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
     let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
     let max_lift = MAX_LIFT * surface.thickness();
     // A sphere touches a flat surface at a single point, which is too small to see.
-    if matches!(surface, EmitterSurface::Sphere(_)) {
+    if matches!(surface, EmissiveSurface::Sphere { .. }) {
         return lift.min(max_lift);
     }
     let lift_on = |form: &Form| {
@@ -271,7 +271,7 @@ impl<S: Float> CompiledLights<S> {
         let delta_light = |light: &Light| {
             let delta = DeltaLight::new(light, geometry.origin)?;
             let on_surface = light.apex().and_then(|position| {
-                let position = DVec3::from(position) - geometry.origin;
+                let position = position - geometry.origin;
                 OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
             });
             Some(ShadowRayTarget { light: delta, on_surface })

@@ -17,7 +17,7 @@
 
 use crate::bvh::morton_code;
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
-use crate::light::{DeltaLight, Light, SpotCone, spot_factor};
+use crate::light::{DeltaLight, Light, LightForm, SpotCone, spot_factor};
 use crate::primitive::BoundingSphere;
 use crate::value::sort_by_number;
 use crate::world::world::DeltaSource;
@@ -324,9 +324,12 @@ impl ManyLights {
     pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
         let (mut points, mut spots) = (0, 0.0);
         for light in lights {
-            points += usize::from(light.point.is_some());
-            if let Some(spot) = &light.spot {
-                spots += share(1.0 - spot.outer_angle.to_radians().cos());
+            match light.form() {
+                LightForm::Point { cone: None, .. } => points += 1,
+                LightForm::Point { cone: Some(spot), .. } => {
+                    spots += share(1.0 - spot.outer_angle.to_radians().cos());
+                }
+                LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => {}
             }
         }
         Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
@@ -334,7 +337,11 @@ impl ManyLights {
 
     /// Returns `true` if the scene has many lights of the kind of `light`.
     pub fn includes(&self, light: &Light) -> bool {
-        self.points && light.point.is_some() || self.spots && light.spot.is_some()
+        match light.form() {
+            LightForm::Point { cone: None, .. } => self.points,
+            LightForm::Point { cone: Some(_), .. } => self.spots,
+            LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => false,
+        }
     }
 }
 

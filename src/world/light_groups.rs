@@ -288,8 +288,7 @@ pub(super) fn emits(light: &Light) -> bool {
 /// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
 /// or the camera sees it. `lit` is `true` if some surface reflects direct light.
 pub(super) fn contributes(light: &Light, lit: bool) -> bool {
-    let has_radiance = light.surface().is_some() || light.environment.is_some();
-    emits(light) && (lit || light.visible && has_radiance)
+    emits(light) && (lit || light.visible && light.has_radiance())
 }
 
 #[cfg(test)]
@@ -316,6 +315,10 @@ mod tests {
 
     fn scene(text: &str) -> Scene {
         Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn move_right(light: &mut Light) {
+        light.position_mut().unwrap()[0] = 5.0;
     }
 
     fn can_reuse(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
@@ -347,12 +350,12 @@ mod tests {
         }));
         // Lights that do not emit may move or be absent.
         assert!(reusable(|s| s.lights[1].intensity = 9.0));
-        assert!(reusable(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(reusable(|s| move_right(&mut s.lights[1])));
         assert!(reusable(|s| s.lights.truncate(s.lights.len() - 1)));
         assert!(reusable(|s| s.lights.clear()));
         assert!(reusable(|s| {
             s.lights[0].on = false;
-            s.lights[0].point.as_mut().unwrap().position[0] = 5.0;
+            move_right(&mut s.lights[0]);
         }));
     }
 
@@ -363,7 +366,7 @@ mod tests {
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         assert!(!reusable(|s| s.lights[1].on = true));
         assert!(!reusable(|s| s.background.color = Color::WHITE));
-        assert!(!reusable(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(!reusable(|s| move_right(&mut s.lights[0])));
         assert!(!reusable(|s| s.lights[0].falloff = crate::light::Falloff::InverseSquare));
         assert!(!reusable(|s| s.lights.push(s.lights[0].clone())));
         assert!(!reusable(|s| s.camera.eye[0] += 0.5));

@@ -9,7 +9,7 @@
 //! `tests/extremes/precision.rs` measures the errors of single precision at each ratio.
 
 use crate::camera::PerspectiveCamera;
-use crate::light::EmitterSurface;
+use crate::light::EmissiveSurface;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
 use crate::value::{sort_by_number, total_order};
@@ -76,12 +76,12 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let lights = || scene.lights.iter().filter(|light| light.on);
     let lamps = lights().filter_map(|light| light.apex());
-    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp) - origin));
+    let mut distances = lamps.map(|lamp| clearance(forms, lamp - origin));
     if distances.any(|distance| extent > MAX_EXTENT_PER_LIGHT_DISTANCE * distance) {
         return false;
     }
     let mut surfaces = lights().filter_map(|light| light.surface());
-    let is_fine = |surface: EmitterSurface| {
+    let is_fine = |surface: EmissiveSurface| {
         // Rounding of the coordinates may displace a part of the surface, so the largest coordinate
         // of the surface counts as well.
         let largest = (surface.center() - origin).abs().max_element() + surface.radius();

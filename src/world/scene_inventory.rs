@@ -2,6 +2,7 @@
 //! and kinds of materials, for the user.
 
 use crate::lanes::SimdFloat;
+use crate::light::KIND_KEYS;
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel, Transmission};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -55,12 +56,12 @@ pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     };
     let light_count = |kind: &str| {
         let is_kind = |source: &&LightGroupSource| match source {
-            LightGroupSource::Light(i) => scene.lights[*i].kinds() == [kind],
+            LightGroupSource::Light(i) => scene.lights[*i].kind.key() == kind,
             _ => false,
         };
         groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
     };
-    for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"] {
+    for kind in KIND_KEYS {
         parts.extend(counted(light_count(kind), &format!("{kind} light")));
     }
     parts.extend(present([(world.light_choice.is_some(), "choice of lights")]));

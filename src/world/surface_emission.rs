@@ -14,7 +14,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
-use crate::light::{ObjectEmitter, ObjectSurface};
+use crate::light::{EmissiveSurface, ObjectEmitter};
 use crate::material::Material;
 use crate::primitive::{
     Aggregate, CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
@@ -253,35 +253,35 @@ pub(super) fn is_sampled(form: &Form) -> bool {
 
 /// Returns the surface of an object from which light is sampled, or `None` if its points cannot be
 /// sampled.
-fn surface_of(form: &Form) -> Option<ObjectSurface> {
+fn surface_of(form: &Form) -> Option<EmissiveSurface> {
     if !is_sampled(form) {
         return None;
     }
     match form {
         Form::Sphere(sphere) => {
-            Some(ObjectSurface::Sphere { center: sphere.center, radius: sphere.radius })
+            Some(EmissiveSurface::Sphere { center: sphere.center, radius: sphere.radius })
         }
         Form::Parallelogram(form) => Some(surface_of_parallelogram(form)),
         Form::ConvexPolyhedron(form) => {
-            Some(ObjectSurface::ConvexTriangles(triangles_of_polyhedron(form)))
+            Some(EmissiveSurface::ConvexTriangles(triangles_of_polyhedron(form)))
         }
-        Form::Mesh(form) => Some(ObjectSurface::Triangles(triangles_of_mesh(form, 1).collect())),
+        Form::Mesh(form) => Some(EmissiveSurface::Triangles(triangles_of_mesh(form, 1).collect())),
         _ => None,
     }
 }
 
-fn surface_of_parallelogram(form: &ParallelogramForm) -> ObjectSurface {
+fn surface_of_parallelogram(form: &ParallelogramForm) -> EmissiveSurface {
     let ParallelogramForm { corner, u, v } = *form;
     let size = [u.length(), v.length()];
     let far = corner + u + v;
     if u.dot(v).abs() > 1e-12 * size[0] * size[1] {
-        return ObjectSurface::Triangles(vec![
+        return EmissiveSurface::Triangles(vec![
             [corner, corner + u, far],
             [corner, far, corner + v],
         ]);
     }
     let (right, up) = (u / size[0], v / size[1]);
-    ObjectSurface::Rectangle {
+    EmissiveSurface::Rectangle {
         center: 0.5 * (corner + far),
         axes: [right, up, right.cross(up)],
         size,

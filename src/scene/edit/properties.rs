@@ -89,15 +89,13 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         Target::Camera | Target::View(_) => Some(&AIM),
         _ => None,
     };
-    let has_size = match subject {
-        Target::Light(i) => scene.lights.get(*i).is_some_and(|light| light.surface().is_some()),
-        _ => true,
+    let light = match subject {
+        Target::Light(i) => scene.lights.get(*i),
+        _ => None,
     };
+    let hidden_key = |name: &str| light.is_some_and(|light| !light.has_key(name));
     for field in fields(subject) {
-        let is_environment = values.contains_key("environment");
-        if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
-            // Only lights with a size have the key `unit`. Only these lights and environments have
-            // the key `visible`.
+        if hidden_key(field.name) {
             continue;
         }
         if let Some(kind) = virtual_kind

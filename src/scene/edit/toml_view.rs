@@ -1,6 +1,7 @@
 //! Conversion of an edit target (a light, an object, the film and so on) to a TOML table of its
 //! values, and back. Only the target is serialised, never the whole scene.
 
+use crate::light::Light;
 use crate::scene::Scene;
 use crate::scene::edit::{EditError, Target};
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
@@ -27,7 +28,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
-        Target::Light(_) => crate::light::KINDS,
+        Target::Light(_) => light::KIND_KEYS,
         Target::Material(_) => &["f0", "metal"],
         _ => &[],
     }
@@ -69,8 +70,8 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
         Target::Background => fill(Some(&mut next.background), values)?,
         Target::Light(i) => {
             fill(next.lights.get_mut(*i), values)?;
-            let environment = next.lights.get_mut(*i).and_then(|light| light.environment.as_mut());
-            let old = scene.lights.get(*i).and_then(|light| light.environment.as_ref());
+            let environment = next.lights.get_mut(*i).and_then(Light::environment_mut);
+            let old = scene.lights.get(*i).and_then(Light::environment);
             if let (Some(new), Some(old)) = (environment, old) {
                 new.resolve_as(old);
             }
