@@ -51,7 +51,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
         }
         if let DeltaLight::Point { cone: Some(_), .. } = target.light {
-            lit = lit & light.irradiance.gt(L::zero());
+            lit = lit & light.irradiance.x.gt(L::zero());
         }
         if lit.none() {
             continue;
@@ -83,7 +83,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             let highlight = bsdf.highlight(interaction.normal, view, light.wi, cos_light, cos_view);
             value += highlight.masked(lanes);
         }
-        let mut value = path.throughput.component_mul(value) * light.irradiance;
+        let mut value = path.throughput.component_mul(value).component_mul(light.irradiance);
         if let Some(left) = media.and_then(|media| media.transmittance(light.distance)) {
             value = value.component_mul(left);
         }

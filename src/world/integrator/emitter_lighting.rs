@@ -13,7 +13,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
-use crate::light::EmitterSample;
+use crate::light::LightSample;
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -138,7 +138,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
         let numbers = sampler.light_2d(bounce, index as u32);
         let Some(source) = sample_emitter(world, index, origin, numbers) else { break };
         let light = &source.light;
-        let arrives = light.irradiance.gt(L::zero());
+        let arrives = light.irradiance.x.gt(L::zero());
         let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
         let cos_light = interaction.normal.dot(light.wi);
         let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
@@ -180,7 +180,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
                 continue;
             }
         }
-        let mut radiance = path.throughput.component_mul(value) * light.irradiance;
+        let mut radiance = path.throughput.component_mul(value).component_mul(light.irradiance);
         if let Some(left) = media.and_then(|media| media.transmittance(light.distance)) {
             radiance = radiance.component_mul(left);
         }
@@ -198,7 +198,7 @@ pub(crate) fn sample_emitter<L: SimdFloat>(
     index: usize,
     origin: Vec3<L>,
     numbers: (L, L),
-) -> Option<LightSource<EmitterSample<L>, L::Scalar>> {
+) -> Option<LightSource<LightSample<L>, L::Scalar>> {
     match world.emitters.get(index) {
         Some(source) => Some(source.with_light(source.light.sample(origin, numbers))),
         None => {

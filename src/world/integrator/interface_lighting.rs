@@ -163,10 +163,9 @@ pub(crate) fn interface_lighting<L: SimdFloat>(
                 continue;
             }
             let light = &source.light;
-            let irradiance = Vec3::new(light.irradiance, light.irradiance, light.irradiance);
             let ray = (light.wi, light.distance);
             let object = (index as usize).checked_sub(world.emitters.len());
-            if let Some(radiance) = lit_radiance(ray, (irradiance, light.density), object) {
+            if let Some(radiance) = lit_radiance(ray, (light.irradiance, light.density), object) {
                 out.groups[source.group] += source.emitted(radiance);
             }
         }
