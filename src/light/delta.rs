@@ -3,7 +3,7 @@
 //! samples.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::light::{Falloff, Light, LightForm, SpotCone};
+use crate::light::{LightSample, SpotCone};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -29,34 +29,7 @@ pub enum DeltaLight<S> {
     },
 }
 
-/// Light that arrives at surface points from a light of unit strength, one point per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSample<L> {
-    /// Unit vector from the surface point towards the light.
-    pub wi: Vec3<L>,
-    /// Distance from the surface point to the light; the largest finite number for a directional
-    /// light.
-    pub distance: L,
-    /// Irradiance that the light, with unit strength, causes on a surface that faces it.
-    pub irradiance: L,
-}
-
 impl<S: Float> DeltaLight<S> {
-    /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
-    /// if `light` has a size or is an environment.
-    pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
-        let vector = |v: DVec3| v.to_array().map(S::from_f64);
-        match light.form() {
-            LightForm::Point { position, cone } => Some(Self::Point {
-                position: vector(position - origin),
-                inverse_square: light.falloff == Falloff::InverseSquare,
-                cone: cone.map(SpotCone::new),
-            }),
-            LightForm::Distant { wi } => Some(Self::Directional { wi: vector(wi) }),
-            LightForm::Surface(_) | LightForm::Environment(_) => None,
-        }
-    }
-
     /// Returns the position of the light relative to the scene's centre; `None` for a directional
     /// light.
     pub fn position(&self) -> Option<DVec3> {
@@ -74,12 +47,8 @@ impl<S: Float> DeltaLight<S> {
     /// Returns the light that arrives at `point` if nothing occludes it.
     #[inline(always)]
     pub fn sample_li<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
-        match self {
-            Self::Directional { wi } => LightSample {
-                wi: Vec3::splat(*wi),
-                distance: L::from_f64(L::MAX),
-                irradiance: L::from_f64(PI),
-            },
+        let (wi, distance, irradiance) = match self {
+            Self::Directional { wi } => (Vec3::splat(*wi), L::from_f64(L::MAX), L::from_f64(PI)),
             Self::Point { position, inverse_square, cone } => {
                 let to_light = Vec3::splat(*position) - point;
                 let distance = to_light.length_squared().sqrt();
@@ -94,9 +63,11 @@ impl<S: Float> DeltaLight<S> {
                 if let Some(cone) = cone {
                     irradiance *= cone.factor(wi);
                 }
-                LightSample { wi, distance, irradiance }
+                (wi, distance, irradiance)
             }
-        }
+        };
+        let irradiance = Vec3::gray(irradiance);
+        LightSample { wi, distance, irradiance, density: L::from_f64(L::MAX) }
     }
 
     /// Returns the irradiance that the light, with unit strength, causes at normal incidence at the

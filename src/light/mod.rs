@@ -1,28 +1,32 @@
 //! Lights: their descriptions, one kind a file, and the compiled forms that kernels sample.
 
+mod compiled;
 mod delta;
 mod directional;
 mod disk;
 mod emitter;
 mod environment;
 mod form;
-mod object_emitter;
 mod point;
 mod rectangle;
 mod registry;
+mod sample;
+mod solid_angle;
 mod sphere;
 mod spot;
+mod triangles;
 
-pub use delta::{DeltaLight, LightSample};
+pub use compiled::CompiledLight;
+pub use delta::DeltaLight;
 pub use directional::Directional;
 pub use disk::DiskLight;
-pub use emitter::{Emitter, EmitterSample};
-pub use environment::{Environment, EnvironmentLight, EnvironmentSample};
+pub use emitter::Emitter;
+pub use environment::{Environment, EnvironmentLight};
 pub use form::{EmissiveSurface, LightForm};
-pub use object_emitter::ObjectEmitter;
 pub use point::Point;
 pub use rectangle::RectangleLight;
 pub use registry::{Handles, KIND_KEYS, KINDS, LightDesc, LightKind, Placement, check_kinds};
+pub use sample::LightSample;
 pub use sphere::SphereLight;
 pub use spot::{Spot, SpotCone, spot_factor};
 

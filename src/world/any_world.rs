@@ -2,11 +2,11 @@
 
 use crate::lanes::{Double, SimdFloat, Single};
 use crate::scene::Scene;
+use crate::world::analysis::precision;
 use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::first_hit::FirstHit;
-use crate::world::light_choice::LightChoice;
-use crate::world::light_groups::LightGroups;
-use crate::world::precision;
+use crate::world::lights::choice::LightChoice;
+use crate::world::lights::groups::LightGroups;
 use crate::world::world::World;
 
 /// Floating-point precision in which a scene is rendered.

@@ -1,24 +1,20 @@
 //! `World`: a compiled scene, as the integrators read it.
 
 use crate::camera::PerspectiveCamera;
-use crate::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use crate::light::{DeltaLight, Emitter, EnvironmentLight};
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::light::{DeltaLight, EnvironmentLight};
 use crate::material::Bsdf;
 use crate::primitive::Aggregate;
-use crate::sampling::{CameraDimensions, PacketSampler, SampleSettings};
+use crate::sampling::{CameraDimensions, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
-use crate::world::integrator::first_hit::{self, FirstHit};
-use crate::world::integrator::indirect_diffuse::{DiffuseLimits, trace_generations};
+use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
-use crate::world::integrator::opaque::trace_opaque;
-use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::surface_textures::SurfaceTextures;
-use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
-use crate::world::light_choice::LightChoice;
-use crate::world::light_groups::LightGroups;
-use crate::world::lights_on_surfaces::OnSurface;
-use crate::world::surface_emission::SurfaceEmission;
+use crate::world::lights::choice::LightChoice;
+use crate::world::lights::emitters::Emitters;
+use crate::world::lights::groups::LightGroups;
+use crate::world::lights::on_surfaces::OnSurface;
 use crate::world::tile_tracer::CameraTracer;
 
 /// Compiled light of type `T`, with its light group. `S` is the scalar type.
@@ -65,9 +61,6 @@ pub(super) struct ShadowRayTarget<S> {
 /// A light without a size, with its light group.
 pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
 
-/// A light with a size, with its light group.
-pub(super) type EmitterSource<S> = LightSource<Emitter<S>, S>;
-
 /// An environment light, with its light group.
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 
@@ -86,12 +79,10 @@ pub struct World<L: SimdFloat> {
     /// Point and spot lights of which paths choose a few at each hit; `sources` holds the other
     /// lights without a size. `None` if shadow rays go to all lights.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
-    /// Lights with a size, and their light groups.
-    pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
+    /// Lights with a size and emissive objects.
+    pub(super) emitters: Emitters<L::Scalar>,
     /// Environment lights, and their light groups.
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
-    /// Emission of objects with an emissive material.
-    pub(super) emission: SurfaceEmission<L::Scalar>,
     /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Index of the light group of the background. `None` if the background is black.
@@ -196,13 +187,13 @@ impl<L: SimdFloat> World<L> {
     /// choose) in the lists of possible occluders.
     #[inline(always)]
     pub(super) fn first_stratum(&self) -> usize {
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
+        self.sources.len() + self.emitters.sampled()
     }
 
     /// Returns `true` if the world has lights with a size, environment lights or emissive objects.
     #[inline(always)]
     pub(super) fn has_emitters(&self) -> bool {
-        !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
+        !self.emitters.is_empty() || !self.environments.is_empty()
     }
 
     /// Returns `true` if all samples of a tile with these candidate primitives are black: its
@@ -210,64 +201,14 @@ impl<L: SimdFloat> World<L> {
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()
-            && !self.emitters.iter().any(|source| source.visible)
+            && self.emitters.visible_lights().next().is_none()
             && !self.environments.iter().any(|source| source.visible)
     }
 
-    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside of `active`
-    /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
-    /// their hit points are tested against; `None` means all primitives.
+    /// Returns the lanes whose paths continue with `throughput`.
     #[inline(always)]
-    pub fn trace(
-        &self,
-        path: &mut Path<L>,
-        candidates: Option<&TileCandidates>,
-        sampler: &PacketSampler<'_, L>,
-        active: L::Mask,
-        out: &mut Radiance<L>,
-    ) -> Counts {
-        for group in &mut out.groups[..self.groups()] {
-            *group = Vec3::zero();
-        }
-        let candidates = candidates.unwrap_or(&self.all_candidates);
-        if let Some(limits) = self.diffuse_limits {
-            return trace_generations(self, limits, path.ray, candidates, sampler, active, out);
-        }
-        if let Some(nested_dielectrics) = &self.nested_dielectrics {
-            let mut start = Branch::camera(path.ray, active);
-            nested_dielectrics.add_at_start(&path.ray, &mut start.media);
-            TransmissionIntegrator { world: self, nested_dielectrics, sampler }
-                .trace(&mut start, self.depth, candidates, None, out)
-        } else {
-            let trace = match (self.simple, !self.has_emitters()) {
-                (true, true) => trace_opaque::<_, true, false>,
-                (false, true) => trace_opaque::<_, false, false>,
-                (_, false) => trace_opaque::<_, false, true>,
-            };
-            trace(self, (path, active, self.depth), candidates, sampler, None, out)
-        }
-    }
-
-    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a position in the picture: a column and a row in pixels, with
-    /// fractions.
-    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
-        first_hit::trace_first_hits(self, points, hits);
+    pub(super) fn reaches_min_weight(&self, throughput: Vec3<L>) -> L::Mask {
+        let max_throughput = throughput.max_element();
+        max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(self.min_weight))
     }
 }
-
-/// Type of [`World::trace`] for the SIMD type `L`.
-type Trace<L> = fn(
-    &World<L>,
-    &mut Path<L>,
-    Option<&TileCandidates>,
-    &PacketSampler<'_, L>,
-    <L as SimdFloat>::Mask,
-    &mut Radiance<L>,
-) -> Counts;
-
-/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate
-/// the machine code of the kernels in this crate, so that other crates call it instead of
-/// generating their own.
-#[doc(hidden)]
-pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

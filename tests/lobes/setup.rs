@@ -5,7 +5,7 @@ use zerkalo::lanes::{Float, SimdFloat, Vec3};
 use zerkalo::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
 use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
+use zerkalo::world::{Path, Radiance, World};
 
 pub type Vector = [f64; 3];
 
@@ -234,7 +234,7 @@ pub fn trace<L: SimdFloat>(
     let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
     let (origin, direction) = world.camera().rays(corner, jitter);
     let mut path = Path::new(Ray { origin, direction });
-    let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+    let mut radiance = Radiance::black();
     world.trace(&mut path, None, &draws, active, &mut radiance);
     let groups = &radiance.groups[..world.groups()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();

@@ -10,14 +10,13 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::light::LightSample;
 use crate::material::{InterfaceMedia, ReflectionLobe};
-use crate::sampling::PacketSampler;
-use crate::world::integrator::emitter_lighting::{power_heuristic, sample_emitter};
-use crate::world::integrator::environment_lighting::ENVIRONMENT_SALT;
+use crate::world::integrator::emitter_lighting::power_heuristic;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics};
-use crate::world::integrator::path::{Counts, Path, Radiance};
-use crate::world::world::World;
+use crate::world::integrator::vertex::Vertex;
+use crate::world::world::{LightSource, World};
 
 /// Hits of a packet on rough interfaces between transparent media.
 pub(crate) struct RoughInterface<'a, L: SimdFloat> {
@@ -28,6 +27,17 @@ pub(crate) struct RoughInterface<'a, L: SimdFloat> {
     /// Lanes whose transmitted light is found by two strategies: samples of emitter points and
     /// samples of ray directions, both with finite densities.
     pub transmitting: L::Mask,
+}
+
+/// Side of an interface from which light arrives.
+struct Side<'a, L: SimdFloat> {
+    /// `true` for the side of the transmitted rays, `false` for that of the reflected rays.
+    behind: bool,
+    /// Lanes for which points of emitters are sampled on this side.
+    lanes: L::Mask,
+    /// Origins of the shadow rays.
+    origin: Vec3<L>,
+    media: Media<'a, L>,
 }
 
 impl<'a, L: SimdFloat> RoughInterface<'a, L> {
@@ -104,81 +114,84 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
     }
 }
 
-/// Adds to `out` the radiance that rough interfaces reflect and transmit in the light of all
-/// visible emitters and environments. `bounce` is the number of earlier surfaces of the path.
-#[inline(never)]
-pub(crate) fn interface_lighting<L: SimdFloat>(
-    world: &World<L>,
-    path: &Path<L>,
-    interaction: &SurfaceInteraction<L>,
-    (rough, nested_dielectrics): (&RoughInterface<'_, L>, &NestedDielectrics<L>),
-    (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    (out, counts): (&mut Radiance<L>, &mut Counts),
-) {
-    let hit = rough.hit;
-    let sides = [
-        (false, rough.reflecting, interaction.ray_origin(), &hit.medium_reflected),
-        (true, rough.transmitting, interaction.ray_origin_behind(), &hit.medium_transmitted),
-    ];
-    for (behind, lanes, origin, stack) in sides {
-        if lanes.none() {
-            continue;
-        }
-        counts.glossy = true;
-        let media = Media { nested_dielectrics, stack };
-        // Returns the radiance that reaches the eye from the sampled directions `wi`, in the lanes
-        // whose shadow ray of length `distance` is not occluded. `density` is the density of the
-        // samples. `object` is the index of the emissive object that was sampled, if any.
-        let mut lit_radiance = |(wi, distance): (Vec3<L>, L),
-                                (irradiance, density): (Vec3<L>, L),
-                                object: Option<usize>| {
-            let height = wi.dot(interaction.geometric);
-            let is_behind = height.lt(L::zero());
-            let arrives = if behind { is_behind } else { height.gt(L::zero()) };
-            let (value, pdf) = rough.evaluate(world, &path.ray.direction, interaction, &wi, behind);
-            let value = value.component_mul(irradiance) * power_heuristic(density, pdf);
-            let mut lit = lanes & arrives & value.max_element().gt(L::zero());
-            if lit.none() {
-                return None;
-            }
-            counts.rays += u64::from(lit.bits().count_ones());
-            let ray = Ray { origin, direction: wi };
-            lit = lit.and_not(world.geometry.occluded(&ray, distance, lit, world.geometry.all()));
-            if let Some(object) = object {
-                let shadow_ray = (&ray, distance);
-                lit = lit.and_not(world.emission.covered(object, &world.geometry, shadow_ray, lit));
-            }
-            let mut radiance = path.throughput.component_mul(value);
-            if let Some(left) = media.transmittance(distance) {
-                radiance = radiance.component_mul(left);
-            }
-            Some(radiance.masked(lit))
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Adds the light of all visible emitters and environments that rough interfaces reflect and
+    /// transmit.
+    #[inline(never)]
+    pub fn interface_lighting(
+        &mut self,
+        rough: &RoughInterface<'_, L>,
+        nested_dielectrics: &NestedDielectrics<L>,
+    ) {
+        let (interaction, hit) = (self.interaction, rough.hit);
+        let reflected = Side {
+            behind: false,
+            lanes: rough.reflecting,
+            origin: interaction.ray_origin(),
+            media: Media { nested_dielectrics, stack: &hit.medium_reflected },
         };
-        for index in 0.. {
-            let numbers = sampler.light_2d(bounce, index);
-            let Some(source) = sample_emitter(world, index as usize, origin, numbers) else {
-                break;
-            };
-            if !source.visible {
+        let transmitted = Side {
+            behind: true,
+            lanes: rough.transmitting,
+            origin: interaction.ray_origin_behind(),
+            media: Media { nested_dielectrics, stack: &hit.medium_transmitted },
+        };
+        for side in [&reflected, &transmitted] {
+            if side.lanes.none() {
                 continue;
             }
-            let light = &source.light;
-            let irradiance = Vec3::new(light.irradiance, light.irradiance, light.irradiance);
-            let ray = (light.wi, light.distance);
-            let object = (index as usize).checked_sub(world.emitters.len());
-            if let Some(radiance) = lit_radiance(ray, (irradiance, light.density), object) {
-                out.groups[source.group] += source.emitted(radiance);
+            self.out.counts.glossy = true;
+            for index in 0.. {
+                let Some(source) = self.sample_emitter(index, side.origin) else { break };
+                self.add_scattered(rough, side, &source, Some(index));
+            }
+            for index in 0..self.world.environments.len() {
+                let source = self.sample_environment(index, side.lanes);
+                self.add_scattered(rough, side, &source, None);
             }
         }
-        for (index, source) in (0..).zip(&world.environments) {
-            let numbers = sampler.light_2d(bounce, ENVIRONMENT_SALT + 2 * index);
-            let light = source.light.sample(numbers, lanes);
-            let ray = (light.wi, L::from_f64(L::MAX));
-            if source.visible
-                && let Some(radiance) = lit_radiance(ray, (light.irradiance, light.density), None)
-            {
-                out.groups[source.group] += source.emitted(radiance);
-            }
+    }
+
+    /// Adds the light of `source` that rough interfaces scatter from one `side`. `emitter` is the
+    /// number of the emitter on which it was sampled; `None` for environments.
+    #[inline(always)]
+    fn add_scattered(
+        &mut self,
+        rough: &RoughInterface<'_, L>,
+        side: &Side<'_, L>,
+        source: &LightSource<LightSample<L>, L::Scalar>,
+        emitter: Option<usize>,
+    ) {
+        if !source.visible {
+            return;
         }
+        let (world, light) = (self.world, &source.light);
+        let height = light.wi.dot(self.interaction.geometric);
+        let is_behind = height.lt(L::zero());
+        let arrives = if side.behind { is_behind } else { height.gt(L::zero()) };
+        let incident = &self.path.ray.direction;
+        let (value, density) =
+            rough.evaluate(world, incident, self.interaction, &light.wi, side.behind);
+        let weight = power_heuristic(light.density, density);
+        let value = value.component_mul(light.irradiance) * weight;
+        let lit = side.lanes & arrives & value.max_element().gt(L::zero());
+        let occluded = |lit| {
+            let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
+            let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
+            match emitter {
+                Some(index) => {
+                    let lanes = lit.and_not(occluded);
+                    occluded | world.emitter_covered(index, &ray, t_max, lanes)
+                }
+                None => occluded,
+            }
+        };
+        self.add_light(source.group, lit, occluded, |vertex, _| {
+            let radiance = vertex.path.throughput.component_mul(value);
+            source.emitted(match side.media.transmittance(light.distance) {
+                Some(left) => radiance.component_mul(left),
+                None => radiance,
+            })
+        });
     }
 }

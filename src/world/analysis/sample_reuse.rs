@@ -10,7 +10,7 @@ use crate::material::Material;
 use crate::scene::{FilmSettings, Object, Scene};
 use crate::shape::Shape;
 use crate::value::Color;
-use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
+use crate::world::lights::groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {

@@ -27,7 +27,7 @@ use std::f64::consts::PI;
 /// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
 /// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
 /// methods. A spot light counts as a part of a light; see [`ManyLights`].
-pub(super) const MIN_LIGHTS: usize = 16;
+pub(crate) const MIN_LIGHTS: usize = 16;
 
 /// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
 /// path traces shadow rays at one surface.
@@ -88,7 +88,7 @@ struct Cones<S> {
 }
 
 /// Point and spot lights of a scene, of which each path chooses a few at each surface.
-pub(super) struct LightChoice<S> {
+pub(crate) struct LightChoice<S> {
     /// Index of the light group that all lights of this choice share.
     pub group: usize,
     /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
@@ -97,7 +97,7 @@ pub(super) struct LightChoice<S> {
 }
 
 /// For each lane of a packet, the set of lights to which it traces shadow rays.
-pub(super) struct ChosenSets<'a, S> {
+pub(crate) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
     /// Index of the chosen set of lights in each lane.
     sets: [u32; MAX_WIDTH],
@@ -310,7 +310,7 @@ impl<S: Float> ChosenSets<'_, S> {
 /// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
 /// of such a kind share one light group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ManyLights {
+pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.
     points: bool,
     /// `true` if the cones of the scene's spot lights have together at least the solid angle of

@@ -6,14 +6,14 @@ use crate::light::KIND_KEYS;
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel, Transmission};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::integrator::surface_textures::SurfaceTextures;
-use crate::world::light_groups::LightGroupSource;
+use crate::world::lights::groups::LightGroupSource;
 use crate::world::world::World;
 
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
 /// commas, in one line.
-pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
+pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
     let (bsdfs, groups) = (&world.bsdfs, &world.groups.members);
-    let [sampled, unsampled] = world.emission.counts();
+    let (emissive, unsampled) = world.emitters.object_counts();
     let any_specular =
         |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
     let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
@@ -65,7 +65,7 @@ pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         parts.extend(counted(light_count(kind), &format!("{kind} light")));
     }
     parts.extend(present([(world.light_choice.is_some(), "choice of lights")]));
-    parts.extend(counted(sampled + unsampled, "emissive object"));
+    parts.extend(counted(emissive, "emissive object"));
     if unsampled > 0 {
         parts.push(format!("{unsampled} of them without sampled points"));
     }

@@ -13,7 +13,7 @@ use crate::light::EmissiveSurface;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
 use crate::value::{sort_by_number, total_order};
-use crate::world::clearance::clearance;
+use crate::world::analysis::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
@@ -56,7 +56,7 @@ const MOST_PAIRS: usize = 1 << 20;
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
 /// `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude
 /// of a coordinate of the objects and the lens, relative to `origin`.
-pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
+pub(crate) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;

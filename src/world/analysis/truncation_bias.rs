@@ -3,7 +3,7 @@
 
 use crate::material::{Fresnel, Material, Texture};
 use crate::scene::{Object, RayTypes, Scene};
-use crate::world::surface_emission::is_sampled;
+use crate::world::lights::emissive_forms::is_sampled;
 use glam::DVec3;
 
 /// Returns the largest fraction of light that a material reflects and transmits together, over all

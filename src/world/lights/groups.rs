@@ -4,13 +4,13 @@
 //! change without new samples.
 
 use crate::lanes::Float;
-use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
+use crate::light::Light;
 use crate::material::Material;
 use crate::scene::{Object, Scene};
 use crate::value::Color;
-use crate::world::light_choice::ManyLights;
-use crate::world::radiance_range::{RadianceRange, SceneDistances};
-use glam::DVec3;
+use crate::world::analysis::radiance_range::{RadianceRange, SceneDistances};
+use crate::world::lights::choice::ManyLights;
+use std::collections::HashMap;
 
 /// Largest number of light groups for lights and emissive materials. If a scene has more lights and
 /// emissive materials than that, several of them share the last of these groups.
@@ -56,7 +56,7 @@ impl LightGroupSource {
 
     /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
     /// black.
-    pub(super) fn emission(&self, scene: &Scene) -> [f64; 3] {
+    pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
@@ -71,11 +71,11 @@ pub struct LightGroups {
     /// Sources of the light groups, in the order of the film's sums: one source for each group.
     pub members: Vec<LightGroupSource>,
     /// `true` if some surface reflects light that arrives directly from lights.
-    pub(super) lit: bool,
+    pub(crate) lit: bool,
     /// `true` if some surface reflects ambient light.
-    pub(super) ambient: bool,
+    pub(crate) ambient: bool,
     /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
-    pub(super) many: ManyLights,
+    pub(crate) many: ManyLights,
 }
 
 impl LightGroups {
@@ -209,26 +209,14 @@ impl LightGroups {
     }
 
     /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`]. `origin`
-    /// is the point in scene coordinates that becomes the origin of the compiled geometry.
-    /// `emitter` compiles a light with a size; it returns `None` for other lights.
-    pub(super) fn scales<S: Float>(
+    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`].
+    /// `ranges` has that of each light, by its index in the scene, for intensity 1.
+    pub(crate) fn scales<S: Float>(
         &self,
         scene: &Scene,
-        origin: DVec3,
-        emitter: impl Fn(&Light) -> Option<Emitter<S>>,
+        ranges: &HashMap<usize, RadianceRange>,
         distances: &SceneDistances,
     ) -> Vec<f64> {
-        let range_of_light = |i: usize| {
-            let light = &scene.lights[i];
-            if let Some(environment) = EnvironmentLight::new(light) {
-                return Some(distances.environment(environment.map(), light.visible));
-            }
-            if let Some(emitter) = emitter(light) {
-                return Some(distances.emitter(&emitter, light.visible));
-            }
-            Some(distances.light(&DeltaLight::<S>::new(light, origin)?))
-        };
         let range_of_material = |name: &str| {
             let has_material = |object: &usize| scene.objects[*object].materials().contains(&name);
             let objects = (0..scene.objects.len()).filter(has_material);
@@ -237,7 +225,7 @@ impl LightGroups {
         let range_of_one = |source: &LightGroupSource| match source {
             LightGroupSource::Ambient => Some(distances.ambient()),
             LightGroupSource::Background => Some(distances.background()),
-            LightGroupSource::Light(i) => range_of_light(*i),
+            LightGroupSource::Light(i) => ranges.get(i).copied(),
             LightGroupSource::Material(name) => range_of_material(name),
             LightGroupSource::Shared(_) => None,
         };
@@ -264,7 +252,7 @@ impl LightGroups {
 }
 
 /// Returns the names of the materials that emit light and are used, in order of first use.
-pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
+pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for name in scene.objects.iter().flat_map(Object::materials) {
         let emits = scene.materials.get(name).is_some_and(Material::emits);
@@ -276,25 +264,25 @@ pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
 }
 
 /// Returns the emission of a light: colour times intensity, black if it is off.
-pub(super) fn emission(light: &Light) -> [f64; 3] {
+pub(crate) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
 /// Returns `true` if the light is on and its emission is not black.
-pub(super) fn emits(light: &Light) -> bool {
+pub(crate) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
 
 /// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
 /// or the camera sees it. `lit` is `true` if some surface reflects direct light.
-pub(super) fn contributes(light: &Light, lit: bool) -> bool {
+pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
     emits(light) && (lit || light.visible && light.has_radiance())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::light_choice::MIN_LIGHTS;
+    use crate::world::lights::choice::MIN_LIGHTS;
 
     const LIGHTS: &str = "
         [ambient]
