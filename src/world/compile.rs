@@ -29,7 +29,7 @@ use std::collections::HashMap;
 
 /// Geometry of all objects in double precision, translated so that the scene's centre is the
 /// origin.
-pub(super) struct RecenteredGeometry {
+pub(crate) struct RecenteredGeometry {
     /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
     pub origin: DVec3,
     /// Geometry of each object in canonical form, with its transform applied.

@@ -177,7 +177,7 @@ fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
 
 /// Distances and reflection factors of a scene without its lights, from which the
 /// [`RadianceRange`] of each light group is computed.
-pub(in crate::world) struct SceneDistances<'a> {
+pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// Factors by which each object reflects direct light, over all its parts. `None` if it
     /// reflects none.
