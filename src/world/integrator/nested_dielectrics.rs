@@ -8,11 +8,12 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
-use crate::material::Bsdf;
+use crate::material::{Bsdf, InterfaceQuery};
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::vertex::Vertex;
 use glam::DVec3;
 
 /// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
@@ -166,6 +167,21 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub medium_reflected: MediumStack<L>,
     /// Media that the transmitted rays are inside of.
     pub medium_transmitted: MediumStack<L>,
+}
+
+impl<L: SimdFloat> InterfaceHit<L> {
+    /// Returns the query of BSDFs at the hit points of `vertex`.
+    #[inline(always)]
+    pub fn query(&self, vertex: &Vertex<'_, L>) -> InterfaceQuery<L> {
+        InterfaceQuery {
+            rays: vertex.query(),
+            n_i: self.n_i,
+            n_t: self.n_t,
+            outer: self.outer,
+            thin: self.thin,
+            reflecting: vertex.interaction.reflecting,
+        }
+    }
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
