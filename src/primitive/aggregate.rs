@@ -7,8 +7,8 @@ use crate::primitive::batch::{
     LabelledBatch, PrimitiveBatch, PrimitiveId, SurfacePoint, UvGradients, compile,
 };
 use crate::primitive::form::Form;
-use crate::primitive::item_box::{Acceleration, ItemBox};
-use crate::primitive::mesh_instance::Meshes;
+use crate::primitive::item_box::ItemBox;
+use crate::primitive::mesh::instance::Meshes;
 use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
@@ -22,6 +22,31 @@ use std::ops::Range;
 /// list of a tile, the BVH is faster from about 50 primitives on for coherent packets, and from
 /// about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
+
+/// Structure that an [`Aggregate`] uses to test rays against fewer primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AccelerationStructure {
+    /// No structure: primitives are tested one by one. The string is the name of such a list in the
+    /// inventory of the scene.
+    List(&'static str),
+    /// Bounding box of each primitive.
+    Boxes {
+        /// `true`: the boxes are in the object space of their primitives. `false`: the boxes are
+        /// axis-aligned in the scene.
+        oriented: bool,
+    },
+    /// BVH over all primitives with finite bounds.
+    Bvh,
+}
+
+impl AccelerationStructure {
+    /// Returns the faster structure by measurement: a BVH if at least [`BVH_MIN_PRIMITIVES`] of the
+    /// primitives have finite bounds, otherwise a list.
+    pub fn fastest(forms: &[Form]) -> Self {
+        let bounded = forms.iter().filter(|form| form.bounds().is_some()).count();
+        if bounded >= BVH_MIN_PRIMITIVES { Self::Bvh } else { Self::List("list") }
+    }
+}
 
 impl PrimitiveSet {
     /// Returns `true` if the set contains no primitive.
@@ -68,32 +93,25 @@ pub struct PrimitiveSet {
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles the canonical forms `forms` to primitives, with a BVH if at least
-    /// [`BVH_MIN_PRIMITIVES`] of them have finite bounds.
+    /// Compiles the canonical forms `forms` to primitives, with the fastest structure.
     pub fn new(forms: &[Form]) -> Self {
-        Self::accelerated(forms, Acceleration::Auto)
+        Self::with_structure(forms, AccelerationStructure::fastest(forms))
     }
 
-    /// Compiles the canonical forms `forms` to primitives. If `tree` is `true`, a BVH holds all
-    /// bounded primitives; otherwise there is no BVH.
+    /// Compiles the canonical forms `forms` to primitives, with or without a BVH.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
-        Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
+        let list = AccelerationStructure::List("list");
+        Self::with_structure(forms, if tree { AccelerationStructure::Bvh } else { list })
     }
 
-    /// Compiles the canonical forms `forms` to primitives with the acceleration structure
-    /// `acceleration`.
-    pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
-        let is_large =
-            || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
-        let tree = match acceleration {
-            Acceleration::Auto => is_large(),
-            Acceleration::Bvh => true,
-            _ => false,
+    /// Compiles the canonical forms `forms` to primitives with the given structure.
+    pub fn with_structure(forms: &[Form], structure: AccelerationStructure) -> Self {
+        let (tree, how_listed) = match structure {
+            AccelerationStructure::Bvh => (true, "list"),
+            AccelerationStructure::List(name) => (false, name),
+            AccelerationStructure::Boxes { oriented: true } => (false, "boxes of their own"),
+            AccelerationStructure::Boxes { oriented: false } => (false, "boxes"),
         };
-        Self::compiled(forms, acceleration, tree)
-    }
-
-    fn compiled(forms: &[Form], acceleration: Acceleration, tree: bool) -> Self {
         let mut out = Self {
             parts: Vec::new(),
             all: PrimitiveSet::default(),
@@ -102,13 +120,6 @@ impl<L: SimdFloat> Aggregate<L> {
             extents: Vec::new(),
             source: Vec::new(),
             counts: Vec::new(),
-        };
-        let how_listed = match acceleration {
-            Acceleration::Auto | Acceleration::Bvh => "list",
-            Acceleration::None => "bare list",
-            Acceleration::ScreenBounds => "screen rectangles",
-            Acceleration::Obb => "boxes of their own",
-            Acceleration::Aabb => "boxes",
         };
         let mut bounds = Vec::new();
         for LabelledBatch { batch, sources, noun, detail, infinite } in compile(forms) {
@@ -136,8 +147,7 @@ impl<L: SimdFloat> Aggregate<L> {
         }
         out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
-        if matches!(acceleration, Acceleration::Obb | Acceleration::Aabb) {
-            let oriented = acceleration == Acceleration::Obb;
+        if let AccelerationStructure::Boxes { oriented } = structure {
             let box_of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], oriented);
             out.extents = out.source.iter().map(box_of).collect();
         }

@@ -8,7 +8,7 @@ use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg::Compounds;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
-use crate::primitive::mesh_instance::Meshes;
+use crate::primitive::mesh::instance::Meshes;
 use crate::primitive::parallelogram::Parallelogram;
 use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;

@@ -4,7 +4,6 @@
 //! Coordinates of a mesh are in single precision for every SIMD type; computation has the precision
 //! of the lanes.
 
-use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
 use crate::primitive::batch::{SurfacePoint, UvGradients};
@@ -14,8 +13,7 @@ use crate::primitive::canonical::{
 use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::item_box::ItemBox;
 use crate::primitive::keep_visible;
-use crate::primitive::triangle_mesh;
-use crate::value::insertion_sort;
+use crate::primitive::mesh::{Mesh, intersection};
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -28,7 +26,7 @@ const EXTENT_PER_DETAIL: f64 = 64.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshForm {
     /// Triangles in the space of the mesh.
-    pub mesh: Arc<asset::Mesh>,
+    pub mesh: Arc<Mesh>,
     /// Map from the space of the mesh to the scene.
     pub scene_from_mesh: DAffine3,
     /// `true` if shading normals are interpolated between vertices.
@@ -150,7 +148,7 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
 }
 
 /// Returns the distance between `point` and the closest triangle of the mesh, in scene units.
-fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
+fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
     // Lower bound of the ratio of a length in the scene to the same length in mesh space.
@@ -187,14 +185,14 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
             }
         }
         // The nearest box is last and popped first.
-        insertion_sort(&mut stack[first..], |(_, distance)| -distance);
+        stack[first..].sort_by(|(_, a), (_, b)| b.total_cmp(a));
     }
     least
 }
 
 /// Mesh placed in the scene, compiled for ray intersection.
 struct MeshInstance<S> {
-    mesh: Arc<asset::Mesh>,
+    mesh: Arc<Mesh>,
     /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
     extent: ItemBox<S>,
     /// Columns of the linear map from scene space to mesh space.
@@ -386,7 +384,7 @@ impl<S: Float> Meshes<S> {
             // The result therefore does not depend on the order of the primitives.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
-            let found = triangle_mesh::closest(&item.mesh, &inner, limit);
+            let found = intersection::closest(&item.mesh, &inner, limit);
             let hit_mask = found.t.lt(limit);
             let before = hit.t;
             hit.keep_closer(hit_mask, found.t / length, tag);
@@ -416,7 +414,7 @@ impl<S: Float> Meshes<S> {
             }
             let (inner, length) = item.ray(ray);
             let limit = L::select(open, limit * length, L::from_f64(-1.0));
-            occluded = occluded | triangle_mesh::occluded(&item.mesh, &inner, limit);
+            occluded = occluded | intersection::occluded(&item.mesh, &inner, limit);
         }
         occluded
     }
