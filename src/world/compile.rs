@@ -363,9 +363,9 @@ impl<S: Float> CompiledCulling<S> {
                     if scene.trace.ray_types >= RayTypes::Shadows {
                         light_buffers = culler.light_buffers(geometry);
                     }
-                    let project = |item: u32| {
-                        let form = form_of(&geometry.sources()[item as usize]);
-                        (item, ScreenBounds::project(form, camera))
+                    let project = |primitive: u32| {
+                        let form = form_of(&geometry.sources()[primitive as usize]);
+                        (primitive, ScreenBounds::project(form, camera))
                     };
                     let bounds = geometry.in_tree().into_iter().map(project);
                     let size = scene.film.size.map(|n| n as usize);

@@ -66,22 +66,25 @@ fn compare_with<L: SimdFloat>(
         for i in 0..lanes {
             let context = || {
                 let (o, d) = (packet.origin.lane(i), packet.direction.lane(i));
-                format!("{} {structure:?}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
+                format!(
+                    "{} {structure:?}, seed {seed}, {count} primitives, ray {o:?} {d:?}",
+                    L::NAME
+                )
             };
             let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
             assert!(s == t, "{}: list {s}, tree {t}", context());
             assert!(
-                s >= L::MAX || a.item.id_lane(i) == b.item.id_lane(i),
+                s >= L::MAX || a.primitive.id_lane(i) == b.primitive.id_lane(i),
                 "{}: at {s} list hits {}, tree {}",
                 context(),
-                a.item.id_lane(i),
-                b.item.id_lane(i)
+                a.primitive.id_lane(i),
+                b.primitive.id_lane(i)
             );
         }
         assert_eq!(
             c.bits(),
             d.bits(),
-            "{} {structure:?}, seed {seed}, {count} items: blocked",
+            "{} {structure:?}, seed {seed}, {count} primitives: blocked",
             L::NAME
         );
     }

@@ -8,7 +8,7 @@ use crate::primitive::form::Form;
 use glam::DVec3;
 
 /// Bounding box of one primitive.
-pub struct ItemBox<S> {
+pub struct PrimitiveBox<S> {
     low: [S; 3],
     high: [S; 3],
     /// Object space of the box; `None` if its axes are those of the scene.
@@ -43,7 +43,7 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
 /// not 0.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
-impl<S: Float> ItemBox<S> {
+impl<S: Float> PrimitiveBox<S> {
     /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
     /// object space, the box is in that space. Returns `None` for a form without finite bounds.
     pub fn new(form: &Form, oriented: bool) -> Option<Self> {
