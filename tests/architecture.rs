@@ -39,7 +39,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
             "camera", "value", "film", "disk", "sampling", "lanes",
         ],
     ),
-    ("terminal", &["value", "film"]),
+    ("terminal", &[]),
     ("measure", &["render", "world", "scene", "material", "film", "sampling"]),
     (
         "render",
