@@ -118,9 +118,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
     pub fn surface_emission(&mut self, hit: &Hit<L>) {
         let path = &*self.path;
         let mut remaining = self.interaction.has_bsdf;
-        while let Some((item, lanes)) = next_distinct(self.interaction.item, remaining) {
+        while let Some((primitive, lanes)) = next_distinct(self.interaction.primitive, remaining) {
             remaining = remaining.and_not(lanes);
-            let Some(source) = self.world.emission.of_item(item) else { continue };
+            let Some(source) = self.world.emission.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
                 && path.lobe_density.lt(L::from_f64(L::MAX)).any()

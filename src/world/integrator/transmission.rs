@@ -139,7 +139,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
         let emitters = world.has_emitters();
         let lanes = add_visible_light(world, path, hit.t, (branch.lanes, emitters), media, out);
-        let Some(first) = next_distinct(hit.item, lanes) else { return false };
+        let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
         let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
         let coincident = self.nested_dielectrics.contacts.as_ref().and_then(|contacts| {
             let hits = (&mut hit, &mut interaction);
@@ -217,7 +217,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (behind, media): (Option<&CoincidentQuery<L>>, &MediumStack<L>),
     ) -> Option<CoincidentState<L>> {
         let uncrossed = lanes.and_not(behind.map_or(L::mask(false), |next| next.lanes));
-        let contact_lanes = contacts.near(interaction.item, interaction.point, uncrossed);
+        let contact_lanes = contacts.near(interaction.primitive, interaction.point, uncrossed);
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
@@ -230,14 +230,14 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(next.offset.masked(coincident_lanes));
         }
         if contact_lanes.any() {
-            let (item, point, axis) = (interaction.item, interaction.point, -interaction.geometric);
+            let (primitive, point, axis) = (interaction.primitive, interaction.point, -interaction.geometric);
             let coincident =
-                CoincidentState { lanes: contact_lanes, item, point, axis, layer: L::zero() };
+                CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
             let first =
                 contacts.first(&self.base.world.geometry, &coincident, !interaction.front, media);
             if first.lanes.any() {
-                hit.take_in(first.lanes, hit.t, (first.item, first.triangle));
-                if let Some(distinct) = next_distinct(hit.item, lanes) {
+                hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
+                if let Some(distinct) = next_distinct(hit.primitive, lanes) {
                     *interaction =
                         interact::<_, false>(self.base.world, &path.ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
@@ -253,7 +253,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
         let coincident = CoincidentState {
             lanes: coincident_lanes,
-            item: interaction.item,
+            primitive: interaction.primitive,
             point: interaction.point,
             axis: -interaction.geometric,
             layer,
@@ -302,7 +302,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let coincident = CoincidentState { lanes, ..*coincident };
         let next = contacts.next(geometry, &coincident, &branch.media);
         ray.origin = Vec3::select(next.lanes, coincident.point, ray.origin);
-        hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
+        hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
         (hit, Some(next))
     }
 
