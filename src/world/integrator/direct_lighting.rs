@@ -76,12 +76,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
     #[inline(always)]
     pub fn direct_value(&self, wi: Vec3<L>, diffuse: L, lanes: L::Mask) -> Vec3<L> {
         let interaction = self.interaction;
-        let normal = interaction.normal;
         let mut value = interaction.diffuse * diffuse;
         for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & lanes) {
-            let (bsdf, view) = (&self.world.bsdfs[index], -self.path.ray.direction);
-            let highlight = bsdf.highlight(normal, view, wi, normal.dot(wi), normal.dot(view));
-            value += highlight.masked(lanes);
+            value += self.world.bsdfs[index].highlight(&self.query(), wi).masked(lanes);
         }
         value
     }
@@ -130,7 +127,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 if SIMPLE {
                     world.geometry.occluded_linear(&ray, t_max, lit, occluders)
                 } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                    let start = (interaction.item, interaction.front);
+                    let start = (interaction.primitive, interaction.front);
                     buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
                 } else {
                     world.geometry.occluded(&ray, t_max, lit, occluders)

@@ -13,7 +13,7 @@
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::light::LightSample;
-use crate::material::ReflectionLobe;
+use crate::material::{BsdfQuery, BsdfValue};
 use crate::world::integrator::direct_lighting::cosine_density;
 use crate::world::integrator::environment_lighting::visible_environments;
 use crate::world::integrator::interaction::SurfaceInteraction;
@@ -75,52 +75,40 @@ pub(crate) struct ReflectedRays<L: SimdFloat> {
     pub share: L,
 }
 
-/// Returns the value of the reflection lobe of BSDF number `index` for light from `direction`, and
-/// the density with which its reflected rays are sampled. `incident` are the directions of the
-/// incoming rays.
+/// Returns the value and the density of the reflection lobe of BSDF number `index` for light from
+/// `direction`.
 #[inline(never)]
-pub(crate) fn lobe_value<L: SimdFloat>(
+pub(crate) fn eval_lobe<L: SimdFloat>(
     world: &World<L>,
-    incident: &Vec3<L>,
     interaction: &SurfaceInteraction<L>,
+    query: &BsdfQuery<L>,
     index: usize,
     direction: Vec3<L>,
-) -> (Vec3<L>, L) {
+) -> BsdfValue<L> {
     let bsdf = &world.bsdfs[index];
-    let Some((strength, lobe)) = &bsdf.reflection else {
-        return (Vec3::zero(), L::zero());
-    };
-    let evaluate = |direction: Vec3<L>| {
-        let normal = interaction.normal;
-        bsdf.evaluate_lobe(*strength, lobe, *incident, normal, direction, world.fold)
-    };
-    let (value, density) = evaluate(direction);
+    let lobe = bsdf.eval(query, direction);
     if !world.smooth {
-        return (value, density);
+        return lobe;
     }
-    // Sampled rays that point into the surface are mirrored out of it. The values of `direction`
-    // therefore include those of its mirror image.
-    let height = direction.dot(interaction.geometric);
-    let mirrored = interaction.geometric.mul_add(height * L::from_f64(-2.0), direction);
-    let (mirrored_value, mirrored_density) = evaluate(mirrored);
-    (value + mirrored_value, density + mirrored_density)
+    // Sampled rays that point into the surface are mirrored out of it.
+    let mirrored = bsdf.eval(query, interaction.mirrored(direction));
+    BsdfValue { value: lobe.value + mirrored.value, density: lobe.density + mirrored.density }
 }
 
 /// Returns the density \[1/sr\] with which the BSDF number `index` samples reflected rays in
-/// `direction`, for incoming rays in direction `incident`. For a mirror it is the largest finite
-/// number.
+/// `direction`. For a mirror it is the largest finite number.
 #[inline(always)]
 pub(crate) fn reflected_density<L: SimdFloat>(
     world: &World<L>,
-    incident: &Vec3<L>,
     interaction: &SurfaceInteraction<L>,
+    query: &BsdfQuery<L>,
     index: usize,
     direction: Vec3<L>,
 ) -> L {
-    match &world.bsdfs[index].reflection {
-        None | Some((_, ReflectionLobe::Mirror)) => L::from_f64(L::MAX),
-        Some(_) => lobe_value(world, incident, interaction, index, direction).1,
+    if world.bsdfs[index].is_delta() {
+        return L::from_f64(L::MAX);
     }
+    eval_lobe(world, interaction, query, index, direction).density
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
@@ -130,9 +118,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
     pub fn surface_emission(&mut self, hit: &Hit<L>) {
         let path = &*self.path;
         let mut remaining = self.interaction.has_bsdf;
-        while let Some((item, lanes)) = next_distinct(self.interaction.item, remaining) {
+        while let Some((primitive, lanes)) = next_distinct(self.interaction.primitive, remaining) {
             remaining = remaining.and_not(lanes);
-            let Some(source) = self.world.emitters.of_item(item) else { continue };
+            let Some(source) = self.world.emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
                 && path.lobe_density.lt(L::from_f64(L::MAX)).any()
@@ -151,7 +139,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let (world, interaction) = (self.world, self.interaction);
         let mut glossy = L::mask(false);
         for (index, lanes) in interaction.bsdfs(rays.lanes.and_not(interaction.shaded)) {
-            if !matches!(&world.bsdfs[index].reflection, None | Some((_, ReflectionLobe::Mirror))) {
+            if !world.bsdfs[index].is_delta() {
                 glossy = glossy | lanes;
             }
         }
@@ -205,11 +193,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
             value = self.direct_value(light.wi, diffuse, direct).masked(direct);
         }
         let Some(rays) = rays else { return value };
+        let query = self.query();
         for (index, lanes) in interaction.bsdfs(rays.lanes & arrives) {
-            let incident = &self.path.ray.direction;
-            let (lobe, density) = lobe_value(world, incident, interaction, index, light.wi);
-            let weight = power_heuristic(light.density, density) * rays.share;
-            value += (lobe * weight).masked(lanes);
+            let lobe = eval_lobe(world, interaction, &query, index, light.wi);
+            let weight = power_heuristic(light.density, lobe.density) * rays.share;
+            value += (lobe.value * weight).masked(lanes);
         }
         value
     }

@@ -11,21 +11,19 @@
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::light::LightSample;
-use crate::material::{InterfaceMedia, ReflectionLobe};
+use crate::material::{BsdfValue, InterfaceQuery};
 use crate::world::integrator::emitter_lighting::power_heuristic;
-use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics};
 use crate::world::integrator::vertex::Vertex;
-use crate::world::world::{LightSource, World};
+use crate::world::world::LightSource;
 
 /// Hits of a packet on rough interfaces between transparent media.
 pub(crate) struct RoughInterface<'a, L: SimdFloat> {
     pub hit: &'a InterfaceHit<L>,
-    /// Lanes whose reflected light is found by two strategies: samples of emitter points and
-    /// samples of ray directions, both with finite densities.
+    pub query: InterfaceQuery<L>,
+    /// Lanes whose reflected light is found by both strategies.
     pub reflecting: L::Mask,
-    /// Lanes whose transmitted light is found by two strategies: samples of emitter points and
-    /// samples of ray directions, both with finite densities.
+    /// Lanes whose transmitted light is found by both strategies.
     pub transmitting: L::Mask,
 }
 
@@ -44,73 +42,47 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
     /// Selects the rough interfaces out of `hit`. Surfaces that coincide with another one, in the
     /// lanes of `coincident`, are left out, because their transmitted rays start on the other
     /// surface.
-    pub fn new(
-        world: &World<L>,
-        interaction: &SurfaceInteraction<L>,
-        hit: &'a InterfaceHit<L>,
-        coincident: L::Mask,
-    ) -> Self {
+    pub fn new(vertex: &Vertex<'_, L>, hit: &'a InterfaceHit<L>, coincident: L::Mask) -> Self {
+        let (world, interaction) = (vertex.world, vertex.interaction);
         let mut rough = L::mask(false);
         // If shadows are off, emitters also light points that cannot see them. Reflected rays do
         // not find this light, so the two strategies cannot be combined.
         if world.has_emitters() && world.shadows {
             for (index, lanes) in interaction.bsdfs(hit.lanes) {
-                if let Some(transmission) = &world.bsdfs[index].transmission
-                    && !matches!(transmission.lobe, ReflectionLobe::Mirror)
-                {
+                if !world.bsdfs[index].is_delta() {
                     rough = rough | lanes;
                 }
             }
         }
         let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
-        Self { hit, reflecting, transmitting: reflecting & (hit.thin | !hit.outer) }
+        let transmitting = reflecting & (hit.thin | !hit.outer);
+        Self { hit, query: hit.query(vertex), reflecting, transmitting }
     }
 
-    /// Returns two values for light from `direction`. The first is the value [1/sr] of the
-    /// interfaces, times the cosine of the angle of incidence. The second is the density [1/sr]
-    /// with which rays are sampled in `direction`: transmitted rays if `behind` is `true`,
-    /// otherwise reflected rays. In lanes where no emitter points are sampled for these rays, the
-    /// value is zero, and the density is the largest finite number.
+    /// Returns the value of the interfaces for light from `direction`, and the density with which
+    /// transmitted rays, if `behind` is `true`, or reflected rays are sampled in this direction. In
+    /// lanes in which only these rays find the light, the value is zero, and the density is the
+    /// largest finite number.
     #[inline(never)]
-    pub fn evaluate(
-        &self,
-        world: &World<L>,
-        incident: &Vec3<L>,
-        interaction: &SurfaceInteraction<L>,
-        direction: &Vec3<L>,
-        behind: bool,
-    ) -> (Vec3<L>, L) {
-        let InterfaceHit { n_i, n_t, outer, thin, .. } = *self.hit;
-        let media = InterfaceMedia { n_i, n_t, outer, thin };
-        let (mut value, mut density) = (Vec3::zero(), L::from_f64(L::MAX));
+    pub fn eval(&self, vertex: &Vertex<'_, L>, direction: &Vec3<L>, behind: bool) -> BsdfValue<L> {
+        let (world, interaction) = (vertex.world, vertex.interaction);
+        let mut out = BsdfValue { value: Vec3::zero(), density: L::from_f64(L::MAX) };
         let wanted = if behind { self.transmitting } else { self.reflecting };
         for (index, lanes) in interaction.bsdfs(wanted) {
             let bsdf = &world.bsdfs[index];
-            let Some(transmission) = &bsdf.transmission else { continue };
-            let evaluate = |direction: Vec3<L>| {
-                bsdf.evaluate_interface(
-                    transmission,
-                    &media,
-                    (*incident, interaction.normal),
-                    (direction, L::mask(behind)),
-                    (interaction.reflecting, world.fold),
-                )
-            };
-            let (mut lobe, mut pdf) = evaluate(*direction);
+            let eval = |direction| bsdf.eval_interface(&self.query, direction, L::mask(behind));
+            let mut lobe = eval(*direction);
             if world.smooth {
                 // Sampled rays on the wrong side of the geometric surface are mirrored to the right
-                // side. The value and the density therefore include those of the mirror image.
-                let height = direction.dot(interaction.geometric);
-                let mirrored =
-                    interaction.geometric.mul_add(height * L::from_f64(-2.0), *direction);
-                let (mirrored_lobe, mirrored_pdf) = evaluate(mirrored);
-                lobe += mirrored_lobe;
-                pdf = (pdf + mirrored_pdf).min(L::from_f64(L::MAX));
+                // side.
+                let mirrored = eval(interaction.mirrored(*direction));
+                lobe.value += mirrored.value;
+                lobe.density = (lobe.density + mirrored.density).min(L::from_f64(L::MAX));
             }
-            value = Vec3::select(lanes, lobe, value);
-            density = L::select(lanes, pdf, density);
+            out.value = Vec3::select(lanes, lobe.value, out.value);
+            out.density = L::select(lanes, lobe.density, out.density);
         }
-        (value, density)
+        out
     }
 }
 
@@ -167,11 +139,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
         let (world, light) = (self.world, &source.light);
         let height = light.wi.dot(self.interaction.geometric);
-        let is_behind = height.lt(L::zero());
-        let arrives = if side.behind { is_behind } else { height.gt(L::zero()) };
-        let incident = &self.path.ray.direction;
-        let (value, density) =
-            rough.evaluate(world, incident, self.interaction, &light.wi, side.behind);
+        let arrives = if side.behind { height.lt(L::zero()) } else { height.gt(L::zero()) };
+        let BsdfValue { value, density } = rough.eval(self, &light.wi, side.behind);
         let weight = power_heuristic(light.density, density);
         let value = value.component_mul(light.irradiance) * weight;
         let lit = side.lanes & arrives & value.max_element().gt(L::zero());

@@ -8,11 +8,12 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
-use crate::material::Bsdf;
+use crate::material::{Bsdf, InterfaceQuery};
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::vertex::Vertex;
 use glam::DVec3;
 
 /// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
@@ -76,8 +77,8 @@ impl<L: SimdFloat> MediumStack<L> {
         let hit = solid.closest(ray, solid.all());
         let mut remaining = hit.t.lt(L::from_f64(L::MAX));
         let mut inside = L::mask(false);
-        while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
-            let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
+        while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+            let normal = solid.surface(primitive, hit.triangle, ray.at(hit.t)).normal;
             inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
             remaining = remaining.and_not(lanes);
         }
@@ -166,6 +167,21 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub medium_reflected: MediumStack<L>,
     /// Media that the transmitted rays are inside of.
     pub medium_transmitted: MediumStack<L>,
+}
+
+impl<L: SimdFloat> InterfaceHit<L> {
+    /// Returns the query of BSDFs at the hit points of `vertex`.
+    #[inline(always)]
+    pub fn query(&self, vertex: &Vertex<'_, L>) -> InterfaceQuery<L> {
+        InterfaceQuery {
+            rays: vertex.query(),
+            n_i: self.n_i,
+            n_t: self.n_t,
+            outer: self.outer,
+            thin: self.thin,
+            reflecting: vertex.interaction.reflecting,
+        }
+    }
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
@@ -261,10 +277,12 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let outer = lanes & interaction.front;
         let mut priority = L::zero();
         let mut remaining = lanes;
-        while let Some((item, item_lanes)) = next_distinct(interaction.item, remaining) {
-            let of_item = L::from_f64(f64::from(self.priority_of[item as usize]));
-            priority = L::select(item_lanes, of_item, priority);
-            remaining = remaining.and_not(item_lanes);
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(interaction.primitive, remaining)
+        {
+            let of_primitive = L::from_f64(f64::from(self.priority_of[primitive as usize]));
+            priority = L::select(primitive_lanes, of_primitive, priority);
+            remaining = remaining.and_not(primitive_lanes);
         }
         let solid = priority.gt(L::zero());
         let (outside, within) = (media.without(priority), media.with(priority));

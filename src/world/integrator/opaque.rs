@@ -36,7 +36,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 world.geometry.closest_masked(&path.ray, &candidates.primary, active)
             };
             active = add_visible_light(world, path, hit.t, (active, EMITTERS), None, out);
-            let Some(first) = next_distinct(hit.item, active) else { return };
+            let Some(first) = next_distinct(hit.primitive, active) else { return };
             let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
             let mut bouncing = None;
             if EMITTERS && let Some(reservoir) = &mut reservoir {

@@ -3,7 +3,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
-use crate::material::{Interface, InterfaceMedia, ReflectionLobe};
+use crate::material::Interface;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::Integrator;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
@@ -68,7 +68,7 @@ impl<L: SimdFloat> Branch<L> {
 
 /// Reflected and transmitted paths at the interfaces of a packet.
 struct Split<'a, L: SimdFloat> {
-    hit: &'a InterfaceHit<L>,
+    rough: &'a RoughInterface<'a, L>,
     /// Refraction as if the surfaces had no roughness.
     interface: Interface<L>,
     reflected: Path<L>,
@@ -139,7 +139,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
         let emitters = world.has_emitters();
         let lanes = add_visible_light(world, path, hit.t, (branch.lanes, emitters), media, out);
-        let Some(first) = next_distinct(hit.item, lanes) else { return false };
+        let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
         let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
         let coincident = self.nested_dielectrics.contacts.as_ref().and_then(|contacts| {
             let hits = (&mut hit, &mut interaction);
@@ -177,7 +177,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             return branch.lanes.any();
         };
         let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
-        let rough = RoughInterface::new(world, interaction, interface_hit, coincident_lanes);
+        let rough = RoughInterface::new(&vertex, interface_hit, coincident_lanes);
         if rough.reflecting.any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }
@@ -217,7 +217,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (behind, media): (Option<&CoincidentQuery<L>>, &MediumStack<L>),
     ) -> Option<CoincidentState<L>> {
         let uncrossed = lanes.and_not(behind.map_or(L::mask(false), |next| next.lanes));
-        let contact_lanes = contacts.near(interaction.item, interaction.point, uncrossed);
+        let contact_lanes = contacts.near(interaction.primitive, interaction.point, uncrossed);
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
@@ -230,14 +230,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(next.offset.masked(coincident_lanes));
         }
         if contact_lanes.any() {
-            let (item, point, axis) = (interaction.item, interaction.point, -interaction.geometric);
+            let (primitive, point, axis) =
+                (interaction.primitive, interaction.point, -interaction.geometric);
             let coincident =
-                CoincidentState { lanes: contact_lanes, item, point, axis, layer: L::zero() };
+                CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
             let first =
                 contacts.first(&self.base.world.geometry, &coincident, !interaction.front, media);
             if first.lanes.any() {
-                hit.take_in(first.lanes, hit.t, (first.item, first.triangle));
-                if let Some(distinct) = next_distinct(hit.item, lanes) {
+                hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
+                if let Some(distinct) = next_distinct(hit.primitive, lanes) {
                     *interaction =
                         interact::<_, false>(self.base.world, &path.ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
@@ -253,7 +254,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
         let coincident = CoincidentState {
             lanes: coincident_lanes,
-            item: interaction.item,
+            primitive: interaction.primitive,
             point: interaction.point,
             axis: -interaction.geometric,
             layer,
@@ -302,7 +303,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let coincident = CoincidentState { lanes, ..*coincident };
         let next = contacts.next(geometry, &coincident, &branch.media);
         ray.origin = Vec3::select(next.lanes, coincident.point, ray.origin);
-        hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
+        hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
         (hit, Some(next))
     }
 
@@ -351,15 +352,14 @@ fn reflected_rays<L: SimdFloat>(
     let interaction = vertex.interaction;
     let (mut followed, mut share) = (interaction.reflecting, L::one());
     let Some(hit) = hit else { return ReflectedRays { lanes: followed, share } };
-    let interface = smooth_interface(vertex.path.ray.direction, interaction, hit);
+    let query = hit.query(vertex);
+    let interface = query.interface(interaction.normal);
     for (index, lanes) in interaction.bsdfs(followed & hit.lanes) {
-        if let Some(transmission) = &vertex.world.bsdfs[index].transmission {
-            if !matches!(transmission.lobe, ReflectionLobe::Mirror) {
-                followed = followed.and_not(lanes);
-            }
-            let shares = interface.split_at(transmission, hit.outer, hit.thin);
-            share = L::select(lanes, shares.reflected, share);
+        let bsdf = &vertex.world.bsdfs[index];
+        if !bsdf.is_delta() {
+            followed = followed.and_not(lanes);
         }
+        share = L::select(lanes, bsdf.split(&interface, &query).reflected, share);
     }
     ReflectedRays { lanes: followed.and_not(hit.suppressed), share }
 }
@@ -367,10 +367,10 @@ fn reflected_rays<L: SimdFloat>(
 impl<'a, L: SimdFloat> Split<'a, L> {
     /// Samples the reflected and the transmitted directions at the hit points of `vertex`. The
     /// surface must transmit in at least one lane.
-    fn new(vertex: &mut Vertex<'_, L>, rough: &RoughInterface<'a, L>) -> Self {
+    fn new(vertex: &mut Vertex<'_, L>, rough: &'a RoughInterface<'a, L>) -> Self {
         let (world, interaction, hit) = (vertex.world, vertex.interaction, rough.hit);
         let incident = vertex.path.ray.direction;
-        let interface = smooth_interface(incident, interaction, hit);
+        let interface = rough.query.interface(interaction.normal);
         let path = |origin, direction| Path {
             ray: Ray { origin, direction },
             throughput: Vec3::zero(),
@@ -379,18 +379,18 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let straight = hit.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
         let mut split = Self {
-            hit,
+            rough,
             interface,
             reflected: path(interaction.ray_origin(), incident.reflect(interaction.normal)),
             transmitted: path(interaction.ray_origin_behind(), refracted),
         };
         let mut numbers = None;
         for (index, lanes) in interaction.bsdfs(interaction.reflecting | hit.lanes) {
-            match &world.bsdfs[index].transmission {
-                Some(transmission) if !matches!(transmission.lobe, ReflectionLobe::Mirror) => {
-                    split.sample_rough(vertex, index, lanes, &mut numbers);
-                }
-                _ => split.sample_smooth(vertex, index, lanes, &mut numbers),
+            let bsdf = &world.bsdfs[index];
+            if bsdf.transmission.is_some() && !bsdf.is_delta() {
+                split.sample_rough(vertex, index, lanes, &mut numbers);
+            } else {
+                split.sample_smooth(vertex, index, lanes, &mut numbers);
             }
         }
         let Self { reflected, transmitted, .. } = &mut split;
@@ -405,8 +405,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let sides = [(false, rough.reflecting, reflected), (true, rough.transmitting, transmitted)];
         for (behind, lanes, path) in sides {
             if lanes.any() {
-                let direction = &path.ray.direction;
-                let (_, density) = rough.evaluate(world, &incident, interaction, direction, behind);
+                let density = rough.eval(vertex, &path.ray.direction, behind).density;
                 path.lobe_density = L::select(lanes, density, path.lobe_density);
             }
             path.throughput = Path::bounded(path.throughput);
@@ -423,12 +422,13 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         lanes: L::Mask,
         numbers: &mut Option<(L, L)>,
     ) {
-        let (world, interaction, hit) = (vertex.world, vertex.interaction, self.hit);
-        let (incident, throughput) = (vertex.path.ray.direction, vertex.path.throughput);
+        let RoughInterface { hit, query, .. } = self.rough;
+        let (world, interaction) = (vertex.world, vertex.interaction);
+        let throughput = vertex.path.throughput;
         let bsdf = &world.bsdfs[index];
         let mut share = L::one();
-        if let Some(transmission) = &bsdf.transmission {
-            let shares = self.interface.split_at(transmission, hit.outer, hit.thin);
+        if bsdf.transmission.is_some() {
+            let shares = bsdf.split(&self.interface, query);
             share = shares.reflected.masked(!hit.suppressed);
             let transmitted = L::select(hit.suppressed, L::one(), shares.transmitted);
             let transmitted = throughput * transmitted;
@@ -437,20 +437,19 @@ impl<'a, L: SimdFloat> Split<'a, L> {
                 Vec3::select(lanes, transmitted, self.transmitted.throughput);
             self.reflected.throughput = Vec3::select(lanes, tir, self.reflected.throughput);
         }
-        let Some((strength, lobe)) = &bsdf.reflection else { return };
         // Hits on the back of a one-sided surface have no BSDF to reflect.
         let lanes = lanes & interaction.reflecting & share.gt(L::zero());
         if lanes.none() {
             return;
         }
-        let uv = vertex.lobe_numbers(lobe, numbers);
-        let sample = bsdf.sample(*strength, lobe, incident, interaction.normal, uv, world.fold);
+        let uv = vertex.lobe_numbers(bsdf.is_delta(), numbers);
+        let sample = bsdf.sample(&query.rays, uv);
         if world.has_emitters() {
             let mut direction = sample.direction;
             if world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
-            let density = reflected_density(world, &incident, interaction, index, direction);
+            let density = reflected_density(world, interaction, &query.rays, index, direction);
             self.reflected.lobe_density = L::select(lanes, density, self.reflected.lobe_density);
         }
         let throughput = throughput.component_mul(sample.weight) * share;
@@ -469,19 +468,10 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         lanes: L::Mask,
         numbers: &mut Option<(L, L)>,
     ) {
-        let (world, interaction, hit) = (vertex.world, vertex.interaction, self.hit);
-        let bsdf = &world.bsdfs[index];
-        let Some(transmission) = &bsdf.transmission else { return };
-        let uv = vertex.lobe_numbers(&transmission.lobe, numbers);
-        let (incident, throughput) = (vertex.path.ray.direction, vertex.path.throughput);
-        let media = InterfaceMedia { n_i: hit.n_i, n_t: hit.n_t, outer: hit.outer, thin: hit.thin };
-        let sample = bsdf.sample_interface(
-            transmission,
-            &media,
-            (incident, interaction.normal),
-            uv,
-            (interaction.reflecting, world.fold),
-        );
+        let RoughInterface { hit, query, .. } = self.rough;
+        let uv = vertex.lobe_numbers(false, numbers);
+        let throughput = vertex.path.throughput;
+        let sample = vertex.world.bsdfs[index].sample_interface(query, uv);
         // Rays pass a suppressed boundary (inside of a solid with a higher priority) unchanged.
         let rough = lanes.and_not(hit.suppressed);
         let weight = throughput.component_mul(sample.reflected_weight);
@@ -494,15 +484,4 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             Vec3::select(rough, sample.transmitted, transmitted.ray.direction);
         transmitted.throughput = Vec3::select(lanes, throughput * passed, transmitted.throughput);
     }
-}
-
-/// Returns the refraction of rays with the direction `incident` at the surfaces of `hit`, as if
-/// they had no roughness.
-#[inline(always)]
-fn smooth_interface<L: SimdFloat>(
-    incident: Vec3<L>,
-    interaction: &SurfaceInteraction<L>,
-    hit: &InterfaceHit<L>,
-) -> Interface<L> {
-    Interface::new(incident, interaction.normal, hit.n_i, hit.n_t)
 }

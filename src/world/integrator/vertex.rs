@@ -2,7 +2,7 @@
 
 use crate::bvh::Hit;
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::material::ReflectionLobe;
+use crate::material::BsdfQuery;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::emitter_lighting::{
@@ -88,21 +88,20 @@ impl<L: SimdFloat> Vertex<'_, L> {
     /// `emitters` is `true`.
     #[inline(always)]
     pub fn sample_reflection<const SIMPLE: bool>(&mut self, emitters: bool) -> L::Mask {
-        let (world, interaction) = (self.world, self.interaction);
+        let (world, interaction, query) = (self.world, self.interaction, self.query());
+        let throughput = self.path.throughput;
         let mut numbers = None;
-        let (incident, throughput) = (self.path.ray.direction, self.path.throughput);
         for (index, lanes) in interaction.bsdfs(interaction.reflecting) {
             let bsdf = &world.bsdfs[index];
-            let Some((strength, lobe)) = &bsdf.reflection else { continue };
-            let uv = self.lobe_numbers(lobe, &mut numbers);
+            let uv = self.lobe_numbers(bsdf.is_delta(), &mut numbers);
             let path = &mut *self.path;
-            let sample = bsdf.sample(*strength, lobe, incident, interaction.normal, uv, world.fold);
+            let sample = bsdf.sample(&query, uv);
             let mut direction = sample.direction;
             if !SIMPLE && world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
             if emitters {
-                let density = reflected_density(world, &incident, interaction, index, direction);
+                let density = reflected_density(world, interaction, &query, index, direction);
                 path.lobe_density = L::select(lanes, density, path.lobe_density);
             }
             path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);
@@ -113,15 +112,21 @@ impl<L: SimdFloat> Vertex<'_, L> {
         interaction.reflecting & world.reaches_min_weight(self.path.throughput)
     }
 
-    /// Returns the random numbers of samples of `lobe`; zeros for a mirror. `numbers` holds them
-    /// once they are computed, because all lobes of a packet share them.
+    /// Returns the query of BSDFs at the hit points.
     #[inline(always)]
-    pub fn lobe_numbers(
-        &mut self,
-        lobe: &ReflectionLobe<L::Scalar>,
-        numbers: &mut Option<(L, L)>,
-    ) -> (L, L) {
-        if matches!(lobe, ReflectionLobe::Mirror) {
+    pub fn query(&self) -> BsdfQuery<L> {
+        BsdfQuery {
+            incident: self.path.ray.direction,
+            normal: self.interaction.normal,
+            fold: self.world.fold,
+        }
+    }
+
+    /// Returns the random numbers of samples of a lobe; zeros if it is a mirror (`is_delta`).
+    /// `numbers` holds them once they are computed, because all lobes of a packet share them.
+    #[inline(always)]
+    pub fn lobe_numbers(&mut self, is_delta: bool, numbers: &mut Option<(L, L)>) -> (L, L) {
+        if is_delta {
             return (L::zero(), L::zero());
         }
         self.out.counts.glossy = true;
