@@ -1,0 +1,127 @@
+//! Light of environments, by multiple importance sampling.
+//!
+//! Three strategies find the light of an environment. The first samples a direction with a density
+//! in proportion to the luminance of the environment. The second is the reflected ray of a glossy
+//! lobe. The third samples a cosine-weighted direction at a diffuse surface. Glossy lobes combine
+//! the first and the second by the power heuristic, diffuse surfaces the first and the third.
+//! Highlights use only the first. Mirrors and the camera use only the light at the end of their ray.
+//!
+//! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
+//! the start of the ray already includes all environments.
+
+use crate::integrator::direct_lighting::cosine_density;
+use crate::integrator::emitter_lighting::{ReflectedRays, power_heuristic};
+use crate::integrator::indirect_diffuse::NO_DENSITY;
+use crate::integrator::path::{Path, Radiance};
+use crate::integrator::vertex::Vertex;
+use crate::world::{EnvironmentSource, LightSource, World};
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::sampling::warp;
+use zerkalo_scene::light::LightSample;
+
+/// First salt of the random numbers for environments. Each emitter has a salt of its own, smaller
+/// than this one, and each environment has two, so that their random numbers are independent.
+const ENVIRONMENT_SALT: u32 = 1 << 30;
+
+/// Adds the radiance of the visible environments, weighted for multiple importance sampling, to
+/// `out`. The rays of `lanes` hit no surface. `transmittance` is that of the medium around the rays;
+/// `None` if no medium absorbs light.
+pub(crate) fn visible_environments<L: SimdFloat>(
+    world: &World<L>,
+    path: &Path<L>,
+    transmittance: Option<Vec3<L>>,
+    lanes: L::Mask,
+    out: &mut Radiance<L>,
+) {
+    let lanes = lanes & path.lobe_density.gt(L::from_f64(NO_DENSITY));
+    if lanes.none() {
+        return;
+    }
+    for source in world.environments.iter().filter(|source| source.visible) {
+        let (radiance, density) = source.light.radiance(path.ray.direction, lanes);
+        let weight = power_heuristic(path.lobe_density, density);
+        let mut radiance = path.throughput.component_mul(radiance) * weight;
+        if let Some(left) = transmittance {
+            radiance = radiance.component_mul(left);
+        }
+        out.groups[source.group] += source.emitted(radiance).masked(lanes);
+    }
+}
+
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Adds the light of all environments that the surfaces reflect. `glossy` are the reflected rays
+    /// with a finite density, which find it, too.
+    #[inline(never)]
+    pub fn environment_lighting(&mut self, glossy: &ReflectedRays<L>) {
+        let interaction = self.interaction;
+        self.out.counts.glossy = true;
+        let is_diffuse = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
+        for (index, environment) in self.world.environments.iter().enumerate() {
+            let source = self.sample_environment(index, interaction.direct_mask | glossy.lanes);
+            let light = &source.light;
+            let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
+            let rays = source.visible.then_some(glossy);
+            let value = self.reflected(light, arrives, rays, |density| {
+                density * power_heuristic(light.density, density)
+            });
+            self.add_environment(environment, light.wi, value.component_mul(light.irradiance));
+            if is_diffuse.any() {
+                self.add_cosine_sample(index, environment, is_diffuse);
+            }
+        }
+    }
+
+    /// Samples a direction of the environment with the number `index`, in `lanes`.
+    #[inline(always)]
+    pub fn sample_environment(
+        &self,
+        index: usize,
+        lanes: L::Mask,
+    ) -> LightSource<LightSample<L>, L::Scalar> {
+        let numbers = self.sampler.light_2d(self.bounce, ENVIRONMENT_SALT + 2 * index as u32);
+        let source = &self.world.environments[index];
+        source.with_light(source.light.sample(numbers, lanes))
+    }
+
+    /// Adds light of an environment from a cosine-weighted direction, in `lanes`.
+    #[inline(always)]
+    fn add_cosine_sample(
+        &mut self,
+        index: usize,
+        environment: &EnvironmentSource<L::Scalar>,
+        lanes: L::Mask,
+    ) {
+        let interaction = self.interaction;
+        let salt = ENVIRONMENT_SALT + 2 * index as u32 + 1;
+        let (u, v) = self.sampler.light_2d(self.bounce, salt);
+        let (x, y, r2) = warp::disk(u, v);
+        let cos = (L::one() - r2).max(L::zero()).sqrt();
+        let wi = Frame::around(interaction.normal).to_world(Vec3::new(x, y, cos)).renormalize();
+        let arrives = lanes & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let (radiance, density) = environment.light.radiance(wi, arrives);
+        let weight = power_heuristic(cosine_density(cos), density).masked(arrives);
+        let value = interaction.diffuse.component_mul(radiance) * weight;
+        self.add_environment(environment, wi, value.masked(arrives));
+    }
+
+    /// Adds reflected light of an environment. `wi` are the directions from which it arrives, and
+    /// `value` is the reflected radiance if nothing occludes them.
+    #[inline(always)]
+    fn add_environment(
+        &mut self,
+        environment: &EnvironmentSource<L::Scalar>,
+        wi: Vec3<L>,
+        value: Vec3<L>,
+    ) {
+        let (geometry, origin) = (&self.world.geometry, self.interaction.ray_origin());
+        let occluded = |lit| {
+            let ray = Ray { origin, direction: wi };
+            geometry.occluded(&ray, L::from_f64(L::MAX), lit, geometry.all())
+        };
+        let lit = value.max_element().gt(L::zero());
+        self.add_light(environment.group, lit, occluded, |vertex, _| {
+            environment.emitted(vertex.path.throughput.component_mul(value))
+        });
+    }
+}

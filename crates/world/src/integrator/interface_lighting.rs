@@ -1,0 +1,166 @@
+//! Light of emitters and environments that rough interfaces reflect and transmit, by multiple
+//! importance sampling.
+//!
+//! Two strategies find this light. The first one samples a point of the emitter and traces a shadow
+//! ray to it. The second one samples the direction of the reflected or transmitted ray, which may
+//! hit the emitter. A shadow ray does not pass through glass: inside a solid, it ends at the far
+//! side. Rays that enter a solid therefore use the second strategy only, with full weight. Both
+//! strategies are combined, with weights, in three cases: for reflected rays, for rays that leave a
+//! solid, and at thin surfaces.
+
+use crate::integrator::emitter_lighting::power_heuristic;
+use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics};
+use crate::integrator::vertex::Vertex;
+use crate::world::LightSource;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
+use zerkalo_scene::light::LightSample;
+use zerkalo_scene::material::{BsdfValue, InterfaceQuery};
+
+/// Hits of a packet on rough interfaces between transparent media.
+pub(crate) struct RoughInterface<'a, L: SimdFloat> {
+    pub hit: &'a InterfaceHit<L>,
+    pub query: InterfaceQuery<L>,
+    /// Lanes whose reflected light is found by both strategies.
+    pub reflecting: L::Mask,
+    /// Lanes whose transmitted light is found by both strategies.
+    pub transmitting: L::Mask,
+}
+
+/// Side of an interface from which light arrives.
+struct Side<'a, L: SimdFloat> {
+    /// `true` for the side of the transmitted rays, `false` for that of the reflected rays.
+    behind: bool,
+    /// Lanes for which points of emitters are sampled on this side.
+    lanes: L::Mask,
+    /// Origins of the shadow rays.
+    origin: Vec3<L>,
+    media: Media<'a, L>,
+}
+
+impl<'a, L: SimdFloat> RoughInterface<'a, L> {
+    /// Selects the rough interfaces out of `hit`. Surfaces that coincide with another one, in the
+    /// lanes of `coincident`, are left out, because their transmitted rays start on the other
+    /// surface.
+    pub fn new(vertex: &Vertex<'_, L>, hit: &'a InterfaceHit<L>, coincident: L::Mask) -> Self {
+        let (world, interaction) = (vertex.world, vertex.interaction);
+        let mut rough = L::mask(false);
+        // If shadows are off, emitters also light points that cannot see them. Reflected rays do
+        // not find this light, so the two strategies cannot be combined.
+        if world.has_emitters() && world.shadows {
+            for (index, lanes) in interaction.bsdfs(hit.lanes) {
+                if !world.bsdfs[index].is_delta() {
+                    rough = rough | lanes;
+                }
+            }
+        }
+        let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
+        let transmitting = reflecting & (hit.thin | !hit.outer);
+        Self { hit, query: hit.query(vertex), reflecting, transmitting }
+    }
+
+    /// Returns the value of the interfaces for light from `direction`, and the density with which
+    /// transmitted rays, if `behind` is `true`, or reflected rays are sampled in this direction. In
+    /// lanes in which only these rays find the light, the value is zero, and the density is the
+    /// largest finite number.
+    #[inline(never)]
+    pub fn eval(&self, vertex: &Vertex<'_, L>, direction: &Vec3<L>, behind: bool) -> BsdfValue<L> {
+        let (world, interaction) = (vertex.world, vertex.interaction);
+        let mut out = BsdfValue { value: Vec3::zero(), density: L::from_f64(L::MAX) };
+        let wanted = if behind { self.transmitting } else { self.reflecting };
+        for (index, lanes) in interaction.bsdfs(wanted) {
+            let bsdf = &world.bsdfs[index];
+            let eval = |direction| bsdf.eval_interface(&self.query, direction, L::mask(behind));
+            let mut lobe = eval(*direction);
+            if world.smooth {
+                // Sampled rays on the wrong side of the geometric surface are mirrored to the right
+                // side.
+                let mirrored = eval(interaction.mirrored(*direction));
+                lobe.value += mirrored.value;
+                lobe.density = (lobe.density + mirrored.density).min(L::from_f64(L::MAX));
+            }
+            out.value = Vec3::select(lanes, lobe.value, out.value);
+            out.density = L::select(lanes, lobe.density, out.density);
+        }
+        out
+    }
+}
+
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Adds the light of all visible emitters and environments that rough interfaces reflect and
+    /// transmit.
+    #[inline(never)]
+    pub fn interface_lighting(
+        &mut self,
+        rough: &RoughInterface<'_, L>,
+        nested_dielectrics: &NestedDielectrics<L>,
+    ) {
+        let (interaction, hit) = (self.interaction, rough.hit);
+        let reflected = Side {
+            behind: false,
+            lanes: rough.reflecting,
+            origin: interaction.ray_origin(),
+            media: Media { nested_dielectrics, stack: &hit.medium_reflected },
+        };
+        let transmitted = Side {
+            behind: true,
+            lanes: rough.transmitting,
+            origin: interaction.ray_origin_behind(),
+            media: Media { nested_dielectrics, stack: &hit.medium_transmitted },
+        };
+        for side in [&reflected, &transmitted] {
+            if side.lanes.none() {
+                continue;
+            }
+            self.out.counts.glossy = true;
+            for index in 0.. {
+                let Some(source) = self.sample_emitter(index, side.origin) else { break };
+                self.add_scattered(rough, side, &source, Some(index));
+            }
+            for index in 0..self.world.environments.len() {
+                let source = self.sample_environment(index, side.lanes);
+                self.add_scattered(rough, side, &source, None);
+            }
+        }
+    }
+
+    /// Adds the light of `source` that rough interfaces scatter from one `side`. `emitter` is the
+    /// number of the emitter on which it was sampled; `None` for environments.
+    #[inline(always)]
+    fn add_scattered(
+        &mut self,
+        rough: &RoughInterface<'_, L>,
+        side: &Side<'_, L>,
+        source: &LightSource<LightSample<L>, L::Scalar>,
+        emitter: Option<usize>,
+    ) {
+        if !source.visible {
+            return;
+        }
+        let (world, light) = (self.world, &source.light);
+        let height = light.wi.dot(self.interaction.geometric);
+        let arrives = if side.behind { height.lt(L::zero()) } else { height.gt(L::zero()) };
+        let BsdfValue { value, density } = rough.eval(self, &light.wi, side.behind);
+        let weight = power_heuristic(light.density, density);
+        let value = value.component_mul(light.irradiance) * weight;
+        let lit = side.lanes & arrives & value.max_element().gt(L::zero());
+        let occluded = |lit| {
+            let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
+            let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
+            match emitter {
+                Some(index) => {
+                    let lanes = lit.and_not(occluded);
+                    occluded | world.emitter_covered(index, &ray, t_max, lanes)
+                }
+                None => occluded,
+            }
+        };
+        self.add_light(source.group, lit, occluded, |vertex, _| {
+            let radiance = vertex.path.throughput.component_mul(value);
+            source.emitted(match side.media.transmittance(light.distance) {
+                Some(left) => radiance.component_mul(left),
+                None => radiance,
+            })
+        });
+    }
+}

@@ -1,0 +1,71 @@
+//! Integrator of worlds without transmission (Whitted 1980). At each hit it computes direct
+//! lighting and continues the path with one reflected ray, sampled from the reflection lobe.
+
+use crate::integrator::Integrator;
+use crate::integrator::emitter_lighting::ReflectedRays;
+use crate::integrator::indirect_diffuse::DiffuseReservoir;
+use crate::integrator::interaction::interact;
+use crate::integrator::nested_dielectrics::MediumStack;
+use crate::integrator::path::{Path, Radiance};
+use crate::integrator::vertex::{Vertex, add_visible_light};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, next_distinct};
+
+impl<L: SimdFloat> Integrator<'_, L> {
+    /// Traces paths in a world without transmissive surfaces, and adds their radiance to `out`. The
+    /// paths start in the lanes `active`. `path` is overwritten. `reservoir` collects the hits from
+    /// which indirect diffuse light may bounce.
+    ///
+    /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. If `EMITTERS` is
+    /// `true`, `SIMPLE` is `false`; otherwise it is the value of
+    /// [`World::simple`](crate::World::simple). `SIMPLE` has the same meaning in all called
+    /// functions.
+    #[inline(never)]
+    pub fn trace_opaque<const SIMPLE: bool, const EMITTERS: bool>(
+        &self,
+        path: &mut Path<L>,
+        mut active: L::Mask,
+        mut reservoir: Option<&mut DiffuseReservoir<L>>,
+        out: &mut Radiance<L>,
+    ) {
+        let Self { world, sampler, mut candidates, depth } = *self;
+        for bounce in 0.. {
+            out.counts.add_rays(active);
+            let hit = if SIMPLE {
+                world.geometry.closest_linear(&path.ray, &candidates.primary, active)
+            } else {
+                world.geometry.closest_masked(&path.ray, &candidates.primary, active)
+            };
+            active = add_visible_light(world, path, hit.t, (active, EMITTERS), None, out);
+            let Some(first) = next_distinct(hit.primitive, active) else { return };
+            let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
+            let mut bouncing = None;
+            if EMITTERS && let Some(reservoir) = &mut reservoir {
+                let media = (&MediumStack::vacuum(), None);
+                bouncing = Some(reservoir.offer(path, &interaction, media, sampler));
+            }
+            let is_last = bounce == depth;
+            let mut vertex = Vertex {
+                world,
+                path: &mut *path,
+                interaction: &interaction,
+                candidates,
+                sampler,
+                bounce,
+                media: None,
+                out: &mut *out,
+            };
+            vertex.shade::<SIMPLE>(&hit, EMITTERS, bouncing, |_| {
+                let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
+                ReflectedRays { lanes, share: L::one() }
+            });
+            if is_last || interaction.reflecting.none() {
+                return;
+            }
+            active = vertex.sample_reflection::<SIMPLE>(EMITTERS);
+            if active.none() {
+                return;
+            }
+            candidates = &world.all_candidates;
+        }
+    }
+}

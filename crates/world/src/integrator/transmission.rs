@@ -1,0 +1,485 @@
+//! Integrator of worlds with transmission. At an interface a path splits into a reflected and a
+//! transmitted ray.
+
+use crate::culling::tile::TileCandidates;
+use crate::integrator::Integrator;
+use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
+use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density};
+use crate::integrator::indirect_diffuse::DiffuseReservoir;
+use crate::integrator::interaction::{SurfaceInteraction, interact};
+use crate::integrator::interface_lighting::RoughInterface;
+use crate::integrator::nested_dielectrics::{InterfaceHit, Media, MediumStack, NestedDielectrics};
+use crate::integrator::path::{Counts, Path, Radiance};
+use crate::integrator::vertex::{Vertex, add_visible_light};
+use zerkalo_kernel::bvh::{Hit, Ray};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_scene::material::Interface;
+
+/// Number of surfaces, counted from the eye or from the latest diffuse bounce, at which a path
+/// splits into reflection and refraction if the surface is an interface. At later interfaces one of
+/// the two is chosen at random.
+const SPLIT_DEPTH: usize = 2;
+
+/// One branch of a packet of paths, which split into reflection and transmission at interfaces. All
+/// paths of the branch have hit the same number of surfaces.
+#[derive(Clone, Copy)]
+pub(crate) struct Branch<L: SimdFloat> {
+    pub path: Path<L>,
+    pub lanes: L::Mask,
+    /// Media that the rays are inside of.
+    pub media: MediumStack<L>,
+    /// Number of surfaces that the paths have hit before, since the camera or the latest diffuse
+    /// bounce.
+    pub bounce: u32,
+    /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
+    pub coincident: Option<CoincidentState<L>>,
+}
+
+impl<L: SimdFloat> Branch<L> {
+    /// Creates the paths of camera rays, which start in vacuum.
+    #[inline(always)]
+    pub fn camera(ray: Ray<L>, lanes: L::Mask) -> Self {
+        let media = MediumStack::vacuum();
+        Self { path: Path::new(ray), lanes, media, bounce: 0, coincident: None }
+    }
+
+    /// Returns the branch `yes` in lanes where `mask` is true and `no` elsewhere. Fields that are
+    /// the same for all lanes are those of `no`.
+    #[inline(always)]
+    fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        let coincident = yes.coincident.as_ref().zip(no.coincident.as_ref());
+        Self {
+            path: Path {
+                ray: Ray {
+                    origin: Vec3::select(mask, yes.path.ray.origin, no.path.ray.origin),
+                    direction: Vec3::select(mask, yes.path.ray.direction, no.path.ray.direction),
+                },
+                throughput: Vec3::select(mask, yes.path.throughput, no.path.throughput),
+                lobe_density: L::select(mask, yes.path.lobe_density, no.path.lobe_density),
+            },
+            media: MediumStack::select(mask, &yes.media, &no.media),
+            coincident: coincident.map(|(yes, no)| CoincidentState::select(mask, yes, no)),
+            ..*no
+        }
+    }
+}
+
+/// Reflected and transmitted paths at the interfaces of a packet.
+struct Split<'a, L: SimdFloat> {
+    rough: &'a RoughInterface<'a, L>,
+    /// Refraction as if the surfaces had no roughness.
+    interface: Interface<L>,
+    reflected: Path<L>,
+    transmitted: Path<L>,
+}
+
+/// Integrator of scenes with transmission.
+pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
+    pub base: Integrator<'a, L>,
+    pub nested_dielectrics: &'a NestedDielectrics<L>,
+}
+
+impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
+    /// Traces the rays of `start` and overwrites it. In each lane, the transmitted branch of an
+    /// interface is traced before the reflected one; this order does not depend on the other lanes.
+    /// `reservoir` collects the hits from which indirect diffuse light may bounce.
+    #[inline(never)]
+    pub fn trace(
+        &self,
+        start: &mut Branch<L>,
+        mut reservoir: Option<&mut DiffuseReservoir<L>>,
+        out: &mut Radiance<L>,
+    ) {
+        // Reflected branches that are traced after the transmitted branches of the same interface.
+        // Entry i starts at the path's surface number i + 1, counted from 1. Branches are large, so
+        // they are traced where they are stored, and the array literal leaves the bytes of unused
+        // entries uninitialised.
+        let mut waiting: [Option<Branch<L>>; SPLIT_DEPTH] = [None, None];
+        // Number of the entry of `waiting` whose branch is traced, counted from 1; 0 stands for
+        // `start`.
+        let mut current = 0;
+        loop {
+            let (traced, deeper) = waiting.split_at_mut(current);
+            let branch = match traced.last_mut() {
+                None => &mut *start,
+                Some(Some(branch)) => branch,
+                Some(None) => return,
+            };
+            if self.advance(branch, deeper, reservoir.as_deref_mut(), out) {
+                continue;
+            }
+            if let Some(finished) = traced.last_mut() {
+                *finished = None;
+            }
+            match waiting.iter().rposition(Option::is_some) {
+                Some(deepest) => current = deepest + 1,
+                None => return,
+            }
+        }
+    }
+
+    /// Traces the rays of `branch` to their next surfaces and adds the radiance of these. Replaces
+    /// `branch` by the paths that continue, and returns `false` if there are none. At an interface
+    /// among the first [`SPLIT_DEPTH`] surfaces, the reflected branch is stored in `waiting`.
+    fn advance(
+        &self,
+        branch: &mut Branch<L>,
+        waiting: &mut [Option<Branch<L>>],
+        reservoir: Option<&mut DiffuseReservoir<L>>,
+        out: &mut Radiance<L>,
+    ) -> bool {
+        let Integrator { world, sampler, candidates, depth } = self.base;
+        let candidates = if branch.bounce == 0 { candidates } else { &world.all_candidates };
+        out.counts.add_rays(branch.lanes);
+        let (mut hit, behind) = self.hit(branch, candidates);
+        // Paths and media are large, so they are borrowed instead of copied.
+        let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
+        let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
+        let emitters = world.has_emitters();
+        let lanes = add_visible_light(world, path, hit.t, (branch.lanes, emitters), media, out);
+        let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
+        let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
+        let coincident = self.nested_dielectrics.contacts.as_ref().and_then(|contacts| {
+            let hits = (&mut hit, &mut interaction);
+            self.coincident(contacts, path, hits, lanes, (behind.as_ref(), stack))
+        });
+        let reversed = coincident.as_ref().map(CoincidentState::reversed);
+        let interface_hit = self.interface_hit(&interaction, lanes, stack);
+        if let Some(interface_hit) = &interface_hit {
+            interaction.mask_out(interface_hit.suppressed);
+        }
+        let bouncing = reservoir.map(|reservoir| {
+            let media = match &interface_hit {
+                Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, stack),
+                None => *stack,
+            };
+            reservoir.offer(path, &interaction, (&media, reversed.as_ref()), sampler)
+        });
+        let interaction = &interaction;
+        let mut vertex =
+            Vertex { world, path, interaction, candidates, sampler, bounce, media, out };
+        let is_last = bounce == depth;
+        vertex.shade::<false>(&hit, emitters, bouncing, |vertex| {
+            if is_last {
+                return ReflectedRays { lanes: L::mask(false), share: L::one() };
+            }
+            reflected_rays(vertex, interface_hit.as_ref())
+        });
+        if is_last {
+            return false;
+        }
+        branch.bounce = bounce + 1;
+        let Some(interface_hit) = &interface_hit else {
+            branch.lanes = vertex.sample_reflection::<false>(emitters);
+            branch.coincident = reversed;
+            return branch.lanes.any();
+        };
+        let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
+        let rough = RoughInterface::new(&vertex, interface_hit, coincident_lanes);
+        if rough.reflecting.any() {
+            vertex.interface_lighting(&rough, self.nested_dielectrics);
+        }
+        let split = Split::new(&mut vertex, &rough);
+        let reflects = (interaction.reflecting | interface_hit.lanes)
+            & world.reaches_min_weight(split.reflected.throughput);
+        let transmits =
+            interface_hit.lanes & world.reaches_min_weight(split.transmitted.throughput);
+        let reflected = Branch {
+            path: split.reflected,
+            lanes: reflects,
+            media: MediumStack::select(interface_hit.lanes, &interface_hit.medium_reflected, stack),
+            bounce: bounce + 1,
+            coincident: reversed,
+        };
+        let transmitted = Branch {
+            path: split.transmitted,
+            lanes: transmits,
+            media: interface_hit.medium_transmitted,
+            bounce: bounce + 1,
+            coincident,
+        };
+        self.follow(branch, reflected, transmitted, waiting, &mut out.counts)
+    }
+
+    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
+    /// of the surface that the path crosses first (see [`Contacts`]). `behind` is the coincident
+    /// surface behind the start points of the rays, if one was found. Returns the state of rays that
+    /// pass the surface, or `None` if no surfaces coincide.
+    #[inline(never)]
+    fn coincident(
+        &self,
+        contacts: &Contacts<L::Scalar>,
+        path: &Path<L>,
+        (hit, interaction): (&mut Hit<L>, &mut SurfaceInteraction<L>),
+        lanes: L::Mask,
+        (behind, media): (Option<&CoincidentQuery<L>>, &MediumStack<L>),
+    ) -> Option<CoincidentState<L>> {
+        let uncrossed = lanes.and_not(behind.map_or(L::mask(false), |next| next.lanes));
+        let contact_lanes = contacts.near(interaction.primitive, interaction.point, uncrossed);
+        let (mut layer, mut offset, mut coincident_lanes) =
+            (L::zero(), interaction.offset, L::mask(false));
+        if let Some(next) = behind {
+            // The surface that the rays have left is in front of the surface that they hit, and
+            // occludes all lights on the side of the rays.
+            if self.base.world.shadows {
+                interaction.shade(next.lanes);
+            }
+            (layer, coincident_lanes) = (next.layer, next.lanes);
+            offset = offset.max(next.offset.masked(coincident_lanes));
+        }
+        if contact_lanes.any() {
+            let (primitive, point, axis) =
+                (interaction.primitive, interaction.point, -interaction.geometric);
+            let coincident =
+                CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
+            let first =
+                contacts.first(&self.base.world.geometry, &coincident, !interaction.front, media);
+            if first.lanes.any() {
+                hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
+                if let Some(distinct) = next_distinct(hit.primitive, lanes) {
+                    *interaction =
+                        interact::<_, false>(self.base.world, &path.ray, hit, distinct, lanes);
+                    offset = offset.max(interaction.offset);
+                    if let (Some(next), true) = (behind, self.base.world.shadows) {
+                        interaction.shade(next.lanes);
+                    }
+                }
+            }
+            layer = L::select(first.touching, first.layer, layer);
+            coincident_lanes = coincident_lanes | first.touching;
+            offset = offset.max(first.offset.masked(first.touching));
+        }
+        interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
+        let coincident = CoincidentState {
+            lanes: coincident_lanes,
+            primitive: interaction.primitive,
+            point: interaction.point,
+            axis: -interaction.geometric,
+            layer,
+        };
+        coincident_lanes.any().then_some(coincident)
+    }
+
+    /// Returns the hits of `lanes` on transmissive surfaces. Returns `None` if no lane hits such a
+    /// surface.
+    fn interface_hit(
+        &self,
+        interaction: &SurfaceInteraction<L>,
+        lanes: L::Mask,
+        media: &MediumStack<L>,
+    ) -> Option<InterfaceHit<L>> {
+        let mut transmissive = L::mask(false);
+        let mut index = L::one();
+        for (bsdf, bsdf_lanes) in interaction.bsdfs(lanes) {
+            if let Some(transmission) = &self.base.world.bsdfs[bsdf].transmission {
+                transmissive = transmissive | bsdf_lanes;
+                index = L::select(bsdf_lanes, L::splat(transmission.index), index);
+            }
+        }
+        self.nested_dielectrics.cross(interaction, transmissive, media, index)
+    }
+
+    /// Finds the hits of the rays of `branch`. Rays that start on coincident surfaces may hit the
+    /// next of these surfaces, which is returned as well; their origin is then moved onto it.
+    fn hit(
+        &self,
+        branch: &mut Branch<L>,
+        candidates: &TileCandidates,
+    ) -> (Hit<L>, Option<CoincidentQuery<L>>) {
+        let geometry = &self.base.world.geometry;
+        let ray = &mut branch.path.ray;
+        let mut hit = geometry.closest_masked(ray, &candidates.primary, branch.lanes);
+        let (Some(contacts), Some(coincident)) =
+            (&self.nested_dielectrics.contacts, &branch.coincident)
+        else {
+            return (hit, None);
+        };
+        let lanes = coincident.lanes & branch.lanes;
+        if lanes.none() {
+            return (hit, None);
+        }
+        let coincident = CoincidentState { lanes, ..*coincident };
+        let next = contacts.next(geometry, &coincident, &branch.media);
+        ray.origin = Vec3::select(next.lanes, coincident.point, ray.origin);
+        hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
+        (hit, Some(next))
+    }
+
+    /// Continues `branch` with the transmitted paths, and with the reflected paths in lanes without
+    /// transmitted ones. Lanes with both store the reflected branch in `waiting`; after
+    /// [`SPLIT_DEPTH`] surfaces they choose one of the two at random. Returns `false` if no path
+    /// continues.
+    fn follow(
+        &self,
+        branch: &mut Branch<L>,
+        mut reflected: Branch<L>,
+        mut transmitted: Branch<L>,
+        waiting: &mut [Option<Branch<L>>],
+        counts: &mut Counts,
+    ) -> bool {
+        let surfaces = reflected.bounce as usize;
+        let both = reflected.lanes & transmitted.lanes;
+        let mut transmits = transmitted.lanes;
+        if both.any() {
+            if surfaces <= SPLIT_DEPTH {
+                let entry = waiting.len() + surfaces - 1 - SPLIT_DEPTH;
+                waiting[entry] = Some(Branch { lanes: both, ..reflected });
+            } else {
+                counts.glossy = true;
+                let [r, t] = [&reflected, &transmitted].map(|b| b.path.throughput.max_element());
+                let number = self.base.sampler.branch_1d((surfaces - 1 - SPLIT_DEPTH) as u32);
+                transmits = transmits.and_not(both & (number * (r + t)).lt(r));
+                for (branch, own) in [(&mut reflected, r), (&mut transmitted, t)] {
+                    let throughput = &mut branch.path.throughput;
+                    *throughput = Vec3::select(both, *throughput * ((r + t) / own), *throughput);
+                }
+            }
+        }
+        let lanes = reflected.lanes | transmitted.lanes;
+        *branch = Branch { lanes, ..Branch::select(transmits, &transmitted, &reflected) };
+        lanes.any()
+    }
+}
+
+/// Returns the reflected rays that find emitters, too, and the share of the light that is
+/// reflected. Rough interfaces are excluded; see [`RoughInterface`].
+fn reflected_rays<L: SimdFloat>(
+    vertex: &Vertex<'_, L>,
+    hit: Option<&InterfaceHit<L>>,
+) -> ReflectedRays<L> {
+    let interaction = vertex.interaction;
+    let (mut followed, mut share) = (interaction.reflecting, L::one());
+    let Some(hit) = hit else { return ReflectedRays { lanes: followed, share } };
+    let query = hit.query(vertex);
+    let interface = query.interface(interaction.normal);
+    for (index, lanes) in interaction.bsdfs(followed & hit.lanes) {
+        let bsdf = &vertex.world.bsdfs[index];
+        if !bsdf.is_delta() {
+            followed = followed.and_not(lanes);
+        }
+        share = L::select(lanes, bsdf.split(&interface, &query).reflected, share);
+    }
+    ReflectedRays { lanes: followed.and_not(hit.suppressed), share }
+}
+
+impl<'a, L: SimdFloat> Split<'a, L> {
+    /// Samples the reflected and the transmitted directions at the hit points of `vertex`. The
+    /// surface must transmit in at least one lane.
+    fn new(vertex: &mut Vertex<'_, L>, rough: &'a RoughInterface<'a, L>) -> Self {
+        let (world, interaction, hit) = (vertex.world, vertex.interaction, rough.hit);
+        let incident = vertex.path.ray.direction;
+        let interface = rough.query.interface(interaction.normal);
+        let path = |origin, direction| Path {
+            ray: Ray { origin, direction },
+            throughput: Vec3::zero(),
+            lobe_density: L::from_f64(L::MAX),
+        };
+        let straight = hit.thin | hit.suppressed;
+        let refracted = Vec3::select(straight, incident, interface.refracted);
+        let mut split = Self {
+            rough,
+            interface,
+            reflected: path(interaction.ray_origin(), incident.reflect(interaction.normal)),
+            transmitted: path(interaction.ray_origin_behind(), refracted),
+        };
+        let mut numbers = None;
+        for (index, lanes) in interaction.bsdfs(interaction.reflecting | hit.lanes) {
+            let bsdf = &world.bsdfs[index];
+            if bsdf.transmission.is_some() && !bsdf.is_delta() {
+                split.sample_rough(vertex, index, lanes, &mut numbers);
+            } else {
+                split.sample_smooth(vertex, index, lanes, &mut numbers);
+            }
+        }
+        let Self { reflected, transmitted, .. } = &mut split;
+        if world.smooth {
+            let direction = &mut reflected.ray.direction;
+            *direction = interaction.reflect_into_hemisphere(*direction);
+            // Transmitted directions that stay in front of the surface are mirrored to the other
+            // side.
+            let direction = &mut transmitted.ray.direction;
+            *direction = -interaction.reflect_into_hemisphere(-*direction);
+        }
+        let sides = [(false, rough.reflecting, reflected), (true, rough.transmitting, transmitted)];
+        for (behind, lanes, path) in sides {
+            if lanes.any() {
+                let density = rough.eval(vertex, &path.ray.direction, behind).density;
+                path.lobe_density = L::select(lanes, density, path.lobe_density);
+            }
+            path.throughput = Path::bounded(path.throughput);
+        }
+        split
+    }
+
+    /// Samples the directions of `lanes`, whose surfaces have BSDF number `index`: they are opaque,
+    /// or transmit without roughness. `numbers` are those of [`Vertex::lobe_numbers`].
+    fn sample_smooth(
+        &mut self,
+        vertex: &mut Vertex<'_, L>,
+        index: usize,
+        lanes: L::Mask,
+        numbers: &mut Option<(L, L)>,
+    ) {
+        let RoughInterface { hit, query, .. } = self.rough;
+        let (world, interaction) = (vertex.world, vertex.interaction);
+        let throughput = vertex.path.throughput;
+        let bsdf = &world.bsdfs[index];
+        let mut share = L::one();
+        if bsdf.transmission.is_some() {
+            let shares = bsdf.split(&self.interface, query);
+            share = shares.reflected.masked(!hit.suppressed);
+            let transmitted = L::select(hit.suppressed, L::one(), shares.transmitted);
+            let transmitted = throughput * transmitted;
+            let tir = throughput * shares.tir.masked(!hit.suppressed);
+            self.transmitted.throughput =
+                Vec3::select(lanes, transmitted, self.transmitted.throughput);
+            self.reflected.throughput = Vec3::select(lanes, tir, self.reflected.throughput);
+        }
+        // Hits on the back of a one-sided surface have no BSDF to reflect.
+        let lanes = lanes & interaction.reflecting & share.gt(L::zero());
+        if lanes.none() {
+            return;
+        }
+        let uv = vertex.lobe_numbers(bsdf.is_delta(), numbers);
+        let sample = bsdf.sample(&query.rays, uv);
+        if world.has_emitters() {
+            let mut direction = sample.direction;
+            if world.smooth {
+                direction = interaction.reflect_into_hemisphere(direction);
+            }
+            let density = reflected_density(world, interaction, &query.rays, index, direction);
+            self.reflected.lobe_density = L::select(lanes, density, self.reflected.lobe_density);
+        }
+        let throughput = throughput.component_mul(sample.weight) * share;
+        let ray = &mut self.reflected.ray;
+        ray.direction = Vec3::select(lanes, sample.direction, ray.direction);
+        self.reflected.throughput = Vec3::select(lanes, throughput, self.reflected.throughput);
+    }
+
+    /// Samples the directions of `lanes`, whose surfaces have BSDF number `index` and transmit with
+    /// roughness. `numbers` are those of [`Vertex::lobe_numbers`].
+    #[inline(never)]
+    fn sample_rough(
+        &mut self,
+        vertex: &mut Vertex<'_, L>,
+        index: usize,
+        lanes: L::Mask,
+        numbers: &mut Option<(L, L)>,
+    ) {
+        let RoughInterface { hit, query, .. } = self.rough;
+        let uv = vertex.lobe_numbers(false, numbers);
+        let throughput = vertex.path.throughput;
+        let sample = vertex.world.bsdfs[index].sample_interface(query, uv);
+        // Rays pass a suppressed boundary (inside of a solid with a higher priority) unchanged.
+        let rough = lanes.and_not(hit.suppressed);
+        let weight = throughput.component_mul(sample.reflected_weight);
+        let reflected = &mut self.reflected;
+        reflected.ray.direction = Vec3::select(rough, sample.reflected, reflected.ray.direction);
+        reflected.throughput = Vec3::select(rough, weight, reflected.throughput);
+        let passed = L::select(hit.suppressed, L::one(), sample.transmitted_weight);
+        let transmitted = &mut self.transmitted;
+        transmitted.ray.direction =
+            Vec3::select(rough, sample.transmitted, transmitted.ray.direction);
+        transmitted.throughput = Vec3::select(lanes, throughput * passed, transmitted.throughput);
+    }
+}
