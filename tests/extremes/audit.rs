@@ -151,13 +151,13 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "Fresnel at every reflectance",
         "in [0, 1], F(1) = F0 within 1e-7",
         "fresnel",
-        "src/material/fresnel.rs",
+        "crates/scene/src/material/fresnel.rs",
     ),
     (
         "total reflection around the critical angle",
         "R + T = 1 within 1e-12, no NaN",
         "total_reflection",
-        "src/material/refraction.rs",
+        "crates/scene/src/material/refraction.rs",
     ),
     (
         "10,000 images between two mirrors",
@@ -207,7 +207,7 @@ fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
 fn extreme_tests() -> Vec<(String, String)> {
     let root = Path::new(env!("ZERKALO_ROOT"));
     let mut paths = Vec::new();
-    for folder in ["src", "tests"] {
+    for folder in ["src", "crates", "tests"] {
         rust_files(&root.join(folder), &mut paths);
     }
     let mut found = Vec::new();
