@@ -197,7 +197,7 @@ pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
         path,
         size: [film.width(), film.height()],
         spp: report.spp.mean,
-        noise_codes: report.noise.map(|noise| noise.rmse_codes),
+        noise_levels: report.noise.map(|noise| noise.rmse_levels),
     }
 }
 
