@@ -5,8 +5,8 @@
 //! `zerkalo-render` and this one. This crate re-exports the modules of the others.
 
 pub use zerkalo_render::{
-    asset, bvh, camera, disk, film, lanes, light, material, primitive, process_memory, render,
-    sampling, scene, shape, value, world,
+    asset, bvh, camera, disk, film, image_file, lanes, light, material, primitive, process_memory,
+    render, sampling, scene, shape, value, world,
 };
 
 pub mod command;

@@ -25,6 +25,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
             "light",
             "camera",
             "value",
+            "image_file",
             "film",
             "disk",
             "process_memory",
@@ -35,8 +36,21 @@ const FOLDERS: &[(&str, &[&str])] = &[
     (
         "dashboard",
         &[
-            "terminal", "render", "world", "scene", "shape", "material", "asset", "light",
-            "camera", "value", "film", "disk", "sampling", "lanes",
+            "terminal",
+            "render",
+            "world",
+            "scene",
+            "shape",
+            "material",
+            "asset",
+            "light",
+            "camera",
+            "value",
+            "image_file",
+            "film",
+            "disk",
+            "sampling",
+            "lanes",
         ],
     ),
     ("terminal", &[]),
@@ -49,6 +63,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
             "material",
             "camera",
             "value",
+            "image_file",
             "film",
             "disk",
             "process_memory",
@@ -93,6 +108,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
     ("primitive", &["bvh", "lanes"]),
     ("bvh", &["lanes"]),
     ("camera", &["value", "lanes"]),
+    ("image_file", &["film", "disk"]),
     ("film", &["value", "disk", "lanes"]),
     ("value", &[]),
     ("disk", &[]),
@@ -111,14 +127,14 @@ const CRATES: &[(&str, &[&str])] = &[
     ("crossbeam_channel", &["render", "dashboard", "terminal"]),
     ("crossterm", &["terminal"]),
     ("csv", &["command"]),
-    ("exr", &["asset", "film"]),
+    ("exr", &["asset", "image_file"]),
     ("gltf", &["asset"]),
     ("icy_sixel", &["terminal"]),
     ("indicatif", &["command"]),
     ("nucleo_matcher", &["dashboard"]),
     ("plotters", &["measure"]),
     ("ply_rs_bw", &["asset"]),
-    ("png", &["asset", "film"]),
+    ("png", &["asset", "image_file"]),
     ("ratatui", &["dashboard", "terminal"]),
     ("rayon", &["render"]),
     // `scene` uses rustix in tests only.
@@ -130,7 +146,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("stl_io", &["asset"]),
     ("strsim", &["scene"]),
     // `asset` uses tempfile in tests only.
-    ("tempfile", &["film", "disk", "command", "scene", "dashboard", "asset"]),
+    ("tempfile", &["film", "image_file", "disk", "command", "scene", "dashboard", "asset"]),
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("tobj", &["asset"]),
     ("toml_edit", &["scene"]),
@@ -289,7 +305,7 @@ fn crates_are_used_only_where_the_map_allows() {
         let Some(folder) = folder_of(&path) else { continue };
         let code = code(&text);
         for (name, allowed) in CRATES {
-            // A sibling module of the same name (`film::png`) shadows the crate.
+            // A sibling module of the same name (`mesh::gltf`) shadows the crate.
             let module = path.parent().unwrap().join(format!("{name}.rs"));
             let is_module = Path::new(env!("CARGO_MANIFEST_DIR")).join(module).exists();
             let used = !first_names(&code, &format!("{name}::")).is_empty()

@@ -1,12 +1,12 @@
 //! Check of a big picture against single pixels, which are traced without tiles and without regions
 //! (bands that are rendered one after the other).
 
-use crate::support::test_film::TestFilm;
 use crate::support::{shipped, sized};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
 use zerkalo::lanes::{Double, SimdFloat};
 use zerkalo::sampling::{SampleSettings, SamplerKind};

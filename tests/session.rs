@@ -2,10 +2,10 @@
 //! earlier scenes.
 
 use crate::support;
-use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::disk::Existing;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::render::Checkpoint;
 use zerkalo::render::export::Provenance;
 use zerkalo::render::schedule::Stop;

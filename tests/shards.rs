@@ -1,8 +1,8 @@
 //! Renders that are divided into shards (parts, each for one process): equality with a render by
 //! one process, interruption, and the noise that a plan promises.
 
-use crate::support::test_film::TestFilm;
 use std::path::Path;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::film::{Display, Film, Noise};
 use zerkalo::render::plan::{Plan, PlanSettings, ShardRender};
 use zerkalo::render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};

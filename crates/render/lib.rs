@@ -1,4 +1,4 @@
-//! zerkalo, part 3 of 4: films and rendering.
+//! zerkalo, part 3 of 4: films, image files and rendering.
 //!
 //! The source is in `src`, one folder per module. The modules of earlier parts are re-exported, so
 //! that paths are the same in every part.
@@ -10,5 +10,7 @@ pub use zerkalo_world::{
 
 #[path = "../../src/film/mod.rs"]
 pub mod film;
+#[path = "../../src/image_file/mod.rs"]
+pub mod image_file;
 #[path = "../../src/render/mod.rs"]
 pub mod render;

@@ -1,7 +1,8 @@
 //! Command-line arguments, parsed by clap. Doc comments of arguments are their help texts.
 
 use crate::dashboard::run::{Colors, TerminalSetup};
-use crate::film::{Depth, Display, Tone};
+use crate::film::{Display, Tone};
+use crate::image_file::Depth;
 use crate::measure::Experiment;
 use crate::render::plan::MAX_SHARDS;
 use crate::sampling::SamplerKind;

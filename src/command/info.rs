@@ -2,7 +2,7 @@
 
 use crate::command::args::InfoArgs;
 use crate::command::{Failure, print_line, read_scene};
-use crate::film::FileMetadata;
+use crate::image_file::FileMetadata;
 use crate::render::SampleInputs;
 use crate::render::export::{scene_hash, settings_text};
 use crate::render::plan::{BASE, Part, Plan, is_plan_file};

@@ -4,8 +4,9 @@
 use crate::command::Failure;
 use crate::command::progress::noise;
 use crate::disk::{Existing, WriteError, check_writable};
+use crate::film::Film;
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use crate::film::{Depth, Film, ImageOutput};
+use crate::image_file::{Depth, ImageOutput};
 use crate::render::RenderState;
 use crate::render::export::{Provenance, film_header};
 use crate::render::plan::Part;
@@ -41,7 +42,7 @@ impl FilmOutput {
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
-            Self::Picture(output, depth) => header.write_picture(film, *depth, output),
+            Self::Picture(output, depth) => output.write_film(header, film, *depth),
         }
     }
 }

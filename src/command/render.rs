@@ -8,7 +8,7 @@ use crate::command::signals::Signals;
 use crate::command::stats::Stats;
 use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
 use crate::disk::{self, WriteError, check_writable};
-use crate::film::ImageOutput;
+use crate::image_file::ImageOutput;
 use crate::process_memory::resident_memory;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};

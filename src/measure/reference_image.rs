@@ -250,7 +250,7 @@ fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::test_random::Rng;
+    use crate::film::testing::Rng;
 
     /// Returns random pixels with mean 0.5 and two kinds of noise: grey noise with the standard
     /// deviation `s`, and independent noise in each channel with a third of this standard

@@ -2,8 +2,9 @@
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
 use crate::disk::WriteError;
+use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Display, ImageData, ImageOutput, WholeFilm};
+use crate::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;

@@ -1,11 +1,11 @@
 //! Thin lens: circles of confusion against their closed form, and lenses of zero size and of the
 //! size of the room.
 
-use crate::support::test_film::TestFilm;
 use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
 use std::f64::consts::PI;
 use zerkalo::camera::{Aperture, Focus};
 use zerkalo::film::Replicates;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;

@@ -2,8 +2,8 @@
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
-use crate::support::test_film::TestFilm;
 use crate::support::{rendered, shipped, sized};
+use zerkalo::film::testing::TestFilm;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 

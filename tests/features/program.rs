@@ -4,13 +4,13 @@
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, material, number};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::disk::Existing;
 use zerkalo::film::file::FilmReader;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::film::{Display, Film, Replicates, TILE};
 use zerkalo::material::Material;
 use zerkalo::render::export::Provenance;

@@ -3,7 +3,8 @@
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, follow, pool, settings, shipped, sized};
 use std::sync::Arc;
-use zerkalo::film::{Bands, Display, Film, Replicates};
+use zerkalo::film::{Display, Film, Replicates};
+use zerkalo::image_file::Bands;
 use zerkalo::render::export::Provenance;
 use zerkalo::render::schedule::Stop;
 use zerkalo::render::{Options, RegionRender};

@@ -1,10 +1,10 @@
 //! Tests of renders that are divided among machines.
 
 use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
 use zerkalo::disk::Existing;
 use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
+use zerkalo::film::testing::TestFilm;
 use zerkalo::film::{Display, Film, LightWeights};
 use zerkalo::render::plan::{
     Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,

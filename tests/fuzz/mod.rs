@@ -4,7 +4,6 @@
 mod files;
 mod mutate;
 
-use crate::support::test_film::TestFilm;
 use mutate::Random;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
@@ -13,6 +12,7 @@ use zerkalo::asset::Assets;
 use zerkalo::disk::Existing;
 use zerkalo::film::Display;
 use zerkalo::film::file::{FilmFileHeader, FilmReader};
+use zerkalo::film::testing::TestFilm;
 use zerkalo::render::export::Provenance;
 use zerkalo::render::plan::Plan;
 use zerkalo::render::schedule::{Criterion, Settings, Stop};

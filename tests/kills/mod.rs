@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use zerkalo::film::read_exr;
+use zerkalo::image_file::read_exr;
 use zerkalo::scene::Recovery;
 use zerkalo::terminal::{ENTER, LEAVE};
 

@@ -5,10 +5,10 @@
 mod noise;
 
 use crate::support;
-use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
+use zerkalo::film::testing::TestFilm;
 use zerkalo::film::{Display, LinearImage, Tone};
 use zerkalo::lanes::{SimdFloat, Single};
 use zerkalo::render::schedule::{Stop, StoppedBy};

@@ -2,9 +2,9 @@
 //! identical byte for byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
 use crate::support::{accelerated, picture};
 use zerkalo::film::Replicates;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::Precision;
 

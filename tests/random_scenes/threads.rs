@@ -2,9 +2,9 @@
 //! counts must be equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, pool, settings, trace};
 use zerkalo::film::Noise;
+use zerkalo::film::testing::TestFilm;
 use zerkalo::render::schedule::{Step, Stop, StoppedBy};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;

@@ -2,8 +2,8 @@
 //! leave all others equal in every bit.
 
 use crate::stories::simulated_dashboard::Desk;
-use crate::support::test_film::TestFilm;
 use crate::support::{pool, rendered, sized};
+use zerkalo::film::testing::TestFilm;
 use zerkalo::render::{FirstHitBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};
 use zerkalo::value::Color;

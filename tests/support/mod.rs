@@ -2,7 +2,6 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 pub mod png_file;
-pub mod test_film;
 
 use crate::common::NAME;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -11,7 +10,7 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
-use zerkalo::film::{Display, Film, LightWeights, Replicates, TILE, Tile};
+use zerkalo::film::{Display, Film, Replicates};
 use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 use zerkalo::render::session::Session;
 use zerkalo::render::wave::{Job, Wave, WaveReport};

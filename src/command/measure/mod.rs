@@ -9,7 +9,8 @@ use crate::command::progress::style;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene_and_warn};
 use crate::disk::{self, check_writable};
-use crate::film::{self, Display};
+use crate::film::Display;
+use crate::image_file;
 use crate::measure::{self, Experiment, Plan, Reference};
 use crate::world::{self, AnyWorld};
 use indicatif::ProgressBar;
@@ -109,7 +110,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
         Drawing::Svg => measure::plot::svg(report.measurement, &title).map(String::into_bytes),
         Drawing::Png => measure::plot::pixels(report.measurement, &title).and_then(|pixels| {
             let (width, height) = measure::plot::size(report.measurement);
-            Ok(film::png_of_rgb([width, height], &pixels)?)
+            Ok(image_file::png_of_rgb([width, height], &pixels)?)
         }),
     };
     let bytes = drawn.map_err(|error| format!("cannot draw: {error}"))?;
@@ -119,7 +120,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
 /// Reads the reference picture at `path`, an EXR file that must have the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
-    let read = film::read_exr(path).map_err(failed)?;
+    let read = image_file::read_exr(path).map_err(failed)?;
     let [width, height] = read.size;
     if read.size != size.map(|n| n as usize) {
         return Err(failed(format!(

@@ -7,7 +7,8 @@ use crate::dashboard::run::export_paths::numbered;
 use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Film, ImageOutput, LinearImage};
+use crate::film::{Film, LinearImage};
+use crate::image_file::{Depth, ImageOutput};
 use crate::render::plan::WatchedFilms;
 use crate::render::session::{Report, Snapshot, WatchSession};
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -63,7 +64,7 @@ fn write(
     let stem = stem(None, header.source().unwrap_or_default());
     let create = |path: &Path| {
         let output = ImageOutput::from_path(path)?.create_new();
-        header.write_picture(film, Depth::Eight, &output)
+        output.write_film(header, film, Depth::Eight)
     };
     let path = numbered(&stem, format.extension(), create)?;
     Ok(exported(path, film, report))

@@ -2,8 +2,8 @@
 //! padding reserves place for a value that becomes known only at the end of a render.
 
 use crate::disk::open_regular;
-use crate::film::exr_read::read_exr_meta;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
+use crate::image_file::exr_reader::read_exr_meta;
 use exr::meta::attribute::AttributeValue;
 use png::Decoder;
 use std::io::BufReader;
