@@ -3,8 +3,10 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use zerkalo::film::{Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone};
-use zerkalo::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
+use zerkalo_render::film::{
+    Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone,
+};
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 /// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
 /// replicates (halves of the samples) of 64 samples each. The noise is estimated from the

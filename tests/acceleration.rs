@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::support;
-use zerkalo::film::testing::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};
@@ -10,9 +10,9 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use support::{accelerated, all_shipped, parsed, sized};
-use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Picture size in pixels. Neither side is a multiple of a tile's side.
 const SIZE: [u32; 2] = [37, 35];

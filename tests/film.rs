@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::common::report;
-use zerkalo::film::testing::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use proptest::prelude::*;
@@ -10,11 +10,11 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
-use zerkalo::film::{
+use zerkalo_render::film::{
     Display, Film, Header, InvalidSample, LightWeights, Replicates, TILE, Tile, TileHandle, Tone,
     lattice_pixels, quantised_8, quantised_16,
 };
-use zerkalo::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;

@@ -1,6 +1,6 @@
 //! Errors of pictures against a reference picture.
 
-use crate::film::{Display, Film, LightWeights, Replicates};
+use zerkalo_render::film::{Display, Film, LightWeights, Replicates};
 
 /// Number that is added to the squared reference value in the denominator of the relative error, so
 /// that the error stays bounded at dark pixels. The relative error is relMSE = mean((x - r)^2 /
@@ -250,7 +250,7 @@ fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::Rng;
+    use zerkalo_render::film::testing::Rng;
 
     /// Returns random pixels with mean 0.5 and two kinds of noise: grey noise with the standard
     /// deviation `s`, and independent noise in each channel with a third of this standard

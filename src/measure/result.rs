@@ -284,8 +284,8 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::Rng;
     use crate::measure::reference_image::Errors;
+    use zerkalo_render::film::testing::Rng;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
         let point = |(step, (spp, levels)): (usize, &(f64, f64))| Point {

@@ -2,8 +2,8 @@
 
 use super::*;
 use std::time::Duration;
-use zerkalo::film::file::FilmReader;
-use zerkalo::film::testing::TestFilm;
+use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 /// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;

@@ -3,8 +3,8 @@
 
 use crate::command_line::Desk;
 use std::fs;
-use zerkalo::film::file::FilmReader;
-use zerkalo::film::testing::TestFilm;
+use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 /// Runs the program with `args`, which must succeed. Returns the program's output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {

@@ -3,9 +3,9 @@
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
 use crate::support::{rendered, shipped, sized};
-use zerkalo::film::testing::TestFilm;
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_render::film::testing::TestFilm;
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {

@@ -3,11 +3,11 @@
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{begin, pool, settings, trace};
-use zerkalo::film::Noise;
-use zerkalo::film::testing::TestFilm;
-use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Noise;
+use zerkalo_render::film::testing::TestFilm;
+use zerkalo_render::schedule::{Step, Stop, StoppedBy};
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;

@@ -3,11 +3,11 @@
 
 use crate::stories::simulated_dashboard::Desk;
 use crate::support::{pool, rendered, sized};
-use zerkalo::film::testing::TestFilm;
-use zerkalo::render::{FirstHitBuffer, RenderState};
-use zerkalo::scene::{BUILT_IN, Scene};
-use zerkalo::value::Color;
-use zerkalo::world::{FirstHit, Precision};
+use zerkalo_render::film::testing::TestFilm;
+use zerkalo_render::{FirstHitBuffer, RenderState};
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{BUILT_IN, Scene};
+use zerkalo_world::{FirstHit, Precision};
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;

@@ -6,16 +6,16 @@ use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
 use crate::dashboard::run::export_paths::numbered;
 use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
-use crate::film::file::FilmFileHeader;
-use crate::film::{Film, LinearImage};
-use crate::image_file::{Depth, ImageOutput};
-use crate::render::plan::WatchedFilms;
-use crate::render::session::{Report, Snapshot, WatchSession};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_render::film::file::FilmFileHeader;
+use zerkalo_render::film::{Film, LinearImage};
+use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::session::{Report, Snapshot, WatchSession};
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
