@@ -4,7 +4,6 @@
 //! implementation only if this default is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
-use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Axis-parallel box: its lowest and its highest corner.
@@ -77,11 +76,6 @@ impl Proxy {
 
 /// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    fn transformed(self, map: &DAffine3) -> Form
-    where
-        Self: Sized;
-
     /// Returns the number of parts that can have a material of their own: the number of a
     /// compound's solids, 1 for all other geometry.
     fn parts(&self) -> usize {
@@ -91,6 +85,15 @@ pub trait CanonicalShape {
     /// Returns the axis-parallel bounding box; `None` if the geometry has no finite bounds. It is
     /// the smallest possible box, except for compounds.
     fn bounds(&self) -> Option<Bounds>;
+
+    /// Returns the largest magnitude of a coordinate of the bounding box; infinity if the geometry
+    /// has no finite bounds.
+    fn max_coordinate(&self) -> f64 {
+        match self.bounds() {
+            Some((low, high)) => low.abs().max(high.abs()).max_element(),
+            None => f64::INFINITY,
+        }
+    }
 
     /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds. The
     /// default is the sphere around the bounding box.

@@ -4,14 +4,14 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
     normals_of_solid, segment_distance,
 };
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rows, times};
 use crate::primitive::form::{Form, cast_compiled};
-use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
@@ -43,13 +43,16 @@ impl Form {
 }
 
 /// Number of normals that approximate the circle of normals at the tip of a cone.
-pub(crate) const AROUND_TIP: u32 = 64;
+pub const AROUND_TIP: u32 = 64;
+
+impl ConicalFrustumForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_unit: *map * self.scene_from_unit, ..self }
+    }
+}
 
 impl CanonicalShape for ConicalFrustumForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_unit: *map * self.scene_from_unit, ..self }.into()
-    }
-
     fn bounds(&self) -> Option<Bounds> {
         // The first two columns of the matrix map the unit disc to the base. The lengths of the
         // rows of these two columns are the half-widths of the base's bounding box.
@@ -186,16 +189,13 @@ pub struct ConicalFrustum<S> {
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// Compiles a conical frustum; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius }) = form
-        else {
-            return None;
-        };
+    /// Compiles a conical frustum.
+    pub fn new(form: &ConicalFrustumForm) -> Self {
+        let ConicalFrustumForm { scene_from_unit: m, top_radius } = form;
         let inverse = m.matrix3.inverse();
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
-        Some(Self {
+        Self {
             center: center.to_array().map(S::from_f64),
             unit_from_scene: rows(inverse),
             slope: S::from_f64(top_radius - 1.0),
@@ -203,7 +203,7 @@ impl<S: Float> ConicalFrustum<S> {
             cap_normal: up.normalize().to_array().map(S::from_f64),
             height: S::from_f64(up.length().recip()),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 

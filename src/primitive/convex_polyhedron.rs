@@ -2,14 +2,13 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
     extent_of_points, half_space, normals_of_solid,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
 /// Canonical form of a bounded convex solid: an intersection of half-spaces, with its corners.
@@ -21,8 +20,9 @@ pub struct ConvexPolyhedronForm {
     pub corners: Vec<DVec3>,
 }
 
-impl CanonicalShape for ConvexPolyhedronForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl ConvexPolyhedronForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
         let normals = map.matrix3.inverse().transpose();
         let face = |face: &HalfSpace| {
             let on_plane = map.transform_point3(face.normal * face.offset);
@@ -32,9 +32,10 @@ impl CanonicalShape for ConvexPolyhedronForm {
             faces: self.faces.iter().map(face).collect(),
             corners: self.corners.iter().map(|c| map.transform_point3(*c)).collect(),
         }
-        .into()
     }
+}
 
+impl CanonicalShape for ConvexPolyhedronForm {
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners)
     }
@@ -126,11 +127,9 @@ pub struct ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Compiles a convex polyhedron; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) = form else {
-            return None;
-        };
+    /// Compiles a convex polyhedron.
+    pub fn new(form: &ConvexPolyhedronForm) -> Self {
+        let ConvexPolyhedronForm { faces, corners } = form;
         let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let center = 0.5 * (low + high);
@@ -162,7 +161,7 @@ impl<S: Float> ConvexPolyhedron<S> {
                 None => out.faces.push(Face { normal, high: S::from_f64(high) }),
             }
         }
-        Some(out)
+        out
     }
 }
 

@@ -3,13 +3,12 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::sphere::{cast_at_unit_sphere, intersections};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -20,11 +19,14 @@ pub struct EllipsoidForm {
     pub scene_from_unit: DAffine3,
 }
 
-impl CanonicalShape for EllipsoidForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_unit: *map * self.scene_from_unit }.into()
+impl EllipsoidForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_unit: *map * self.scene_from_unit }
     }
+}
 
+impl CanonicalShape for EllipsoidForm {
     fn bounds(&self) -> Option<Bounds> {
         // The half-widths of the image's bounding box are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
@@ -142,15 +144,15 @@ pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L
 }
 
 impl<S: Float> Ellipsoid<S> {
-    /// Compiles an ellipsoid; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Ellipsoid(EllipsoidForm { scene_from_unit: m }) = form else { return None };
-        Some(Self {
-            center: m.translation.to_array().map(S::from_f64),
-            unit_from_scene: rows(m.matrix3.inverse()),
-            scene_from_unit: rows(m.matrix3),
+    /// Compiles an ellipsoid.
+    pub fn new(form: &EllipsoidForm) -> Self {
+        let DAffine3 { matrix3, translation } = form.scene_from_unit;
+        Self {
+            center: translation.to_array().map(S::from_f64),
+            unit_from_scene: rows(matrix3.inverse()),
+            scene_from_unit: rows(matrix3),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 

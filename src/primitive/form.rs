@@ -7,7 +7,7 @@ use crate::primitive::Aggregate;
 use crate::primitive::canonical::CanonicalShape;
 use crate::primitive::conical_frustum::ConicalFrustumForm;
 use crate::primitive::convex_polyhedron::ConvexPolyhedronForm;
-use crate::primitive::csg_tree::CsgSolid;
+use crate::primitive::csg::CsgSolid;
 use crate::primitive::ellipsoid::EllipsoidForm;
 use crate::primitive::mesh::instance::MeshForm;
 use crate::primitive::parallelogram::ParallelogramForm;
@@ -60,7 +60,7 @@ macro_rules! forms {
             /// any other form has the same variant.
             pub fn transformed(self, map: &DAffine3) -> Self {
                 match self {
-                    $(Self::$kind(form) => form.transformed(map),)+
+                    $(Self::$kind(form) => form.transformed(map).into(),)+
                 }
             }
         }
@@ -99,15 +99,6 @@ impl Form {
     /// Returns `true` if the geometry does not lie in a plane.
     pub fn is_solid(&self) -> bool {
         !self.is_flat()
-    }
-
-    /// Returns the largest magnitude of a coordinate of the bounding box. For an infinite plane it
-    /// is the distance of the plane from the origin.
-    pub fn max_coordinate(&self) -> f64 {
-        match self.bounds() {
-            Some((low, high)) => low.abs().max(high.abs()).max_element(),
-            None => self.plane().map_or(0.0, |plane| plane.offset.abs()),
-        }
     }
 }
 

@@ -2,13 +2,12 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
     extent_of_points, segment_distance,
 };
-use crate::primitive::form::Form;
+use crate::primitive::compiled::{Primitive, SurfacePoint};
 use glam::{DAffine3, DVec3};
 
 /// Flat parallelogram of the points `corner + a u + b v`, with a and b in 0..=1. Its front is the
@@ -23,17 +22,20 @@ pub struct ParallelogramForm {
     pub v: DVec3,
 }
 
-impl CanonicalShape for ParallelogramForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl ParallelogramForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
         // A map that mirrors space would exchange front and back. The edges are exchanged to
         // prevent this.
         let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
-        Self { corner, u, v }.into()
+        Self { corner, u, v }
     }
+}
 
+impl CanonicalShape for ParallelogramForm {
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners())
     }
@@ -127,19 +129,19 @@ pub struct Parallelogram<S> {
 }
 
 impl<S: Float> Parallelogram<S> {
-    /// Compiles a parallelogram; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Parallelogram(ParallelogramForm { corner, u, v }) = form else { return None };
-        let n = u.cross(*v);
+    /// Compiles a parallelogram.
+    pub fn new(form: &ParallelogramForm) -> Self {
+        let ParallelogramForm { corner, u, v } = *form;
+        let n = u.cross(v);
         let area2 = n.length_squared();
         let rounded = |v: DVec3| v.to_array().map(S::from_f64);
-        Some(Self {
-            corner: rounded(*corner),
+        Self {
+            corner: rounded(corner),
             normal: rounded(n.normalize()),
             dual_u: rounded(v.cross(n) / area2),
-            dual_v: rounded(n.cross(*u) / area2),
+            dual_v: rounded(n.cross(u) / area2),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 

@@ -2,12 +2,11 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, half_space,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
 /// Canonical form of an infinite plane. Its front is the side to which `normal` points.
@@ -19,16 +18,24 @@ pub struct PlaneForm {
     pub offset: f64,
 }
 
-impl CanonicalShape for PlaneForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl PlaneForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
         let normals = map.matrix3.inverse().transpose();
         let on_plane = map.transform_point3(self.normal * self.offset);
         let HalfSpace { normal, offset } = half_space(on_plane, normals * self.normal);
-        Self { normal, offset }.into()
+        Self { normal, offset }
     }
+}
 
+impl CanonicalShape for PlaneForm {
     fn bounds(&self) -> Option<Bounds> {
         None
+    }
+
+    /// Returns the distance of the plane from the origin.
+    fn max_coordinate(&self) -> f64 {
+        self.offset.abs()
     }
 
     fn plane(&self) -> Option<HalfSpace> {
@@ -80,10 +87,10 @@ pub struct Plane<S> {
 }
 
 impl<S: Float> Plane<S> {
-    /// Compiles a plane; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Plane(PlaneForm { normal, offset }) = form else { return None };
-        Some(Self { normal: normal.to_array().map(S::from_f64), offset: S::from_f64(*offset) })
+    /// Rounds the plane to the precision of the lanes.
+    pub fn new(form: &PlaneForm) -> Self {
+        let normal = form.normal.to_array().map(S::from_f64);
+        Self { normal, offset: S::from_f64(form.offset) }
     }
 }
 

@@ -2,14 +2,13 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, ProxyFace, normals_of_solid, similarity,
 };
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{Solid, SolidPrimitive, Span};
 use crate::primitive::ellipsoid::EllipsoidForm;
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
 /// Canonical form of a sphere.
@@ -21,8 +20,9 @@ pub struct SphereForm {
     pub radius: f64,
 }
 
-impl CanonicalShape for SphereForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl SphereForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Solid {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
             Some(scale) => {
@@ -36,7 +36,9 @@ impl CanonicalShape for SphereForm {
             .into(),
         }
     }
+}
 
+impl CanonicalShape for SphereForm {
     fn bounds(&self) -> Option<Bounds> {
         Some((self.center - self.radius, self.center + self.radius))
     }
@@ -99,15 +101,14 @@ pub struct Sphere<S> {
 }
 
 impl<S: Float> Sphere<S> {
-    /// Compiles a sphere; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Sphere(SphereForm { center, radius }) = form else { return None };
-        Some(Self {
-            center: center.to_array().map(S::from_f64),
-            radius: S::from_f64(*radius),
-            radius2: S::from_f64(radius * radius),
+    /// Rounds the sphere to the precision of the lanes.
+    pub fn new(form: &SphereForm) -> Self {
+        Self {
+            center: form.center.to_array().map(S::from_f64),
+            radius: S::from_f64(form.radius),
+            radius2: S::from_f64(form.radius * form.radius),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 

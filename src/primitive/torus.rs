@@ -16,15 +16,15 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid, similarity,
     sphere_around_box,
 };
+use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rows, times};
-use crate::primitive::form::{Form, cast_compiled};
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::form::cast_compiled;
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
@@ -54,11 +54,14 @@ impl TorusForm {
     }
 }
 
-impl CanonicalShape for TorusForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_torus: *map * self.scene_from_torus, ..self }.into()
+impl TorusForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_torus: *map * self.scene_from_torus, ..self }
     }
+}
 
+impl CanonicalShape for TorusForm {
     /// Returns the bounding box. The torus is the Minkowski sum of its ring and of a ball with the
     /// radius of the tube. Each half-width of the box is therefore the sum of the half-widths of
     /// ring and ball.
@@ -154,18 +157,17 @@ pub struct Torus<S> {
 }
 
 impl<S: Float> Torus<S> {
-    /// Compiles a torus; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Torus(torus) = form else { return None };
-        let DAffine3 { matrix3, translation } = torus.scene_from_unit();
-        Some(Self {
+    /// Compiles a torus.
+    pub fn new(form: &TorusForm) -> Self {
+        let DAffine3 { matrix3, translation } = form.scene_from_unit();
+        Self {
             center: translation.to_array().map(S::from_f64),
             unit_from_scene: rows(matrix3.inverse()),
             scene_from_unit: rows(matrix3),
-            tube: S::from_f64(torus.tube / torus.ring),
-            inverse_ring: S::from_f64(torus.ring.recip()),
+            tube: S::from_f64(form.tube / form.ring),
+            inverse_ring: S::from_f64(form.ring.recip()),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 

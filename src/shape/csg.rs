@@ -4,8 +4,7 @@
 //! that users can copy the text of an object into a compound, and the text of a part into an
 //! object.
 
-use crate::primitive::Form;
-use crate::primitive::csg_tree::{CsgSolid, CsgTree};
+use crate::primitive::{CsgSolid, CsgTree, Form};
 use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
@@ -196,9 +195,11 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
                 trees.push(inner.tree.shifted(parts.len()));
                 parts.extend(inner.parts);
             }
+            // Other geometry is left out; `unfit_reason` reports it.
             simple => {
+                let Some(solid) = simple.into_solid() else { continue };
                 trees.push(CsgTree::Part(parts.len()));
-                parts.push(simple);
+                parts.push(solid);
             }
         }
     }

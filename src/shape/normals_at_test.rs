@@ -1,6 +1,6 @@
 //! Tests of `Form::normals_at` with every shape.
 
-use crate::primitive::conical_frustum::AROUND_TIP;
+use crate::primitive::AROUND_TIP;
 use crate::shape::{EXAMPLES, Shape};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;

@@ -6,14 +6,14 @@
 
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
-use crate::primitive::batch::{SurfacePoint, UvGradients};
+use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
 };
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
 use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::keep_visible;
 use crate::primitive::mesh::{Mesh, intersection};
-use crate::primitive::primitive_box::PrimitiveBox;
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -33,11 +33,14 @@ pub struct MeshForm {
     pub smooth: bool,
 }
 
-impl CanonicalShape for MeshForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }.into()
+impl MeshForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }
     }
+}
 
+impl CanonicalShape for MeshForm {
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_mesh;
         let rows = m.matrix3.transpose();
@@ -219,7 +222,8 @@ struct Triangle<L> {
 
 impl<S: Float> MeshInstance<S> {
     fn new(form: &Form) -> Option<Self> {
-        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = form else { return None };
+        let Form::Mesh(form) = form else { return None };
+        let MeshForm { mesh, scene_from_mesh, smooth } = form;
         let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
         let inverse = scene_from_mesh.matrix3.inverse();

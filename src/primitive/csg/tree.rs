@@ -1,6 +1,7 @@
 //! Compound solids (CSG): their parts, and the tree of set operations that combines them.
 
 use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
+use crate::primitive::csg::solid::Solid;
 use crate::primitive::form::{Form, cast_compiled};
 use glam::{DAffine3, DVec3};
 
@@ -34,19 +35,13 @@ impl CsgTree {
 /// Compound solid: several solids combined by set operations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Solids that are combined. Valid kinds are `Sphere`, `Ellipsoid`, `ConvexPolyhedron`,
-    /// `ConicalFrustum`, `Torus`, and `Plane`, which means the half-space behind it.
-    pub parts: Vec<Form>,
+    /// Solids that are combined.
+    pub parts: Vec<Solid>,
     /// Tree of set operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
 }
 
 impl CanonicalShape for CsgSolid {
-    fn transformed(self, map: &DAffine3) -> Form {
-        let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
-        Self { parts, tree: self.tree }.into()
-    }
-
     fn parts(&self) -> usize {
         self.parts.len()
     }
@@ -87,6 +82,17 @@ impl CanonicalShape for CsgSolid {
 }
 
 impl CsgSolid {
+    /// Combines `parts` by `tree`; `None` if a part is not a solid.
+    pub fn new(parts: impl IntoIterator<Item = Form>, tree: CsgTree) -> Option<Self> {
+        let parts = parts.into_iter().map(Form::into_solid).collect::<Option<_>>()?;
+        Some(Self { parts, tree })
+    }
+
+    /// Returns the image of the solid under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { parts: self.parts.into_iter().map(|p| p.transformed(map)).collect(), ..self }
+    }
+
     /// Returns `true` if the bounding boxes of the parts show that the solid has no points, for
     /// example an intersection of solids that are apart.
     pub fn is_empty(&self) -> bool {

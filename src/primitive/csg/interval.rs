@@ -2,7 +2,7 @@
 //! and the transitions of the line between inside and outside.
 
 use crate::lanes::SimdFloat;
-use crate::primitive::solid::Span;
+use crate::primitive::csg::solid::Span;
 
 /// Lower limit of the cosine of the angle between a line and a surface normal; smaller cosines
 /// count as this value. The tolerance of coincident faces is divided by the cosine. The limit keeps

@@ -4,7 +4,7 @@
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::form::Form;
+use crate::primitive::canonical::CanonicalShape;
 use glam::DVec3;
 
 /// Bounding box of one primitive.
@@ -46,7 +46,7 @@ const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 impl<S: Float> PrimitiveBox<S> {
     /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
     /// object space, the box is in that space. Returns `None` for a form without finite bounds.
-    pub fn new(form: &Form, oriented: bool) -> Option<Self> {
+    pub fn new(form: &dyn CanonicalShape, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let made = |bounds, space| {

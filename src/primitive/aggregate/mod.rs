@@ -1,15 +1,20 @@
 //! Aggregate: all primitives of a scene, compiled for rays. It holds an array for each kind of
 //! primitive. If there are many primitives, it also holds a BVH over all bounded ones.
 
+mod batch;
+pub mod primitive_box;
+mod scene_bvh;
+
+pub use batch::PrimitiveId;
+
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{
-    LabelledBatch, PrimitiveBatch, PrimitiveId, SurfacePoint, UvGradients, compile,
-};
+use crate::primitive::aggregate::batch::{LabelledBatch, PrimitiveBatch, compile};
+use crate::primitive::aggregate::primitive_box::PrimitiveBox;
+use crate::primitive::aggregate::scene_bvh::SceneBvh;
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
 use crate::primitive::form::Form;
 use crate::primitive::mesh::instance::Meshes;
-use crate::primitive::primitive_box::PrimitiveBox;
-use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
 
@@ -147,7 +152,7 @@ impl<L: SimdFloat> Aggregate<L> {
         out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
         if let AccelerationStructure::Boxes { oriented } = structure {
-            let box_of = |source: &PrimitiveId| PrimitiveBox::new(&forms[source.form], oriented);
+            let box_of = |source: &PrimitiveId| PrimitiveBox::new(&*forms[source.form], oriented);
             out.extents = out.source.iter().map(box_of).collect();
         }
         out
@@ -409,7 +414,7 @@ impl<L: SimdFloat> Aggregate<L> {
     /// `None` if there are no meshes.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
-            BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
+            BatchRange { batch: PrimitiveBatch::Mesh(meshes), base, .. } => Some((meshes, *base)),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@ use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
 use crate::bvh::single::traverse_rays;
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::primitive_box::padded;
+use crate::primitive::aggregate::primitive_box::padded;
 use glam::DVec3;
 
 /// Coherence limit of the scene's BVH: it determines which packets of rays traverse the BVH as a

@@ -11,20 +11,20 @@
 //! leaves no skin, and parts in contact leave no crack, although rounding errors put equal faces
 //! into a random order. Parts thinner than this distance disappear.
 
+mod interval;
+mod solid;
+mod tree;
+
+pub use solid::{Solid, SolidPrimitive, Span};
+pub use tree::{CsgSolid, CsgTree};
+
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::canonical::CanonicalShape;
-use crate::primitive::conical_frustum::ConicalFrustum;
-use crate::primitive::convex_polyhedron::ConvexPolyhedron;
-use crate::primitive::csg_interval::{Event, Interval, Transition, events, insert, with_scratch};
-use crate::primitive::csg_tree::{CsgSolid, CsgTree};
-use crate::primitive::ellipsoid::Ellipsoid;
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::csg::interval::{Event, Interval, Transition, events, insert, with_scratch};
+use crate::primitive::csg::solid::CompiledSolid;
 use crate::primitive::form::Form;
-use crate::primitive::plane::Plane;
-use crate::primitive::solid::SolidPrimitive;
-use crate::primitive::sphere::Sphere;
-use crate::primitive::torus::Torus;
 use std::ops::Range;
 
 /// Distance within which surfaces of a compound's parts count as coincident. The unit is the
@@ -46,54 +46,9 @@ enum Op {
     Minus,
 }
 
-macro_rules! leaves {
-    ($($kind:ident($spans:literal)),+ $(,)?) => {
-        /// Solid of one part of a compound, compiled for ray intersection.
-        enum CsgLeaf<S> {
-            $($kind($kind<S>),)+
-        }
-
-        /// Evaluates one expression for the solid in any variant of [`CsgLeaf`].
-        macro_rules! each {
-            ($solid:expr, $primitive:ident => $value:expr) => {
-                match $solid {
-                    $(CsgLeaf::$kind($primitive) => $value,)+
-                }
-            };
-        }
-
-        impl<S: Float> CsgLeaf<S> {
-            /// Compiles the canonical form of a part; `None` if compounds cannot contain it.
-            fn new(form: &Form) -> Option<Self> {
-                None$(.or_else(|| $kind::new(form).map(Self::$kind)))+
-            }
-
-            /// Returns the largest number of spans of one line in this solid. A span is an interval
-            /// in which the line is inside of the solid.
-            fn max_spans(&self) -> usize {
-                match self {
-                    $(Self::$kind(_) => $spans,)+
-                }
-            }
-        }
-    };
-}
-
-// Solids that can be parts of compounds, each with the largest number of spans of one line in it. A
-// new solid needs a line here.
-leaves! {
-    Sphere(1),
-    Ellipsoid(1),
-    ConvexPolyhedron(1),
-    ConicalFrustum(1),
-    Torus(2),
-    // A plane stands for the half-space behind it.
-    Plane(1),
-}
-
 /// Part of a compound: one of the solids that the compound's set operations combine.
 struct Part<S> {
-    solid: CsgLeaf<S>,
+    solid: CompiledSolid<S>,
     /// `true` if the part is subtracted: the inside of its solid is outside of the compound.
     reversed: bool,
     /// Range of the part's spans (intervals in which a line is inside of the part) in the list of
@@ -145,7 +100,7 @@ impl<S: Float> Compounds<S> {
         let (first_part, first_op) = (self.parts.len(), self.ops.len());
         let mut spans = 0;
         for (i, part) in compound.parts.iter().enumerate() {
-            let solid = CsgLeaf::new(part).expect("parts are solids that compounds are made of");
+            let solid = CompiledSolid::new(part);
             let first = spans;
             spans += solid.max_spans();
             self.parts.push(Part { solid, reversed: false, spans: first..spans });
@@ -179,7 +134,7 @@ impl<S: Float> Compounds<S> {
             CsgTree::Intersection(list) => (list, Op::And),
             CsgTree::Difference(list) => (list, Op::Minus),
         };
-        let mut depth = 0;
+        let mut depth = 1;
         for (n, inner) in list.iter().enumerate() {
             let cuts = matches!(op, Op::Minus) && n > 0;
             let above = self.build(inner, first_part, reversed ^ cuts);
@@ -309,7 +264,9 @@ impl<S: Float> Compounds<S> {
                 let mut count = 0;
                 for part in parts {
                     let slots = &mut spans[part.spans.clone()];
-                    each!(&part.solid, solid => for (span, found) in slots.iter_mut().zip(solid.spans(ray)) {
+                    let mut slots = slots.iter_mut();
+                    part.solid.for_each_span(ray, |found| {
+                        let Some(span) = slots.next() else { return };
                         *span = Interval {
                             enter: L::select(found.meets, found.enter, never),
                             leave: L::select(found.meets, found.leave, always),
@@ -421,7 +378,7 @@ impl<S: Float> Compounds<S> {
         point: Vec3<L>,
     ) -> SurfacePoint<L> {
         let part = &self.parts[part];
-        let surface: SurfacePoint<L> = each!(&part.solid, solid => solid.surface(point));
+        let surface: SurfacePoint<L> = part.solid.surface(point);
         let normal = if part.reversed { -surface.normal } else { surface.normal };
         SurfacePoint { normal, ..surface }
     }
@@ -433,7 +390,7 @@ impl<S: Float> Compounds<S> {
         part: usize,
         point: Vec3<L>,
     ) -> Option<UvGradients<L>> {
-        each!(&self.parts[part].solid, solid => solid.uv(point))
+        self.parts[part].solid.uv(point)
     }
 }
 

@@ -3,6 +3,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg::Compounds;
@@ -15,63 +16,14 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Point on the surface of a primitive where a ray hits it, one per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct SurfacePoint<L> {
-    /// Hit point, projected onto the surface as exactly as the precision of the lanes allows.
-    pub point: Vec3<L>,
-    /// Unit geometric normal. It points out of a solid, and to the front of a flat shape.
-    pub normal: Vec3<L>,
-    /// Largest magnitude of the coordinates from which the hit point was computed. The rounding
-    /// error of the point is a few units in the last place of this value.
-    pub max_coordinate: L,
-}
-
-/// Texture coordinates at one point of a primitive, with their gradients.
-#[derive(Clone, Copy, Debug)]
-pub struct UvGradients<L> {
-    /// Texture coordinates: u to the right, v up.
-    pub uv: [L; 2],
-    /// Gradients of u and v along the surface, in the space of the shape: changes per unit of
-    /// length.
-    pub gradients: [Vec3<L>; 2],
-}
-
-impl<L: SimdFloat> SurfacePoint<L> {
-    /// Returns the distance from the surface at which secondary rays start: a few rounding errors
-    /// of [`SurfacePoint::max_coordinate`].
-    #[inline(always)]
-    pub fn ray_offset(&self) -> L {
-        self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
-    }
-}
-
-/// Primitive compiled for the kernels of one SIMD type.
-pub trait Primitive<L: SimdFloat> {
-    /// Returns two values: the smallest distance at which each ray hits the primitive, and the
-    /// lanes that hit it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
-    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
-
-    /// Returns the projection of `point` onto the surface, with the normal there. `point` is the
-    /// computed hit point of a ray, with rounding errors.
-    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
-
-    /// Returns the texture coordinates, with gradients, that the primitive's own parametrisation
-    /// has at a point. Returns `None` for primitives that have no parametrisation.
-    fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
-        None
-    }
-}
-
 macro_rules! batches {
-    ($($(#[$doc:meta])+ $kind:ident($primitive:ident)),+ $(,)?) => {
+    ($($kind:ident),+ $(,)?) => {
         /// Batch: all primitives of one kind, compiled for one SIMD type.
         pub enum PrimitiveBatch<L: SimdFloat> {
-            $($(#[$doc])+ $kind(Vec<$primitive<L::Scalar>>),)+
-            /// Batch of compound solids (CSG). Each part of a compound counts as a primitive.
-            Compounds(Compounds<L::Scalar>),
-            /// Batch of triangle meshes; each mesh is one primitive.
-            Meshes(Meshes<L::Scalar>),
+            $($kind(Vec<$kind<L::Scalar>>),)+
+            /// Each part of a compound counts as a primitive.
+            Csg(Compounds<L::Scalar>),
+            Mesh(Meshes<L::Scalar>),
         }
 
         /// Evaluates one of three expressions for a [`PrimitiveBatch`]: the first for an array of
@@ -81,8 +33,8 @@ macro_rules! batches {
                 $meshes:ident => $third:expr) => {
                 match $batch {
                     $(PrimitiveBatch::$kind($primitives) => $value,)+
-                    PrimitiveBatch::Compounds($compounds) => $other,
-                    PrimitiveBatch::Meshes($meshes) => $third,
+                    PrimitiveBatch::Csg($compounds) => $other,
+                    PrimitiveBatch::Mesh($meshes) => $third,
                 }
             };
         }
@@ -92,10 +44,11 @@ macro_rules! batches {
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
-                let primitives = forms.iter().enumerate().filter_map(|(form, f)| {
-                    Some((PrimitiveId { form, part: 0 }, $primitive::new(f)?))
+                let all = forms.iter().enumerate().filter_map(|(form, f)| {
+                    let Form::$kind(f) = f else { return None };
+                    Some((PrimitiveId { form, part: 0 }, $kind::new(f)))
                 });
-                let (sources, primitives): (Vec<_>, Vec<_>) = primitives.unzip();
+                let (sources, primitives): (Vec<_>, Vec<_>) = all.unzip();
                 out.extend(LabelledBatch::new(PrimitiveBatch::$kind(primitives), sources, forms));
             )+
             let sources_of = |wanted: fn(&Form) -> bool| -> Vec<_> {
@@ -106,34 +59,19 @@ macro_rules! batches {
                 matching.flat_map(parts).collect()
             };
             let sources = sources_of(|f| matches!(f, Form::Csg(_)));
-            let compounds = PrimitiveBatch::Compounds(Compounds::new(forms));
+            let compounds = PrimitiveBatch::Csg(Compounds::new(forms));
             out.extend(LabelledBatch::new(compounds, sources, forms));
             let sources = sources_of(|f| matches!(f, Form::Mesh(_)));
-            let meshes = PrimitiveBatch::Meshes(Meshes::new(forms));
+            let meshes = PrimitiveBatch::Mesh(Meshes::new(forms));
             out.extend(LabelledBatch::new(meshes, sources, forms));
             out
         }
     };
 }
 
-// Kinds of compiled primitives, in the order in which primitives are numbered. A new kind needs a
-// line here.
-batches! {
-    /// Batch of parallelograms, such as rectangles.
-    Parallelograms(Parallelogram),
-    /// Batch of infinite planes.
-    Planes(Plane),
-    /// Batch of spheres.
-    Spheres(Sphere),
-    /// Batch of ellipsoids.
-    Ellipsoids(Ellipsoid),
-    /// Batch of convex polyhedra, such as boxes.
-    ConvexPolyhedra(ConvexPolyhedron),
-    /// Batch of conical frusta: cylinders, cones and tapered cylinders.
-    ConicalFrusta(ConicalFrustum),
-    /// Batch of tori (rings).
-    Tori(Torus),
-}
+// Kinds of compiled primitives other than compounds and meshes, in the order in which primitives
+// are numbered. A new kind needs a word here.
+batches!(Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus);
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
     /// Replaces `hit` in the lanes whose ray hits a primitive of the batch nearer than `hit`. Only
