@@ -1,5 +1,4 @@
-//! Ellipsoids: images of the unit sphere under affine maps. Rays are transformed into the space of
-//! the unit sphere.
+//! Ellipsoids. Rays are transformed into the space of the unit sphere.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -28,7 +27,7 @@ impl EllipsoidForm {
 
 impl CanonicalShape for EllipsoidForm {
     fn bounds(&self) -> Option<Bounds> {
-        // The half-widths of the image's bounding box are the lengths of the matrix's rows.
+        // The half-widths of the box are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
@@ -39,8 +38,7 @@ impl CanonicalShape for EllipsoidForm {
         let map = &self.scene_from_unit;
         let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
             .map(|a| a.length_squared());
-        // The largest half-axis is the largest singular value of the matrix. The Frobenius norm is
-        // an upper bound of it.
+        // The Frobenius norm is an upper bound of the largest singular value, the largest half-axis.
         BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
     }
 
@@ -87,8 +85,7 @@ impl CanonicalShape for EllipsoidForm {
     }
 }
 
-/// Returns the distance between `point` and the surface of an ellipsoid, the image of the unit
-/// sphere under the map `scene_from_unit`.
+/// Returns the distance between `point` and the surface of an ellipsoid.
 ///
 /// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
 /// closest point q of the surface q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for
@@ -98,12 +95,11 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
     let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-    // If `point` is the centre or on an axis, several surface points can be nearest to it. The
-    // offset selects one of them.
+    // The offset selects one of several nearest points if `point` is the centre or on an axis.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
     // `size` is the Frobenius norm of Q. The smallest half-axis is therefore at least 1 /
-    // sqrt(size) and at most 3^(1/4) times this length. The initial bounds of l follow from it.
+    // sqrt(size) and at most 3^(1/4) times this length.
     let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
     let mut nearest = p;
     for _ in 0..160 {
@@ -133,14 +129,21 @@ pub struct Ellipsoid<S> {
 }
 
 /// Returns the rows of a matrix, rounded to the precision `S`.
-pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
+pub fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
 /// Returns the product of the matrix with the rows `m` and the vector `v`.
 #[inline(always)]
-pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
+pub fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
+}
+
+/// Returns the product of the transpose of the matrix with the rows `m` and the vector `v`. A normal
+/// transforms by it if `m` is the inverse of the map.
+#[inline(always)]
+pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
+    Vec3::splat(m[0]) * v.x + Vec3::splat(m[1]) * v.y + Vec3::splat(m[2]) * v.z
 }
 
 impl<S: Float> Ellipsoid<S> {
@@ -156,8 +159,8 @@ impl<S: Float> Ellipsoid<S> {
     }
 }
 
-/// Returns three values: the distances at which each ray's line enters and leaves the ellipsoid,
-/// and the lanes that hit it. Returns `None` if no line hits it.
+/// Returns the distances at which each ray's line enters and leaves the ellipsoid, and the lanes
+/// that hit it; `None` if no line hits it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
@@ -178,15 +181,9 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let center = Vec3::splat(self.center);
         let on_unit = times(&self.unit_from_scene, point - center).normalize();
-        // Normals transform by the transpose of the inverse map. The columns of this transpose are
-        // the rows of `unit_from_scene`.
-        let m = &self.unit_from_scene;
-        let normal = Vec3::splat(m[0]) * on_unit.x
-            + Vec3::splat(m[1]) * on_unit.y
-            + Vec3::splat(m[2]) * on_unit.z;
         SurfacePoint {
             point: times(&self.scene_from_unit, on_unit) + center,
-            normal: normal.normalize(),
+            normal: transposed_times(&self.unit_from_scene, on_unit).normalize(),
             max_coordinate: L::splat(self.reach),
         }
     }

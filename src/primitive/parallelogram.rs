@@ -1,4 +1,4 @@
-//! Flat parallelograms, the canonical form of rectangles and platforms.
+//! Flat parallelograms.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -16,9 +16,9 @@ use glam::{DAffine3, DVec3};
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
     pub corner: DVec3,
-    /// Edge u from the corner: the vector to the next corner.
+    /// Edge from `corner` to the next corner.
     pub u: DVec3,
-    /// Edge v from the corner: the vector to the other adjacent corner.
+    /// Edge from `corner` to the other adjacent corner.
     pub v: DVec3,
 }
 
@@ -28,8 +28,7 @@ impl ParallelogramForm {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
-        // A map that mirrors space would exchange front and back. The edges are exchanged to
-        // prevent this.
+        // A map that mirrors space would exchange front and back.
         let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
         Self { corner, u, v }
     }
@@ -45,8 +44,7 @@ impl CanonicalShape for ParallelogramForm {
     }
 
     fn plane(&self) -> Option<HalfSpace> {
-        let normal = self.u.cross(self.v).normalize();
-        Some(HalfSpace { normal, offset: normal.dot(self.corner) })
+        Some(HalfSpace::through(self.corner, self.u.cross(self.v)))
     }
 
     fn is_convex(&self) -> bool {
@@ -72,8 +70,7 @@ impl CanonicalShape for ParallelogramForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let normal = self.u.cross(self.v).normalize();
         let from_corner = point - self.corner;
-        // Both numbers are signed distances from the line through `edge`: `distance` is that of the
-        // point, `width` is that of the opposite edge.
+        // Signed distances of the point and of the opposite edge from the line through `edge`.
         let is_between = |edge: DVec3, other: DVec3| {
             let across = edge.cross(normal).normalize();
             let (distance, width) = (across.dot(from_corner), across.dot(other));
@@ -117,8 +114,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// Parallelogram compiled for ray intersection. A point p of its plane has the two coordinates (p -
-/// corner) . `dual_u` and (p - corner) . `dual_v`. Inside of the parallelogram, both are in 0..=1.
+/// Parallelogram compiled for ray intersection. The coordinates (p - corner) . `dual_u` and (p -
+/// corner) . `dual_v` of a point p inside it are in 0..=1.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],
@@ -150,8 +147,7 @@ impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
         let from_corner = ray.origin - Vec3::splat(self.corner);
-        // For a ray parallel to the plane, t, a and b are infinite or NaN. The tests below then
-        // fail.
+        // For a ray parallel to the plane, t, a and b are infinite or NaN, and the tests fail.
         let t = -from_corner.dot(normal) / ray.direction.dot(normal);
         let hit_point = ray.direction.mul_add(t, from_corner);
         let a = hit_point.dot(Vec3::splat(self.dual_u));

@@ -1,9 +1,9 @@
-//! Infinite planes, and the half-spaces behind them, which can be parts of compounds (CSG).
+//! Infinite planes, and the half-spaces behind them, which can be parts of compounds.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, half_space,
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -21,10 +21,12 @@ pub struct PlaneForm {
 impl PlaneForm {
     /// Returns the image of the geometry under the invertible affine map `map`.
     pub fn transformed(self, map: &DAffine3) -> Self {
-        let normals = map.matrix3.inverse().transpose();
-        let on_plane = map.transform_point3(self.normal * self.offset);
-        let HalfSpace { normal, offset } = half_space(on_plane, normals * self.normal);
+        let HalfSpace { normal, offset } = self.half_space().transformed(map);
         Self { normal, offset }
+    }
+
+    fn half_space(&self) -> HalfSpace {
+        HalfSpace { normal: self.normal, offset: self.offset }
     }
 }
 
@@ -39,7 +41,7 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn plane(&self) -> Option<HalfSpace> {
-        Some(HalfSpace { normal: self.normal, offset: self.offset })
+        Some(self.half_space())
     }
 
     fn is_convex(&self) -> bool {
@@ -51,11 +53,11 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        Some((self.normal.dot(point) - self.offset).abs())
+        Some(self.half_space().height(point).abs())
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
-        let on = (self.normal.dot(point) - self.offset).abs() <= slack;
+        let on = self.half_space().height(point).abs() <= slack;
         if on { vec![vec![self.normal]] } else { Vec::new() }
     }
 
@@ -69,7 +71,7 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn proxies(&self) -> Vec<Proxy> {
-        vec![Proxy::new(self.plane().into_iter().map(ProxyFace::Flat).collect(), None)]
+        vec![Proxy::new(vec![ProxyFace::Flat(self.half_space())], None)]
     }
 
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
@@ -112,7 +114,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     }
 }
 
-/// Half-space behind a plane, as a part of compounds (CSG).
+/// Half-space behind the plane.
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 
@@ -123,9 +125,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
         let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let t = -height / speed;
         let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
-        // A line parallel to the plane does not cross it: all of the line is behind the plane or in
-        // front of it. If the distance of a crossing overflows, it is clamped to the largest
-        // number, which means that there is no crossing.
+        // A line parallel to the plane is behind it or in front of it everywhere. A distance that
+        // overflows is clamped to the largest number, which means that there is no crossing.
         let enter = L::select(enters, t.max(none).min(all), none);
         let leave = L::select(leaves, t.max(none).min(all), all);
         let meets = enters | leaves | height.le(L::zero());

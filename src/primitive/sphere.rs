@@ -1,4 +1,4 @@
-//! Spheres: canonical form and ray intersection.
+//! Spheres.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -14,14 +14,15 @@ use glam::{DAffine3, DVec3};
 /// Canonical form of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereForm {
-    /// Centre of the sphere, in scene coordinates.
+    /// Centre.
     pub center: DVec3,
-    /// Radius of the sphere, greater than zero.
+    /// Radius, greater than 0.
     pub radius: f64,
 }
 
 impl SphereForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
+    /// Returns the image under the invertible affine map `map`: a sphere if the map is a similarity,
+    /// otherwise an ellipsoid.
     pub fn transformed(self, map: &DAffine3) -> Solid {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
@@ -112,14 +113,14 @@ impl<S: Float> Sphere<S> {
     }
 }
 
-/// Returns three values: the distances at which each line enters and leaves a sphere, and the lanes
-/// that hit it. Returns `None` if no line hits it.
+/// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it;
+/// `None` if no line hits it. `f` is the line's origin relative to the centre, and `d` is its unit
+/// direction.
 ///
-/// `f` is the line's origin relative to the centre, and `d` is its unit direction. The discriminant
-/// is computed from the vector f - (f.d) d, whose length is the line's distance from the centre.
-/// The root closer to the origin is computed from the product of both roots. Neither computation
-/// cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision
-/// Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
+/// The discriminant is computed from the vector f - (f.d) d, whose length is the line's distance
+/// from the centre, and the root closer to the origin from the product of both roots. Neither
+/// computation cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019,
+/// *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);
@@ -132,8 +133,7 @@ pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option
     let root = discriminant.max(L::zero()).sqrt();
     let q = b + root.copysign(b);
     let c = f.length_squared() - radius2;
-    // q is 0 only if the ray starts on the sphere and is tangent to it there. Both distances are
-    // then 0.
+    // q is 0 only if the ray starts on the sphere and is tangent to it: both distances are 0.
     let other = c / q;
     let other = L::select(q.abs().gt(L::zero()), other, L::zero());
     let behind = b.lt(L::zero());

@@ -1,5 +1,4 @@
-//! Batches of compiled primitives: one array for each kind of primitive that the scene contains. A
-//! kind that the scene does not contain costs nothing.
+//! Batches of compiled primitives: one array for each kind of primitive that the scene contains.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -26,8 +25,7 @@ macro_rules! batches {
             Mesh(Meshes<L::Scalar>),
         }
 
-        /// Evaluates one of three expressions for a [`PrimitiveBatch`]: the first for an array of
-        /// primitives, the second for compounds, the third for meshes.
+        /// Evaluates one of three expressions: for an array of primitives, compounds or meshes.
         macro_rules! each {
             ($batch:expr, $primitives:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
@@ -39,8 +37,7 @@ macro_rules! batches {
             };
         }
 
-        /// Compiles the canonical forms `forms` into one batch for each kind of primitive that
-        /// occurs.
+        /// Compiles `forms` into one batch for each kind of primitive that occurs.
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
@@ -74,9 +71,8 @@ macro_rules! batches {
 batches!(Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus);
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
-    /// Replaces `hit` in the lanes whose ray hits a primitive of the batch nearer than `hit`. Only
-    /// primitives with a number in `range` are tested. The id of a primitive is `base` plus its
-    /// number in the batch.
+    /// Replaces `hit` in the lanes whose ray hits a primitive with a number in `range` nearer than
+    /// `hit`. The id of a primitive is `base` plus its number in the batch.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
@@ -85,8 +81,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Returns the lanes whose ray hits a primitive of the batch, with a number in `range`, at a
-    /// distance between 0 and `limit`. The search may stop once all lanes of `wanted` are occluded.
+    /// Returns the lanes whose ray hits a primitive with a number in `range` at a distance between
+    /// 0 and `limit`. The search may stop once all lanes of `wanted` are occluded.
     #[inline(always)]
     pub fn occluded(
         &self,
@@ -101,9 +97,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// Returns the projection of `point` onto the surface of `primitive`, with the normal
-    /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
-    /// the id of the hit triangle if the primitive is a mesh.
+    /// See [`Aggregate::surface`](super::Aggregate::surface).
     #[inline(always)]
     pub fn surface(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
@@ -112,9 +106,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.surface(primitive, triangle_tag, point))
     }
 
-    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`;
-    /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
-    /// primitive is a mesh.
+    /// See [`Aggregate::uv`](super::Aggregate::uv).
     pub fn uv(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         each!(self,
             primitives => primitives[primitive].uv(point),
@@ -156,44 +148,39 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// Origin of a compiled primitive: the index of its canonical form, and the number of its part if
-/// the form is a compound.
+/// Origin of a compiled primitive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
-    /// Index of the canonical form in the list given to `compile`.
+    /// Index of the canonical form in the list given to the aggregate.
     pub form: usize,
-    /// Number of the part if the form is a compound, counted from 0; otherwise 0. In lists of
-    /// primitives the first part stands for the whole compound; the other parts are not intersected
-    /// on their own.
+    /// Number of the part if the form is a compound; otherwise 0. Part 0 stands for the whole
+    /// compound; the other parts are not intersected on their own.
     pub part: usize,
 }
 
-/// All primitives of one kind (a batch), with their origins and the name of the kind.
+/// Batch with the origins of its primitives.
 pub struct LabelledBatch<L: SimdFloat> {
-    /// Compiled primitives of the batch, all of one kind.
     pub batch: PrimitiveBatch<L>,
-    /// Origin of each primitive of the batch: its canonical form and compound part.
     pub sources: Vec<PrimitiveId>,
-    /// Noun for primitives of this kind in the scene's inventory: singular and plural.
-    pub noun: (&'static str, &'static str),
-    /// Addition to the noun in the scene's inventory, such as a number of triangles.
-    pub detail: String,
+    /// Number and kind of the primitives for the scene's inventory, such as `2 spheres`.
+    pub label: String,
     /// `true` if the primitives have no finite bounds, so that a BVH cannot hold them.
     pub infinite: bool,
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Creates the batch of the primitives with the origins `sources`, and its noun and detail for
-    /// the scene's inventory. Returns `None` if `sources` is empty.
+    /// Returns `None` if `sources` is empty.
     fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
-        let noun = forms[sources.first()?.form].noun();
+        let (one, several) = forms[sources.first()?.form].noun();
+        let count = sources.iter().filter(|s| s.part == 0).count();
+        let noun = if count == 1 { one } else { several };
         let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();
         let detail = match triangles {
             0 => String::new(),
             n => format!(" of {} triangles", with_thousands_separators(n)),
         };
         let infinite = sources.iter().any(|s| forms[s.form].bounds().is_none());
-        Some(Self { batch, sources, noun, detail, infinite })
+        Some(Self { batch, sources, label: format!("{count} {noun}{detail}"), infinite })
     }
 }
 

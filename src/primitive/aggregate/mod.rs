@@ -1,5 +1,5 @@
-//! Aggregate: all primitives of a scene, compiled for rays. It holds an array for each kind of
-//! primitive. If there are many primitives, it also holds a BVH over all bounded ones.
+//! Aggregate: all primitives of a scene, compiled for rays: an array for each kind of primitive,
+//! and, if there are many, a BVH.
 
 mod batch;
 pub mod primitive_box;
@@ -18,9 +18,8 @@ use crate::primitive::mesh::instance::Meshes;
 use std::fmt;
 use std::ops::Range;
 
-/// Smallest number of primitives with finite bounds for which a BVH is built. Fewer primitives are
-/// tested one by one. For them this is faster than a BVH, because each tile of the picture has a
-/// short list of the primitives that its rays may hit.
+/// Smallest number of primitives with finite bounds for which a BVH is built. For fewer primitives,
+/// a short list for each tile of the picture is faster.
 ///
 /// Measured with spheres that fill a ball (`benches/acceleration.rs`): whole pictures with up to 95
 /// primitives render faster without a BVH. If rays are tested against all primitives instead of the
@@ -45,23 +44,15 @@ pub enum AccelerationStructure {
 }
 
 impl AccelerationStructure {
-    /// Returns the faster structure by measurement: a BVH if at least [`BVH_MIN_PRIMITIVES`] of the
-    /// primitives have finite bounds, otherwise a list.
+    /// Returns the faster structure by measurement, a BVH or a list: see [`BVH_MIN_PRIMITIVES`].
     pub fn fastest(forms: &[Form]) -> Self {
         let bounded = forms.iter().filter(|form| form.bounds().is_some()).count();
         if bounded >= BVH_MIN_PRIMITIVES { Self::Bvh } else { Self::List("list") }
     }
 }
 
-impl PrimitiveSet {
-    /// Returns `true` if the set contains no primitive.
-    pub fn is_empty(&self) -> bool {
-        self.ranges.is_empty() && !self.tree
-    }
-}
-
-/// Batch of an aggregate (all primitives of one kind). The numbers of its primitives in the
-/// aggregate are from `base` up to, but not including, `end`.
+/// Batch of an aggregate. The numbers of its primitives in the aggregate are from `base` up to, but
+/// not including, `end`.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
@@ -70,155 +61,158 @@ struct BatchRange<L: SimdFloat> {
 
 /// All primitives of a scene, numbered, compiled for one SIMD type.
 pub struct Aggregate<L: SimdFloat> {
-    parts: Vec<BatchRange<L>>,
+    batches: Vec<BatchRange<L>>,
     all: PrimitiveSet,
-    tree: Option<SceneBvh>,
-    /// Primitives in the BVH, each as the index of its batch (the array of its kind) and its number
-    /// in the batch.
-    tree_primitives: Vec<(u32, u32)>,
-    /// Bounding box of each primitive, which rays are tested against before the primitive itself;
-    /// `None` for an infinite primitive. The list is empty if no boxes are used.
-    extents: Vec<Option<PrimitiveBox<L::Scalar>>>,
-    /// Origin of each primitive: the index of its canonical form in the list given to
-    /// [`Aggregate::new`], and the number of the part if the form is a compound.
-    source: Vec<PrimitiveId>,
+    bvh: Option<SceneBvh>,
+    /// Primitives in the BVH, each as the index of its batch and its number in the batch.
+    in_bvh: Vec<(u32, u32)>,
+    /// Bounding box of each primitive; `None` for an infinite primitive. Empty if no boxes are
+    /// used.
+    boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
+    sources: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
-/// Subset of the primitives of an [`Aggregate`] (all primitives of a scene), to which ray queries
-/// are restricted.
+/// Subset of the primitives of an [`Aggregate`], to which ray queries are restricted.
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
-    /// Primitives that are tested one by one. Each entry has the index of a batch (the array of one
-    /// kind of primitive) and a range of primitive numbers in this batch.
+    /// Primitives that are tested one by one: the index of a batch, and a range of primitive
+    /// numbers in this batch.
     ranges: Vec<(u32, Range<u32>)>,
     /// `true` if the subset also includes all primitives of the BVH.
-    tree: bool,
+    bvh: bool,
+}
+
+impl PrimitiveSet {
+    /// Returns `true` if the set contains no primitive.
+    pub fn is_empty(&self) -> bool {
+        self.ranges.is_empty() && !self.bvh
+    }
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles the canonical forms `forms` to primitives, with the fastest structure.
+    /// Compiles the canonical forms `forms`, with the fastest structure.
     pub fn new(forms: &[Form]) -> Self {
         Self::with_structure(forms, AccelerationStructure::fastest(forms))
     }
 
-    /// Compiles the canonical forms `forms` to primitives, with or without a BVH.
+    /// Compiles the canonical forms `forms`, with or without a BVH.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         let list = AccelerationStructure::List("list");
         Self::with_structure(forms, if tree { AccelerationStructure::Bvh } else { list })
     }
 
-    /// Compiles the canonical forms `forms` to primitives with the given structure.
+    /// Compiles the canonical forms `forms`.
     pub fn with_structure(forms: &[Form], structure: AccelerationStructure) -> Self {
-        let (tree, how_listed) = match structure {
+        let (has_bvh, how_listed) = match structure {
             AccelerationStructure::Bvh => (true, "list"),
             AccelerationStructure::List(name) => (false, name),
             AccelerationStructure::Boxes { oriented: true } => (false, "boxes of their own"),
             AccelerationStructure::Boxes { oriented: false } => (false, "boxes"),
         };
         let mut out = Self {
-            parts: Vec::new(),
+            batches: Vec::new(),
             all: PrimitiveSet::default(),
-            tree: None,
-            tree_primitives: Vec::new(),
-            extents: Vec::new(),
-            source: Vec::new(),
+            bvh: None,
+            in_bvh: Vec::new(),
+            boxes: Vec::new(),
+            sources: Vec::new(),
             counts: Vec::new(),
         };
         let mut bounds = Vec::new();
-        for LabelledBatch { batch, sources, noun, detail, infinite } in compile(forms) {
-            let base = out.source.len() as u32;
-            let in_tree = tree && !infinite;
-            let how = match (in_tree, infinite) {
+        for LabelledBatch { batch, sources, label, infinite } in compile(forms) {
+            let in_bvh = has_bvh && !infinite;
+            let how = match (in_bvh, infinite) {
                 (true, _) => "tree",
-                (_, true) => "list",
-                _ => how_listed,
+                (false, true) => "list",
+                (false, false) => how_listed,
             };
-            let count = sources.iter().filter(|s| s.part == 0).count();
-            let name = if count == 1 { noun.0 } else { noun.1 };
-            out.counts.push(format!("{count} {name}{detail} ({how})"));
-            let part = out.parts.len() as u32;
-            if in_tree {
+            out.counts.push(format!("{label} ({how})"));
+            let index = out.batches.len() as u32;
+            if in_bvh {
                 for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
                     bounds.extend(forms[source.form].bounds());
-                    out.tree_primitives.push((part, i as u32));
+                    out.in_bvh.push((index, i as u32));
                 }
             } else {
-                out.all.ranges.push((part, 0..sources.len() as u32));
+                out.all.ranges.push((index, 0..sources.len() as u32));
             }
-            out.source.extend(&sources);
-            out.parts.push(BatchRange { batch, base, end: out.source.len() as u32 });
+            let base = out.sources.len() as u32;
+            out.sources.extend(&sources);
+            out.batches.push(BatchRange { batch, base, end: out.sources.len() as u32 });
         }
-        out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
-        out.all.tree = out.tree.is_some();
+        out.bvh = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
+        out.all.bvh = out.bvh.is_some();
         if let AccelerationStructure::Boxes { oriented } = structure {
             let box_of = |source: &PrimitiveId| PrimitiveBox::new(&*forms[source.form], oriented);
-            out.extents = out.source.iter().map(box_of).collect();
+            out.boxes = out.sources.iter().map(box_of).collect();
         }
         out
     }
 
-    /// Returns a subset of the primitives: all primitives in the BVH, and each primitive outside of
-    /// the BVH for whose number `wanted` returns `true`. Primitives in the BVH need no selection,
-    /// because traversal skips those that a ray misses.
+    /// Returns a subset of the primitives: all primitives in the BVH, and each other primitive for
+    /// whose number `wanted` returns `true`.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
-        for (part, range) in &self.all.ranges {
-            let base = self.parts[*part as usize].base;
+        for (index, range) in &self.all.ranges {
+            let base = self.batches[*index as usize].base;
             for i in range.clone().filter(|i| wanted(base + i)) {
                 match ranges.last_mut() {
-                    Some((last, run)) if last == part && run.end == i => run.end += 1,
-                    _ => ranges.push((*part, i..i + 1)),
+                    Some((last, run)) if last == index && run.end == i => run.end += 1,
+                    _ => ranges.push((*index, i..i + 1)),
                 }
             }
         }
-        PrimitiveSet { ranges, tree: self.all.tree }
+        PrimitiveSet { ranges, bvh: self.all.bvh }
     }
 
-    /// Returns a set of two groups of primitives: those with the numbers `primitives`, which must be in
-    /// the BVH, and all primitives outside of the BVH. Rays are tested against each primitive of
-    /// the set, without traversal of the BVH.
+    /// Returns the set of all primitives outside the BVH and of those with the numbers
+    /// `primitives`, which must be in the BVH. Rays are tested against each primitive of the set,
+    /// without traversal of the BVH.
     pub fn select_indices(&self, primitives: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for primitive in primitives {
-            let part = self.parts.partition_point(|part| part.end <= *primitive);
-            let i = primitive - self.parts[part].base;
-            ranges.push((part as u32, i..i + 1));
+            let index = self.batch_index(*primitive);
+            let i = primitive - self.batches[index].base;
+            ranges.push((index as u32, i..i + 1));
         }
-        ranges.sort_unstable_by_key(|(part, range)| (*part, range.start));
-        PrimitiveSet { ranges, tree: false }
+        ranges.sort_unstable_by_key(|(index, range)| (*index, range.start));
+        PrimitiveSet { ranges, bvh: false }
     }
 
     /// Returns the numbers of the primitives in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
-        let primitive = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
-        self.tree_primitives.iter().map(primitive).collect()
+        let number = |(index, i): &(u32, u32)| self.batches[*index as usize].base + i;
+        self.in_bvh.iter().map(number).collect()
     }
 
     /// Returns `true` if the aggregate has a BVH.
     pub fn has_tree(&self) -> bool {
-        self.tree.is_some()
+        self.bvh.is_some()
     }
 
-    /// Returns `true` if there is neither a BVH nor a list of bounding boxes of primitives.
+    /// Returns `true` if there are neither a BVH nor bounding boxes of primitives.
     pub fn has_no_tree(&self) -> bool {
-        self.tree.is_none() && self.extents.is_empty()
+        self.bvh.is_none() && self.boxes.is_empty()
     }
 
-    /// Returns the set of all primitives of the aggregate.
+    /// Returns the set of all primitives.
     pub fn all(&self) -> &PrimitiveSet {
         &self.all
     }
 
     /// Returns `true` if there are no primitives.
     pub fn is_empty(&self) -> bool {
-        self.source.is_empty()
+        self.sources.is_empty()
     }
 
-    /// Returns the origin of each primitive: the index of its canonical form, and the number of its
-    /// part if the form is a compound.
+    /// Returns the origin of each primitive.
     pub fn sources(&self) -> &[PrimitiveId] {
-        &self.source
+        &self.sources
+    }
+
+    fn batch_index(&self, primitive: u32) -> usize {
+        self.batches.partition_point(|batch| batch.end <= primitive)
     }
 
     /// Returns the closest hit of each ray with the primitives of `set`. At equal distances the
@@ -233,73 +227,71 @@ impl<L: SimdFloat> Aggregate<L> {
     /// undefined.
     #[inline(always)]
     pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
-        if !self.extents.is_empty() {
-            return self.closest_boxed(ray, set, nearest_wanted(wanted));
+        if !self.boxes.is_empty() {
+            return self.closest_boxed(ray, set, no_hit(wanted));
         }
         let hit = self.closest_linear(ray, set, wanted);
-        match &self.tree {
-            Some(tree) if set.tree => self.closest_bvh(tree, ray, hit),
+        match &self.bvh {
+            Some(bvh) if set.bvh => self.closest_bvh(bvh, ray, hit),
             _ => hit,
         }
     }
 
     /// Returns the result of [`Aggregate::closest_masked`] for those primitives of `set` that are
-    /// tested one by one, without traversal of the BVH. No bounding boxes are used.
+    /// tested one by one, without BVH and bounding boxes.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
-        let mut hit = nearest_wanted(wanted);
-        for (part, range) in &set.ranges {
-            let part = &self.parts[*part as usize];
-            part.batch.closest(indices(range), part.base, ray, &mut hit);
+        let mut hit = no_hit(wanted);
+        for (index, range) in &set.ranges {
+            let batch = &self.batches[*index as usize];
+            batch.batch.closest(indices(range), batch.base, ray, &mut hit);
         }
         hit
     }
 
     #[inline(never)]
-    fn closest_bvh(&self, tree: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
-        tree.traverse(ray, hit.t, |primitive, limit| {
-            let (part, i) = self.tree_primitives[primitive];
-            let part = &self.parts[part as usize];
+    fn closest_bvh(&self, bvh: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+        bvh.traverse(ray, hit.t, |primitive, limit| {
+            let (index, i) = self.in_bvh[primitive];
+            let batch = &self.batches[index as usize];
             // The limit is widened by rounding errors, so that hits at the distance of the current
             // hit are found, too. Of two hits at the same distance, `merge` keeps the primitive
             // with the lower number.
-            let mut primitive_hit = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
-            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut primitive_hit);
+            let mut new = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
+            batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut new);
             // Inactive lanes have a negative limit; here they become misses.
-            primitive_hit.t =
-                L::select(primitive_hit.t.gt(L::zero()), primitive_hit.t, L::from_f64(L::MAX));
-            hit.merge(&primitive_hit);
+            new.t = L::select(new.t.gt(L::zero()), new.t, L::from_f64(L::MAX));
+            hit.merge(&new);
             hit.t
         });
         hit
     }
 
-    /// Iterates over the primitives of `set` that are tested one by one, without BVH. An element
-    /// has three values: the batch of the primitive (all primitives of its kind), its number in the
-    /// batch, and its bounding box. The box is `None` for an infinite primitive.
+    /// Iterates over the primitives of `set` that are tested one by one: the batch of each, its
+    /// number in the batch, and its bounding box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
         set: &'a PrimitiveSet,
     ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a PrimitiveBox<L::Scalar>>)> {
-        set.ranges.iter().flat_map(move |(part, range)| {
-            let part = &self.parts[*part as usize];
-            range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
+        set.ranges.iter().flat_map(move |(index, range)| {
+            let batch = &self.batches[*index as usize];
+            range.clone().map(move |i| (batch, i, self.boxes[(batch.base + i) as usize].as_ref()))
         })
     }
 
     #[inline(never)]
     fn closest_boxed(&self, ray: &Ray<L>, set: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
-        for (part, i, extent) in self.boxed(set) {
-            if extent.is_none_or(|extent| extent.meets(ray, hit.t).any()) {
-                part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut hit);
+        for (batch, i, bounds) in self.boxed(set) {
+            if bounds.is_none_or(|bounds| bounds.meets(ray, hit.t).any()) {
+                batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut hit);
             }
         }
         hit
     }
 
     #[inline(never)]
-    fn blocked_in_boxes(
+    fn occluded_boxed(
         &self,
         ray: &Ray<L>,
         limit: L,
@@ -307,11 +299,11 @@ impl<L: SimdFloat> Aggregate<L> {
         set: &PrimitiveSet,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for (part, i, extent) in self.boxed(set) {
+        for (batch, i, bounds) in self.boxed(set) {
             let open = wanted.and_not(occluded);
-            let open = extent.map_or(open, |extent| open & extent.meets(ray, limit));
+            let open = bounds.map_or(open, |bounds| open & bounds.meets(ray, limit));
             if open.any() {
-                let new = part.batch.occluded(indices(&(i..i + 1)), ray, limit, open);
+                let new = batch.batch.occluded(indices(&(i..i + 1)), ray, limit, open);
                 occluded = occluded | (new & open);
                 if wanted.and_not(occluded).none() {
                     break;
@@ -325,21 +317,20 @@ impl<L: SimdFloat> Aggregate<L> {
     /// and `limit`.
     #[inline(always)]
     pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, set: &PrimitiveSet) -> L::Mask {
-        if !self.extents.is_empty() {
-            return self.blocked_in_boxes(ray, limit, wanted, set);
+        if !self.boxes.is_empty() {
+            return self.occluded_boxed(ray, limit, wanted, set);
         }
         let occluded = self.occluded_linear(ray, limit, wanted, set);
-        match &self.tree {
-            Some(tree) if set.tree && wanted.and_not(occluded).any() => {
-                self.blocked_in(tree, ray, limit, wanted, occluded)
+        match &self.bvh {
+            Some(bvh) if set.bvh && wanted.and_not(occluded).any() => {
+                self.occluded_bvh(bvh, ray, limit, wanted, occluded)
             }
             _ => occluded,
         }
     }
 
-    /// Returns the lanes of `wanted` whose ray hits, at a distance between 0 and `limit`, one of
-    /// those primitives of `set` that are tested one by one, without traversal of the BVH. No
-    /// bounding boxes are used.
+    /// Returns the result of [`Aggregate::occluded`] for those primitives of `set` that are tested
+    /// one by one, without BVH and bounding boxes.
     #[inline(always)]
     pub fn occluded_linear(
         &self,
@@ -349,9 +340,9 @@ impl<L: SimdFloat> Aggregate<L> {
         set: &PrimitiveSet,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for (part, range) in &set.ranges {
+        for (index, range) in &set.ranges {
             let open = wanted.and_not(occluded);
-            let batch = &self.parts[*part as usize].batch;
+            let batch = &self.batches[*index as usize].batch;
             occluded = occluded | batch.occluded(indices(range), ray, limit, open);
             if wanted.and_not(occluded).none() {
                 break;
@@ -364,21 +355,21 @@ impl<L: SimdFloat> Aggregate<L> {
     /// between 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
-        let (part, i) = self.tree_primitives[number as usize];
-        self.parts[part as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
+        let (index, i) = self.in_bvh[number as usize];
+        self.batches[index as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
     }
 
     #[inline(never)]
-    fn blocked_in(
+    fn occluded_bvh(
         &self,
-        tree: &SceneBvh,
+        bvh: &SceneBvh,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
         mut occluded: L::Mask,
     ) -> L::Mask {
         let limit_of = |occluded| L::select(wanted.and_not(occluded), limit, L::from_f64(-1.0));
-        tree.traverse(ray, limit_of(occluded), |primitive, left| {
+        bvh.traverse(ray, limit_of(occluded), |primitive, left| {
             let open = left.gt(L::zero());
             let new = self.occluded_by(primitive as u32, ray, left, open);
             occluded = occluded | (new & open);
@@ -387,36 +378,35 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the hits of the rays with `primitive` that are nearer than `limit`. If
-    /// `primitive` is the first part of a compound, these are the hits with the whole compound.
+    /// Returns the hits of the rays with `primitive` that are nearer than `limit`. If `primitive`
+    /// is the first part of a compound, these are the hits with the whole compound.
     pub fn closest_to(&self, primitive: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
-        let part = &self.parts[self.parts.partition_point(|part| part.end <= primitive)];
-        let (i, mut hit) = ((primitive - part.base) as usize, Hit::with_t_max(limit));
-        part.batch.closest(i..i + 1, part.base, ray, &mut hit);
+        let batch = &self.batches[self.batch_index(primitive)];
+        let (i, mut hit) = ((primitive - batch.base) as usize, Hit::with_t_max(limit));
+        batch.batch.closest(i..i + 1, batch.base, ray, &mut hit);
         hit
     }
 
-    /// Returns the projection of `point` onto the surface of `primitive`, with the normal
-    /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
-    /// the id of the hit triangle if the primitive is a mesh.
+    /// Returns the projection of `point` onto the surface of `primitive`, with the normal there.
+    /// `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
+    /// [`Hit::triangle`].
     #[inline(always)]
     pub fn surface(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
-        for part in &self.parts {
-            if primitive < part.end {
-                return part.batch.surface((primitive - part.base) as usize, triangle_tag, point);
+        for batch in &self.batches {
+            if primitive < batch.end {
+                let i = (primitive - batch.base) as usize;
+                return batch.batch.surface(i, triangle_tag, point);
             }
         }
-        unreachable!("every primitive belongs to a part")
+        unreachable!("every primitive belongs to a batch")
     }
 
-    /// Returns two values: all mesh primitives of the aggregate, and the number of the first one.
-    /// The others have the following numbers, which are the highest of the aggregate. Returns
-    /// `None` if there are no meshes.
+    /// Returns the mesh primitives and the number of the first one. The others have the following
+    /// numbers, which are the highest of the aggregate. Returns `None` if there are no meshes.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
-        match self.parts.last()? {
-            BatchRange { batch: PrimitiveBatch::Mesh(meshes), base, .. } => Some((meshes, *base)),
-            _ => None,
-        }
+        let BatchRange { batch, base, .. } = self.batches.last()?;
+        let PrimitiveBatch::Mesh(meshes) = batch else { return None };
+        Some((meshes, *base))
     }
 
     /// Returns `true` if some primitive has interpolated normals; see
@@ -430,11 +420,10 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal of `primitive` at a hit point. `triangle_tag` is the id of
-    /// the hit triangle if the primitive is a mesh. `at` has two vectors: the hit point, and the
-    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The angles
-    /// of the shading normal to the geometric normal and to the direction of the viewer are below
-    /// 90 degrees.
+    /// Returns the shading normal of `primitive` at a hit point. `triangle_tag` is
+    /// [`Hit::triangle`]. `at` is the hit point, and the geometric normal on the viewer's side.
+    /// `direction` is the direction of the rays. The angles of the shading normal to the geometric
+    /// normal and to the direction of the viewer are below 90 degrees.
     pub fn shading_normal(
         &self,
         (primitive, triangle_tag): (u32, L),
@@ -449,27 +438,25 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the colour that the mesh file of `primitive` gives to the triangle with the id
-    /// `triangle_tag`. Returns `None` if the primitive is no mesh, or if the file has no colours.
+    /// Returns the colour that the mesh file of `primitive` gives to the triangle `triangle_tag`.
+    /// Returns `None` if the primitive is not a mesh, or if the file has no colours.
     pub fn color(&self, primitive: u32, triangle_tag: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
         (primitive >= base).then(|| meshes.color((primitive - base) as usize, triangle_tag))?
     }
 
-    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`;
-    /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
-    /// primitive is a mesh.
+    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`; `None`
+    /// if it defines none. `triangle_tag` is [`Hit::triangle`].
     pub fn uv(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        let part = &self.parts[self.parts.partition_point(|part| part.end <= primitive)];
-        part.batch.uv((primitive - part.base) as usize, triangle_tag, point)
+        let batch = &self.batches[self.batch_index(primitive)];
+        batch.batch.uv((primitive - batch.base) as usize, triangle_tag, point)
     }
 }
 
-/// Returns a miss in every lane, with which the search for the closest hit begins. The lanes of
-/// `wanted` accept hits at any distance. Other lanes accept none, because their distance limit is
-/// negative.
+/// Returns a miss in every lane. Lanes outside `wanted` have a negative distance limit, so that
+/// they accept no hit.
 #[inline(always)]
-fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
+fn no_hit<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
 }
 

@@ -1,10 +1,9 @@
 //! Compounds (constructive solid geometry): unions, intersections and differences of solids, by
 //! intervals along lines (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
-//! Each part returns the spans in which a line is inside of it. The sorted ends of all spans divide
-//! the line into pieces. Each piece is either inside or outside of any given part, and therefore of
-//! the compound. The line crosses the surface of the compound where an inner and an outer piece
-//! meet.
+//! Each part returns the spans in which a line is inside it. The sorted ends of all spans divide
+//! the line into pieces. Each piece is either inside or outside any given part, and therefore the
+//! compound. The line crosses the surface of the compound where an inner and an outer piece meet.
 //!
 //! Two ends coincide if the distance between them, measured perpendicular to the surface, is at
 //! most [`TIE`] rounding errors. There is no piece between them. A cut flush with a face therefore
@@ -32,59 +31,54 @@ use std::ops::Range;
 /// by four units in the last place, each hit with a few rounding errors.
 const TIE: f64 = 16.0;
 
-/// Instruction of a stack machine. The machine computes whether a point is inside of a compound
-/// solid. Its input is one mask for each part: the lanes whose point is inside of this part.
+/// Instruction of a stack machine that computes whether a point is inside a compound. An entry of
+/// the stack is a mask of lanes.
 #[derive(Clone, Copy, Debug)]
 enum Op {
-    /// Pushes the mask of the lanes whose point is inside of the part with this number.
+    /// Pushes the lanes whose point is inside the part with this number.
     Part(u32),
-    /// Replaces the top two stack entries by their union.
+    /// Replaces the top two entries by their union.
     Or,
-    /// Replaces the top two stack entries by their intersection.
+    /// Replaces the top two entries by their intersection.
     And,
-    /// Replaces the top two stack entries by the difference: the lower one minus the upper one.
+    /// Subtracts the top entry from the one below.
     Minus,
 }
 
-/// Part of a compound: one of the solids that the compound's set operations combine.
 struct Part<S> {
     solid: CompiledSolid<S>,
-    /// `true` if the part is subtracted: the inside of its solid is outside of the compound.
+    /// `true` if the part is subtracted: the inside of its solid is outside the compound.
     reversed: bool,
-    /// Range of the part's spans (intervals in which a line is inside of the part) in the list of
-    /// the spans of all parts of the compound.
+    /// Range of the part's spans in the list of the spans of the compound.
     spans: Range<usize>,
 }
 
 /// Compound compiled for ray intersection: a bounding sphere, and the ranges of its parts and
 /// instructions in the lists of [`Compounds`].
-struct SolidOperand<S> {
+struct Compound<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     parts: Range<usize>,
     ops: Range<usize>,
-    /// Largest total number of spans of all parts of the compound. A span is an interval in which a
-    /// line is inside of a part.
+    /// Largest number of spans of one line in all parts.
     spans: usize,
-    /// Largest number of entries on the stack while the compound's instructions are executed.
+    /// Largest number of entries on the stack of the instructions.
     depth: usize,
 }
 
 /// All compounds of a scene, compiled for ray intersection. Every part counts as a primitive, so
-/// that a hit identifies the part. In lists of primitives the first part stands for the whole
-/// compound.
+/// that a hit identifies the part.
 pub struct Compounds<S> {
-    compounds: Vec<SolidOperand<S>>,
+    compounds: Vec<Compound<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// For each part of all compounds: the number of its compound if it is the first part,
-    /// otherwise `None`.
+    /// For each part: the number of its compound if it is the first part, otherwise `None`.
     first: Vec<Option<u32>>,
 }
 
 impl<S: Float> Compounds<S> {
-    /// Compiles the compounds among the canonical forms `forms`, in order.
+    /// Compiles the compounds among `forms`.
     pub fn new(forms: &[Form]) -> Self {
         let mut out =
             Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
@@ -110,7 +104,7 @@ impl<S: Float> Compounds<S> {
         let (low, high) = compound.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
         let bounded = compound.parts.iter().filter(|part| part.bounds().is_some());
-        self.compounds.push(SolidOperand {
+        self.compounds.push(Compound {
             center: (0.5 * (low + high)).to_array().map(S::from_f64),
             radius2: S::from_f64(radius * radius),
             reach: S::from_f64(bounded.map(|part| part.max_coordinate()).fold(0.0, f64::max)),
@@ -146,98 +140,11 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Returns the spans of part number `i` of a compound: the intervals in which each line is
-    /// inside of the part. `spans` has the spans of all parts of the compound.
-    #[inline(always)]
-    fn spans_of<'a, L>(
-        &self,
-        compound: &SolidOperand<S>,
-        spans: &'a [Interval<L>],
-        i: u32,
-    ) -> &'a [Interval<L>] {
-        &spans[self.parts[compound.parts.start + i as usize].spans.clone()]
-    }
-
-    /// Returns the lanes in which the point at the distance `t` along the ray is inside of the
-    /// compound. `spans` has the intervals in which the ray is inside of each part of the compound.
-    #[inline(always)]
-    fn inside<L: SimdFloat<Scalar = S>>(
-        &self,
-        compound: &SolidOperand<S>,
-        spans: &[Interval<L>],
-        t: L,
-    ) -> L::Mask {
-        with_scratch::<8, _, _>(compound.depth, L::mask(false), |stack| {
-            let mut top = 0;
-            for op in &self.ops[compound.ops.clone()] {
-                if let Op::Part(i) = op {
-                    stack[top] = inside_any(self.spans_of(compound, spans, *i), t);
-                    top += 1;
-                    continue;
-                }
-                top -= 1;
-                let (a, b) = (stack[top - 1], stack[top]);
-                stack[top - 1] = match op {
-                    Op::Or => a | b,
-                    Op::And => a & b,
-                    Op::Part(_) | Op::Minus => a.and_not(b),
-                };
-            }
-            stack[0]
-        })
-    }
-
-    /// Returns the transition of each line through the compound's surface between the points at the
-    /// distances `before` and `after`: whether each point is inside of the compound, and the
-    /// surface between the two. `spans` has the intervals in which each line is inside of each part
-    /// of the compound. The id of a part is `base` plus its number.
-    fn change<L: SimdFloat<Scalar = S>>(
-        &self,
-        compound: &SolidOperand<S>,
-        spans: &[Interval<L>],
-        base: u32,
-        before: L,
-        after: L,
-    ) -> Transition<L> {
-        let nothing = Transition {
-            before: L::mask(false),
-            after: L::mask(false),
-            t: L::zero(),
-            tag: L::from_id(0),
-        };
-        with_scratch::<8, _, _>(compound.depth, nothing, |stack| {
-            let mut top = 0;
-            for op in &self.ops[compound.ops.clone()] {
-                if let Op::Part(i) = op {
-                    let spans = self.spans_of(compound, spans, *i);
-                    let (was, is) = (inside_any(spans, before), inside_any(spans, after));
-                    let mut t = spans[0].leave;
-                    for span in spans {
-                        t = L::select(span.at(before).and_not(is), span.leave, t);
-                        t = L::select(span.at(after), span.enter, t);
-                    }
-                    let tag = L::from_id(base + compound.parts.start as u32 + i);
-                    stack[top] = Transition { before: was, after: is, t, tag };
-                    top += 1;
-                    continue;
-                }
-                top -= 1;
-                let (a, b) = (stack[top - 1], stack[top]);
-                stack[top - 1] = match op {
-                    Op::Or => a.or(b),
-                    Op::And => a.and(b),
-                    Op::Part(_) | Op::Minus => a.and(b.inverted()),
-                };
-            }
-            stack[0]
-        })
-    }
-
     /// Replaces `hit` in the lanes of `wanted` whose ray hits `compound` nearer than `hit`. The id
     /// of a part in `hit` is `base` plus the number of the part.
-    fn intersect_item<L: SimdFloat<Scalar = S>>(
+    fn intersect<L: SimdFloat<Scalar = S>>(
         &self,
-        compound: &SolidOperand<S>,
+        compound: &Compound<S>,
         base: u32,
         ray: &Ray<L>,
         wanted: L::Mask,
@@ -254,17 +161,18 @@ impl<S: Float> Compounds<S> {
             return;
         }
         let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
-        let parts = &self.parts[compound.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
+        let parts = &self.parts[compound.parts.clone()];
+        let ops = &self.ops[compound.ops.clone()];
+        let first_id = base + compound.parts.start as u32;
         with_scratch::<8, _, _>(compound.spans, outside, |spans| {
             with_scratch::<16, _, _>(2 * compound.spans, end, |ends| {
                 let tie = ray.origin.max_abs().max(L::splat(compound.reach))
                     * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
                 for part in parts {
-                    let slots = &mut spans[part.spans.clone()];
-                    let mut slots = slots.iter_mut();
+                    let mut slots = spans[part.spans.clone()].iter_mut();
                     part.solid.for_each_span(ray, |found| {
                         let Some(span) = slots.next() else { return };
                         *span = Interval {
@@ -277,60 +185,12 @@ impl<S: Float> Compounds<S> {
                         }
                     });
                 }
-                self.sweep_events(compound, (&*spans, &ends[..count]), base, near, hit);
+                let lines = Lines { parts, ops, depth: compound.depth, first_id, spans };
+                lines.sweep(&ends[..count], near, hit);
             });
         });
     }
 
-    /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this
-    /// surface is nearer than `hit`. The function steps along each line through `ends`, the sorted
-    /// ends of the parts' spans.
-    ///
-    /// Two ends coincide only if the distance between them is at most the tolerance (`tie`) of each
-    /// end. The tolerance along the line is large at a face that the line grazes. If the tolerance
-    /// of one end were enough, the grazed face would absorb other faces. Coincident faces have
-    /// equal tolerances, because their angles to the line are equal.
-    #[inline(always)]
-    fn sweep_events<L: SimdFloat<Scalar = S>>(
-        &self,
-        compound: &SolidOperand<S>,
-        (spans, ends): (&[Interval<L>], &[Event<L>]),
-        base: u32,
-        mut open: L::Mask,
-        hit: &mut Hit<L>,
-    ) {
-        let last = Event { t: L::from_f64(L::MAX), tie: L::zero() };
-        let mut state = L::mask(false);
-        let mut before = L::from_f64(-L::MAX);
-        for (i, end) in ends.iter().enumerate() {
-            let next = ends.get(i + 1).unwrap_or(&last);
-            let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
-            if gap.none() {
-                continue;
-            }
-            let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
-            let inside = self.inside(compound, spans, middle);
-            let changed = gap & (inside.and_not(state) | state.and_not(inside));
-            if changed.any() {
-                let seen = self.change(compound, spans, base, before, middle);
-                let ahead = changed & seen.t.gt(L::zero());
-                let nearer = ahead & seen.t.lt(hit.t);
-                hit.t = L::select(nearer, seen.t, hit.t);
-                hit.primitive = L::select(nearer, seen.tag, hit.primitive);
-                open = open.and_not(ahead);
-            }
-            // In these lanes all further surfaces are farther than the hit.
-            open = open.and_not(gap & next.t.gt(hit.t));
-            if open.none() {
-                return;
-            }
-            state = (inside & gap) | state.and_not(gap);
-            before = L::select(gap, middle, before);
-        }
-    }
-}
-
-impl<S: Float> Compounds<S> {
     /// Replaces `hit` in the lanes whose ray hits a compound nearer than `hit`. Only compounds
     /// whose first part is in `range` are tested. The id of a part is `base` plus its number.
     #[inline(never)]
@@ -342,7 +202,7 @@ impl<S: Float> Compounds<S> {
         hit: &mut Hit<L>,
     ) {
         for compound in self.first[range].iter().flatten() {
-            self.intersect_item(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+            self.intersect(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
         }
     }
 
@@ -363,14 +223,14 @@ impl<S: Float> Compounds<S> {
                 break;
             }
             let mut hit = Hit::with_t_max(limit);
-            self.intersect_item(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
+            self.intersect(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
             occluded = occluded | hit.t.lt(limit);
         }
         occluded
     }
 
-    /// Returns the projection of `point` onto the surface of a compound's part. The normal points
-    /// out of the compound.
+    /// Returns the projection of `point` onto the surface of a part. The normal points out of the
+    /// compound.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -378,13 +238,12 @@ impl<S: Float> Compounds<S> {
         point: Vec3<L>,
     ) -> SurfacePoint<L> {
         let part = &self.parts[part];
-        let surface: SurfacePoint<L> = part.solid.surface(point);
+        let surface = part.solid.surface(point);
         let normal = if part.reversed { -surface.normal } else { surface.normal };
         SurfacePoint { normal, ..surface }
     }
 
-    /// Returns the texture coordinates of a compound's part at `point`; `None` if the part has
-    /// none.
+    /// Returns the texture coordinates of a part at `point`; `None` if the part has none.
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         part: usize,
@@ -394,7 +253,125 @@ impl<S: Float> Compounds<S> {
     }
 }
 
-/// Returns the lanes in which the distance `t` is inside of at least one of `spans`.
+/// Lines of a ray packet through one compound.
+struct Lines<'a, L: SimdFloat> {
+    parts: &'a [Part<L::Scalar>],
+    ops: &'a [Op],
+    depth: usize,
+    /// Id of the compound's first part.
+    first_id: u32,
+    /// Spans of all parts.
+    spans: &'a [Interval<L>],
+}
+
+impl<L: SimdFloat> Lines<'_, L> {
+    #[inline(always)]
+    fn spans_of(&self, part: u32) -> &[Interval<L>] {
+        &self.spans[self.parts[part as usize].spans.clone()]
+    }
+
+    /// Returns the lanes in which the point at the distance `t` is inside the compound.
+    #[inline(always)]
+    fn inside(&self, t: L) -> L::Mask {
+        with_scratch::<8, _, _>(self.depth, L::mask(false), |stack| {
+            let mut top = 0;
+            for op in self.ops {
+                if let Op::Part(i) = op {
+                    stack[top] = inside_any(self.spans_of(*i), t);
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a | b,
+                    Op::And => a & b,
+                    Op::Part(_) | Op::Minus => a.and_not(b),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// Returns the transition of each line through the compound's surface between the points at the
+    /// distances `before` and `after`.
+    fn change(&self, before: L, after: L) -> Transition<L> {
+        let nothing = Transition {
+            before: L::mask(false),
+            after: L::mask(false),
+            t: L::zero(),
+            tag: L::from_id(0),
+        };
+        with_scratch::<8, _, _>(self.depth, nothing, |stack| {
+            let mut top = 0;
+            for op in self.ops {
+                if let Op::Part(i) = op {
+                    let spans = self.spans_of(*i);
+                    let (was, is) = (inside_any(spans, before), inside_any(spans, after));
+                    let mut t = spans[0].leave;
+                    for span in spans {
+                        t = L::select(span.at(before).and_not(is), span.leave, t);
+                        t = L::select(span.at(after), span.enter, t);
+                    }
+                    let tag = L::from_id(self.first_id + i);
+                    stack[top] = Transition { before: was, after: is, t, tag };
+                    top += 1;
+                    continue;
+                }
+                top -= 1;
+                let (a, b) = (stack[top - 1], stack[top]);
+                stack[top - 1] = match op {
+                    Op::Or => a.or(b),
+                    Op::And => a.and(b),
+                    Op::Part(_) | Op::Minus => a.and(b.inverted()),
+                };
+            }
+            stack[0]
+        })
+    }
+
+    /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this
+    /// surface is nearer than `hit`. Steps along each line through `ends`, the sorted ends of the
+    /// parts' spans.
+    ///
+    /// Two ends coincide only if the distance between them is at most the tolerance (`tie`) of each
+    /// end. The tolerance along the line is large at a face that the line grazes. If the tolerance
+    /// of one end were enough, the grazed face would absorb other faces. Coincident faces have
+    /// equal tolerances, because their angles to the line are equal.
+    #[inline(always)]
+    fn sweep(&self, ends: &[Event<L>], mut open: L::Mask, hit: &mut Hit<L>) {
+        let last = Event { t: L::from_f64(L::MAX), tie: L::zero() };
+        let mut state = L::mask(false);
+        let mut before = L::from_f64(-L::MAX);
+        for (i, end) in ends.iter().enumerate() {
+            let next = ends.get(i + 1).unwrap_or(&last);
+            let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
+            if gap.none() {
+                continue;
+            }
+            let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
+            let inside = self.inside(middle);
+            let changed = gap & (inside.and_not(state) | state.and_not(inside));
+            if changed.any() {
+                let seen = self.change(before, middle);
+                let ahead = changed & seen.t.gt(L::zero());
+                let nearer = ahead & seen.t.lt(hit.t);
+                hit.t = L::select(nearer, seen.t, hit.t);
+                hit.primitive = L::select(nearer, seen.tag, hit.primitive);
+                open = open.and_not(ahead);
+            }
+            // In these lanes all further surfaces are farther than the hit.
+            open = open.and_not(gap & next.t.gt(hit.t));
+            if open.none() {
+                return;
+            }
+            state = (inside & gap) | state.and_not(gap);
+            before = L::select(gap, middle, before);
+        }
+    }
+}
+
+/// Returns the lanes in which the distance `t` is inside at least one of `spans`.
 #[inline(always)]
 fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
     let [first, others @ ..] = spans else { return L::mask(false) };

@@ -1,4 +1,4 @@
-//! Compound solids (CSG): their parts, and the tree of set operations that combines them.
+//! Canonical form of compounds: their parts, and the tree of set operations that combines them.
 
 use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
 use crate::primitive::csg::solid::Solid;
@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3};
 /// Tree of set operations on the parts of a compound.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
-    /// One part of the solid (a single primitive), as its index in [`CsgSolid::parts`].
+    /// Part, as its index in [`CsgSolid::parts`].
     Part(usize),
     /// Union: points in any of the operands.
     Union(Vec<CsgTree>),
@@ -21,7 +21,7 @@ pub enum CsgTree {
 impl CsgTree {
     /// Returns the tree with all part indices increased by `by`, for use as an operand of a larger
     /// compound.
-    pub(crate) fn shifted(self, by: usize) -> Self {
+    pub fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
             Self::Part(i) => Self::Part(i + by),
@@ -35,7 +35,7 @@ impl CsgTree {
 /// Compound solid: several solids combined by set operations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Solids that are combined.
+    /// Solids that are combined; each can have a material of its own.
     pub parts: Vec<Solid>,
     /// Tree of set operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
@@ -74,8 +74,6 @@ impl CanonicalShape for CsgSolid {
         DefaultMapping::Box
     }
 
-    /// Returns the proxies of all parts: simplified geometry with which narrow gaps between objects
-    /// are found.
     fn proxies(&self) -> Vec<Proxy> {
         self.parts.iter().flat_map(|form| form.proxies()).collect()
     }
