@@ -1,5 +1,4 @@
-//! Canonical forms: the few kinds of geometry to which every shape with its transform is reduced,
-//! before it is compiled for a SIMD type.
+//! Canonical forms: the few kinds of geometry to which every shape with its transform is reduced.
 
 use crate::bvh::Ray;
 use crate::lanes::Vec3;
@@ -37,8 +36,6 @@ macro_rules! forms {
         impl Deref for Form {
             type Target = dyn CanonicalShape;
 
-            /// Returns the geometry that the variant holds. Properties that every kind of geometry
-            /// has, such as the bounds, can therefore be read from the form itself.
             fn deref(&self) -> &Self::Target {
                 match self {
                     $(Self::$kind(form) => form,)+
@@ -47,17 +44,14 @@ macro_rules! forms {
         }
 
         impl Form {
-            /// Returns the noun for primitives of this kind in the scene's inventory: singular and
-            /// plural.
-            pub(crate) fn noun(&self) -> (&'static str, &'static str) {
+            /// Returns the noun for primitives of this kind, singular and plural.
+            pub fn noun(&self) -> (&'static str, &'static str) {
                 match self {
                     $(Self::$kind(_) => ($noun, $nouns),)+
                 }
             }
 
-            /// Returns the image of the geometry under the invertible affine map `map`. A
-            /// similarity maps a sphere to a sphere, any other map to an ellipsoid. The image of
-            /// any other form has the same variant.
+            /// Returns the image of the geometry under the invertible affine map `map`.
             pub fn transformed(self, map: &DAffine3) -> Self {
                 match self {
                     $(Self::$kind(form) => form.transformed(map).into(),)+
@@ -67,8 +61,8 @@ macro_rules! forms {
     };
 }
 
-// List of the canonical forms. A new kind of primitive needs a line here: its variant, its type,
-// and the noun for such primitives in the inventory of a scene, singular and plural.
+// Kinds of primitives, each with its noun in the inventory of a scene, singular and plural. A new
+// kind needs a line here.
 forms! {
     /// Sphere, given by centre and radius.
     Sphere(SphereForm, "sphere", "spheres"),
@@ -102,8 +96,7 @@ impl Form {
     }
 }
 
-/// Implements [`CanonicalShape::cast`] for `form`: compiles it in double precision and intersects
-/// the ray with it.
+/// Implements [`CanonicalShape::cast`] by compilation in double precision.
 pub fn cast_compiled(form: Form, origin: DVec3, direction: DVec3) -> Option<f64> {
     let length = direction.length();
     let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
