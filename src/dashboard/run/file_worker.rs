@@ -7,14 +7,14 @@ use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use zerkalo_scene::disk::FileStamp;
-use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
@@ -304,8 +304,8 @@ impl FileWorker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::starter;
     use std::fs;
+    use zerkalo_scene::starter;
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
     /// it.
