@@ -241,51 +241,37 @@ impl BoundingVolume {
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        let grown = |ball: &BoundingSphere| BoundingSphere {
-            radius: ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center),
-            ..*ball
-        };
         distance_to_hull(self.ball.center, &grown(light), &grown(lit)) <= grown(&self.ball).radius
     }
 
     /// Returns `true` if the object may be between some point of the sphere `lit` and the light
     /// `towards`.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
-        let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
-        let radius = lit.radius + slack;
-        let above = |plane: HalfSpace| match towards {
-            LightTarget::Point(light) => (plane.height(*light), self.ray_error(*light)),
-            LightTarget::Direction(direction) => (plane.normal.dot(*direction), F32_RAY_ERROR),
+        let direction = match towards {
+            LightTarget::Point(light) => {
+                return self.may_occlude_ball(lit, &BoundingSphere { center: *light, radius: 0.0 });
+            }
+            LightTarget::Direction(direction) => *direction,
         };
-        if self.is_beside(lit, above) {
+        if self.is_beside(lit, |plane| (plane.normal.dot(direction), F32_RAY_ERROR)) {
             return false;
         }
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        match towards {
-            LightTarget::Direction(direction) => {
-                let to = self.ball.center - lit.center;
-                let along = to.dot(*direction);
-                let across = (to - *direction * along).length();
-                let both = (radius + self.ball.radius) * (1.0 + F32_RAY_ERROR)
-                    + ray_error(self.ball.center);
-                across <= both && along >= -both
-            }
-            LightTarget::Point(light) => {
-                let to = lit.center - *light;
-                let distance = to.length();
-                if distance <= radius {
-                    return true;
-                }
-                let sin = radius / distance;
-                let (axis, cos) = (to / distance, (1.0 - sin * sin).sqrt());
-                let cone = Cone { apex: *light, axis, sin, cos };
-                let nearest = (self.ball.center - *light).length() - self.ball.radius;
-                nearest <= distance + radius && cone.meets(&self.ball)
-            }
-        }
+        let to = self.ball.center - lit.center;
+        let along = to.dot(direction);
+        let across = (to - direction * along).length();
+        let radius = grown(lit).radius + self.ball.radius;
+        let both = radius * (1.0 + F32_RAY_ERROR) + ray_error(self.ball.center);
+        across <= both && along >= -both
     }
+}
+
+/// Returns `ball` enlarged by the rounding errors of rays from or to it.
+fn grown(ball: &BoundingSphere) -> BoundingSphere {
+    let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
+    BoundingSphere { radius, ..*ball }
 }
 
 /// Returns the distance between `point` and the convex hull of the spheres `a` and `b`; negative

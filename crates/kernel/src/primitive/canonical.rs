@@ -127,9 +127,6 @@ pub trait CanonicalShape {
         None
     }
 
-    /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
-    fn is_convex(&self) -> bool;
-
     /// Returns the smallest thickness of a solid, or the shorter edge of flat geometry, in scene
     /// units. A compound has the thickness of its thinnest part; the search for narrow gaps finds
     /// thinner pieces, which cuts may leave.
@@ -143,10 +140,6 @@ pub trait CanonicalShape {
     /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`: one
     /// list for each solid of a compound, or of other geometry, with such a surface.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
-
-    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
-    /// there is none. The unit of t is the length of `direction`.
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
     /// See [`DefaultMapping`].
     fn default_mapping(&self) -> DefaultMapping;

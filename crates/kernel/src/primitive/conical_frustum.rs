@@ -11,7 +11,7 @@ use crate::primitive::canonical::{
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rows, times, transposed_times};
-use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
@@ -71,10 +71,6 @@ impl CanonicalShape for ConicalFrustumForm {
         Some((self.scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         // Smallest distance in the scene between opposite faces of the box around the canonical
         // solid, 2 by 2 by 1.
@@ -116,10 +112,6 @@ impl CanonicalShape for ConicalFrustumForm {
             }
         }
         normals_of_solid(sides, slack)
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled((*self).into(), origin, direction)
     }
 
     fn default_mapping(&self) -> DefaultMapping {

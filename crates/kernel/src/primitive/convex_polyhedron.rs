@@ -39,10 +39,6 @@ impl CanonicalShape for ConvexPolyhedronForm {
         BoundingSphere::around(&self.corners)
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         let behind = |face: &HalfSpace| {
             self.corners.iter().map(|corner| -face.height(*corner)).fold(0.0, f64::max)
@@ -58,23 +54,6 @@ impl CanonicalShape for ConvexPolyhedronForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let side = |face: &HalfSpace| (face.height(point), face.normal);
         normals_of_solid(self.faces.iter().map(side).collect(), slack)
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-        for face in &self.faces {
-            let height = face.height(origin);
-            let rise = face.normal.dot(direction);
-            if rise < 0.0 {
-                enter = enter.max(-height / rise);
-            } else if rise > 0.0 {
-                leave = leave.min(-height / rise);
-            } else if height > 0.0 {
-                return None;
-            }
-        }
-        let t = if enter > 0.0 { enter } else { leave };
-        (enter <= leave && t > 0.0 && t.is_finite()).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {

@@ -8,7 +8,7 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::sphere::{cast_at_unit_sphere, intersections};
+use crate::primitive::sphere::intersections;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Image of the unit sphere at the origin under an invertible affine map.
@@ -46,10 +46,6 @@ impl CanonicalShape for EllipsoidForm {
         Some((self.scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         self.bounds().map_or(f64::INFINITY, |(low, high)| (high - low).min_element())
     }
@@ -66,14 +62,6 @@ impl CanonicalShape for EllipsoidForm {
         let steepness = unit_from_scene.matrix3.transpose() * (on_unit / distance);
         let height = (distance - 1.0) / steepness.length();
         normals_of_solid(vec![(height, steepness.normalize())], slack)
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let unit_from_scene = self.scene_from_unit.inverse();
-        cast_at_unit_sphere(
-            unit_from_scene.transform_point3(origin),
-            unit_from_scene.transform_vector3(direction),
-        )
     }
 
     fn default_mapping(&self) -> DefaultMapping {

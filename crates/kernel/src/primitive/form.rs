@@ -14,32 +14,53 @@ use crate::primitive::plane::PlaneForm;
 use crate::primitive::sphere::SphereForm;
 use crate::primitive::torus::TorusForm;
 use glam::{DAffine3, DVec3};
-use std::ops::Deref;
 
-macro_rules! forms {
-    ($($(#[$doc:meta])+ $kind:ident($form:ident, $noun:literal, $nouns:literal)),+ $(,)?) => {
-        /// Canonical form: the geometry of one object in double precision and scene coordinates.
-        /// Each variant is a kind of primitive.
+/// Declares an enum of canonical forms, which is dereferenced to their properties.
+macro_rules! form_enum {
+    ($(#[$meta:meta])* pub enum $name:ident { $($(#[$doc:meta])* $kind:ident($form:ident),)+ }) => {
+        $(#[$meta])*
         #[derive(Clone, Debug, PartialEq)]
-        pub enum Form {
-            $($(#[$doc])+ $kind($form),)+
+        pub enum $name {
+            $($(#[$doc])* $kind($form),)+
         }
 
         $(
-            impl From<$form> for Form {
+            impl From<$form> for $name {
                 fn from(form: $form) -> Self {
                     Self::$kind(form)
                 }
             }
         )+
 
-        impl Deref for Form {
+        impl std::ops::Deref for $name {
             type Target = dyn CanonicalShape;
 
             fn deref(&self) -> &Self::Target {
                 match self {
                     $(Self::$kind(form) => form,)+
                 }
+            }
+        }
+
+        impl $name {
+            /// Returns the image of the geometry under the invertible affine map `map`.
+            pub fn transformed(self, map: &DAffine3) -> Self {
+                match self {
+                    $(Self::$kind(form) => form.transformed(map).into(),)+
+                }
+            }
+        }
+    };
+}
+pub(in crate::primitive) use form_enum;
+
+macro_rules! forms {
+    ($($(#[$doc:meta])+ $kind:ident($form:ident, $noun:literal, $nouns:literal, convex: $convex:literal),)+) => {
+        form_enum! {
+            /// Canonical form: the geometry of one object in double precision and scene coordinates.
+            /// Each variant is a kind of primitive.
+            pub enum Form {
+                $($(#[$doc])+ $kind($form),)+
             }
         }
 
@@ -51,10 +72,10 @@ macro_rules! forms {
                 }
             }
 
-            /// Returns the image of the geometry under the invertible affine map `map`.
-            pub fn transformed(self, map: &DAffine3) -> Self {
+            /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
+            pub fn is_convex(&self) -> bool {
                 match self {
-                    $(Self::$kind(form) => form.transformed(map).into(),)+
+                    $(Self::$kind(_) => $convex,)+
                 }
             }
         }
@@ -65,23 +86,23 @@ macro_rules! forms {
 // kind needs a line here.
 forms! {
     /// Sphere, given by centre and radius.
-    Sphere(SphereForm, "sphere", "spheres"),
+    Sphere(SphereForm, "sphere", "spheres", convex: true),
     /// Image of the unit sphere under an affine map.
-    Ellipsoid(EllipsoidForm, "ellipsoid", "ellipsoids"),
+    Ellipsoid(EllipsoidForm, "ellipsoid", "ellipsoids", convex: true),
     /// Convex polyhedron: a bounded intersection of half-spaces.
-    ConvexPolyhedron(ConvexPolyhedronForm, "convex solid", "convex solids"),
+    ConvexPolyhedron(ConvexPolyhedronForm, "convex solid", "convex solids", convex: true),
     /// Image of a circular cylinder, cone or frustum under an affine map.
-    ConicalFrustum(ConicalFrustumForm, "tapered cylinder", "tapered cylinders"),
+    ConicalFrustum(ConicalFrustumForm, "tapered cylinder", "tapered cylinders", convex: true),
     /// Compound of solids: union, intersection or difference.
-    Csg(CsgSolid, "compound", "compounds"),
+    Csg(CsgSolid, "compound", "compounds", convex: false),
     /// Image of a triangle mesh under an affine map.
-    Mesh(MeshForm, "mesh", "meshes"),
+    Mesh(MeshForm, "mesh", "meshes", convex: false),
     /// Flat parallelogram, such as a rectangle.
-    Parallelogram(ParallelogramForm, "rectangle", "rectangles"),
+    Parallelogram(ParallelogramForm, "rectangle", "rectangles", convex: true),
     /// Infinite plane, given by normal and offset.
-    Plane(PlaneForm, "plane", "planes"),
+    Plane(PlaneForm, "plane", "planes", convex: true),
     /// Image of a torus under an affine map.
-    Torus(TorusForm, "torus", "tori"),
+    Torus(TorusForm, "torus", "tori", convex: false),
 }
 
 impl Form {
@@ -94,14 +115,15 @@ impl Form {
     pub fn is_solid(&self) -> bool {
         !self.is_flat()
     }
-}
 
-/// Implements [`CanonicalShape::cast`] by compilation in double precision.
-pub fn cast_compiled(form: Form, origin: DVec3, direction: DVec3) -> Option<f64> {
-    let length = direction.length();
-    let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
-    let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
-    let alone = Aggregate::with_tree(&[form], false);
-    let t = alone.closest(&ray, alone.all()).t;
-    (t < f64::MAX).then_some(t / length)
+    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if there
+    /// is none. The unit of t is the length of `direction`.
+    pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let length = direction.length();
+        let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
+        let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
+        let alone = Aggregate::with_tree(std::slice::from_ref(self), false);
+        let t = alone.closest(&ray, alone.all()).t;
+        (t < f64::MAX).then_some(t / length)
+    }
 }

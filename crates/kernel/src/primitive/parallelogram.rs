@@ -47,10 +47,6 @@ impl CanonicalShape for ParallelogramForm {
         Some(HalfSpace::through(self.corner, self.u.cross(self.v)))
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         self.u.length().min(self.v.length())
     }
@@ -80,19 +76,6 @@ impl CanonicalShape for ParallelogramForm {
             && is_between(self.u, self.v)
             && is_between(self.v, self.u);
         if on { vec![vec![normal]] } else { Vec::new() }
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let Self { corner, u, v } = *self;
-        let normal = u.cross(v);
-        let t = normal.dot(corner - origin) / normal.dot(direction);
-        let hit_point = origin + direction * t - corner;
-        // Coordinates along u and v by Cramer's rule in the parallelogram's plane.
-        let area = normal.length_squared();
-        let a = hit_point.cross(v).dot(normal) / area;
-        let b = u.cross(hit_point).dot(normal) / area;
-        let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
-        (t > 0.0 && t.is_finite() && inside).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {

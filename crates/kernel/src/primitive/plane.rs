@@ -44,10 +44,6 @@ impl CanonicalShape for PlaneForm {
         Some(self.half_space())
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         f64::INFINITY
     }
@@ -59,11 +55,6 @@ impl CanonicalShape for PlaneForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let on = self.half_space().height(point).abs() <= slack;
         if on { vec![vec![self.normal]] } else { Vec::new() }
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let t = (self.offset - self.normal.dot(origin)) / self.normal.dot(direction);
-        (t > 0.0 && t.is_finite()).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {

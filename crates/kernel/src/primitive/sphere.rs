@@ -48,10 +48,6 @@ impl CanonicalShape for SphereForm {
         BoundingSphere { center: self.center, radius: self.radius }
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         2.0 * self.radius
     }
@@ -66,10 +62,6 @@ impl CanonicalShape for SphereForm {
         normals_of_solid(vec![(distance - self.radius, from_center / distance)], slack)
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_at_unit_sphere((origin - self.center) / self.radius, direction / self.radius)
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Spherical
     }
@@ -82,14 +74,6 @@ impl CanonicalShape for SphereForm {
         let middle = axis.dot(self.center);
         Some((middle - self.radius, middle + self.radius))
     }
-}
-
-/// Returns the smallest t > 0 with |o + t d| = 1; `None` if there is none.
-pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
-    let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
-    let root = (b * b - a * c).sqrt();
-    // NaN (no crossing) compares false.
-    [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0 && t.is_finite())
 }
 
 /// Sphere compiled for ray intersection, rounded to the precision of the lanes.

@@ -25,7 +25,6 @@ use crate::primitive::canonical::{
 use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rows, times, transposed_times};
-use crate::primitive::form::cast_compiled;
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
@@ -88,10 +87,6 @@ impl CanonicalShape for TorusForm {
         Some((self.scene_from_torus, (-half, half)))
     }
 
-    fn is_convex(&self) -> bool {
-        false
-    }
-
     /// Returns the smallest distance between opposite faces of the parallelepiped that is the image
     /// of a cube around a ball with the radius of the tube.
     fn thickness(&self) -> f64 {
@@ -121,10 +116,6 @@ impl CanonicalShape for TorusForm {
         let steepness = inverse.matrix3.transpose() * outward;
         let height = (distance - self.tube) / steepness.length();
         normals_of_solid(vec![(height, steepness.normalize())], slack)
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled((*self).into(), origin, direction)
     }
 
     /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from 0

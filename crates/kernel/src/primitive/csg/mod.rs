@@ -270,63 +270,60 @@ impl<L: SimdFloat> Lines<'_, L> {
         &self.spans[self.parts[part as usize].spans.clone()]
     }
 
-    /// Returns the lanes in which the point at the distance `t` is inside the compound.
+    /// Executes the instructions on a stack of values: `part` returns the value of a part, and
+    /// `join` combines two values.
     #[inline(always)]
-    fn inside(&self, t: L) -> L::Mask {
-        with_scratch::<8, _, _>(self.depth, L::mask(false), |stack| {
+    fn evaluate<T: Copy>(
+        &self,
+        empty: T,
+        part: impl Fn(u32) -> T,
+        join: impl Fn(Op, T, T) -> T,
+    ) -> T {
+        with_scratch::<8, _, _>(self.depth, empty, |stack| {
             let mut top = 0;
             for op in self.ops {
                 if let Op::Part(i) = op {
-                    stack[top] = inside_any(self.spans_of(*i), t);
+                    stack[top] = part(*i);
                     top += 1;
-                    continue;
+                } else {
+                    top -= 1;
+                    stack[top - 1] = join(*op, stack[top - 1], stack[top]);
                 }
-                top -= 1;
-                let (a, b) = (stack[top - 1], stack[top]);
-                stack[top - 1] = match op {
-                    Op::Or => a | b,
-                    Op::And => a & b,
-                    Op::Part(_) | Op::Minus => a.and_not(b),
-                };
             }
             stack[0]
+        })
+    }
+
+    /// Returns the lanes in which the point at the distance `t` is inside the compound.
+    #[inline(always)]
+    fn inside(&self, t: L) -> L::Mask {
+        let part = |i| inside_any(self.spans_of(i), t);
+        self.evaluate(L::mask(false), part, |op, a, b| match op {
+            Op::Or => a | b,
+            Op::And => a & b,
+            Op::Part(_) | Op::Minus => a.and_not(b),
         })
     }
 
     /// Returns the transition of each line through the compound's surface between the points at the
     /// distances `before` and `after`.
     fn change(&self, before: L, after: L) -> Transition<L> {
-        let nothing = Transition {
-            before: L::mask(false),
-            after: L::mask(false),
-            t: L::zero(),
-            tag: L::from_id(0),
-        };
-        with_scratch::<8, _, _>(self.depth, nothing, |stack| {
-            let mut top = 0;
-            for op in self.ops {
-                if let Op::Part(i) = op {
-                    let spans = self.spans_of(*i);
-                    let (was, is) = (inside_any(spans, before), inside_any(spans, after));
-                    let mut t = spans[0].leave;
-                    for span in spans {
-                        t = L::select(span.at(before).and_not(is), span.leave, t);
-                        t = L::select(span.at(after), span.enter, t);
-                    }
-                    let tag = L::from_id(self.first_id + i);
-                    stack[top] = Transition { before: was, after: is, t, tag };
-                    top += 1;
-                    continue;
-                }
-                top -= 1;
-                let (a, b) = (stack[top - 1], stack[top]);
-                stack[top - 1] = match op {
-                    Op::Or => a.or(b),
-                    Op::And => a.and(b),
-                    Op::Part(_) | Op::Minus => a.and(b.inverted()),
-                };
+        let no = L::mask(false);
+        let nothing = Transition { before: no, after: no, t: L::zero(), tag: L::from_id(0) };
+        let part = |i| {
+            let spans = self.spans_of(i);
+            let (was, is) = (inside_any(spans, before), inside_any(spans, after));
+            let mut t = spans[0].leave;
+            for span in spans {
+                t = L::select(span.at(before).and_not(is), span.leave, t);
+                t = L::select(span.at(after), span.enter, t);
             }
-            stack[0]
+            Transition { before: was, after: is, t, tag: L::from_id(self.first_id + i) }
+        };
+        self.evaluate(nothing, part, |op, a, b| match op {
+            Op::Or => a.or(b),
+            Op::And => a.and(b),
+            Op::Part(_) | Op::Minus => a.and(b.inverted()),
         })
     }
 

@@ -7,12 +7,11 @@ use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::conical_frustum::{ConicalFrustum, ConicalFrustumForm};
 use crate::primitive::convex_polyhedron::{ConvexPolyhedron, ConvexPolyhedronForm};
 use crate::primitive::ellipsoid::{Ellipsoid, EllipsoidForm};
-use crate::primitive::form::Form;
+use crate::primitive::form::{Form, form_enum};
 use crate::primitive::plane::{Plane, PlaneForm};
 use crate::primitive::sphere::{Sphere, SphereForm};
 use crate::primitive::torus::{Torus, TorusForm};
 use glam::DAffine3;
-use std::ops::Deref;
 
 /// Interval of distances in which the line of each lane is inside a solid.
 #[derive(Clone, Copy, Debug)]
@@ -40,45 +39,19 @@ pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
 
 macro_rules! solids {
     ($($kind:ident($form:ident, $spans:literal)),+; others: $($other:ident),+) => {
-        /// Canonical form that can be a part of a compound. A plane stands for the half-space
-        /// behind it.
-        #[derive(Clone, Debug, PartialEq)]
-        #[allow(missing_docs, reason = "the variants of `Form` with the same names")]
-        pub enum Solid {
-            $($kind($form),)+
-        }
-
-        $(
-            impl From<$form> for Solid {
-                fn from(form: $form) -> Self {
-                    Self::$kind(form)
-                }
+        form_enum! {
+            /// Canonical form that can be a part of a compound. A plane stands for the half-space
+            /// behind it.
+            #[allow(missing_docs, reason = "the variants of `Form` with the same names")]
+            pub enum Solid {
+                $($kind($form),)+
             }
-        )+
+        }
 
         impl From<Solid> for Form {
             fn from(solid: Solid) -> Self {
                 match solid {
                     $(Solid::$kind(form) => Self::$kind(form),)+
-                }
-            }
-        }
-
-        impl Deref for Solid {
-            type Target = dyn CanonicalShape;
-
-            fn deref(&self) -> &Self::Target {
-                match self {
-                    $(Self::$kind(form) => form,)+
-                }
-            }
-        }
-
-        impl Solid {
-            /// Returns the image of the solid under the invertible affine map `map`.
-            pub fn transformed(self, map: &DAffine3) -> Self {
-                match self {
-                    $(Self::$kind(form) => form.transformed(map).into(),)+
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
 use crate::primitive::csg::solid::Solid;
-use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
 
 /// Tree of set operations on the parts of a compound.
@@ -50,10 +50,6 @@ impl CanonicalShape for CsgSolid {
         self.bounds_of(&self.tree)
     }
 
-    fn is_convex(&self) -> bool {
-        false
-    }
-
     fn thickness(&self) -> f64 {
         self.parts.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min)
     }
@@ -64,10 +60,6 @@ impl CanonicalShape for CsgSolid {
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         self.parts.iter().flat_map(|part| part.normals_at(point, slack)).collect()
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled(self.clone().into(), origin, direction)
     }
 
     fn default_mapping(&self) -> DefaultMapping {

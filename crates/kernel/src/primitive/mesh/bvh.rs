@@ -69,11 +69,8 @@ impl Mesh {
             let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
             [reduce(f32::min), reduce(f32::max)]
         };
-        // A high traversal cost gives large leaves. Large leaves are cheap, because a single ray is
-        // intersected with all triangles of a leaf at once by SIMD.
-        let quality = BuildQuality { traversal_cost: 8.0, ..BuildQuality::FAST };
         let Bvh8Build { bvh: boxes, order, leaves } =
-            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
+            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, BuildQuality::FAST);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
             mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();

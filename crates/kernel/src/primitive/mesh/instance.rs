@@ -11,7 +11,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
 };
 use crate::primitive::compiled::{SurfacePoint, UvGradients};
-use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::form::Form;
 use crate::primitive::keep_visible;
 use crate::primitive::mesh::{Mesh, intersection};
 use glam::{DAffine3, DVec3};
@@ -55,10 +55,6 @@ impl CanonicalShape for MeshForm {
         Some((self.scene_from_mesh, (low, high)))
     }
 
-    fn is_convex(&self) -> bool {
-        false
-    }
-
     fn thickness(&self) -> f64 {
         let [low, high] = self.mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
         let m = self.scene_from_mesh.matrix3;
@@ -97,10 +93,6 @@ impl CanonicalShape for MeshForm {
             }
         }
         if normals.is_empty() { Vec::new() } else { vec![normals] }
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled(self.clone().into(), origin, direction)
     }
 
     fn default_mapping(&self) -> DefaultMapping {
