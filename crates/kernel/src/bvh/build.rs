@@ -71,14 +71,15 @@ pub struct BuildQuality {
 }
 
 impl BuildQuality {
-    /// Short build of a BVH of a million primitives or more, whose intersection tests are cheap.
+    /// Short build, for a million triangles or more. SIMD tests all triangles of a leaf at once, so
+    /// that large leaves are cheap.
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
         second_reinsertion: 0.0,
         traversal_cost: 8.0,
     };
-    /// Longer build for primitives whose intersection tests take much time.
+    /// Longer build, for primitives whose intersection tests take much time.
     pub const MEDIUM: Self = Self {
         window: SearchWindow { narrow_passes: 3, distance: 14 },
         reinsertion: 0.05,

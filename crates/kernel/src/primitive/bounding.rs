@@ -146,7 +146,7 @@ impl BoundingVolume {
         self.plane.is_some()
     }
 
-    /// See [`CanonicalShape::is_convex`](super::CanonicalShape::is_convex).
+    /// See [`Form::is_convex`].
     pub fn is_convex(&self) -> bool {
         self.convex
     }
