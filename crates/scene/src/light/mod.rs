@@ -100,12 +100,9 @@ impl Light {
         }
     }
 
-    /// Returns `true` if the camera and mirrors can see lights of this form.
+    /// Returns `true` if the camera and mirrors can see the light, unless `visible` is `false`.
     pub fn has_radiance(&self) -> bool {
-        match self.form() {
-            LightForm::Surface(_) | LightForm::Environment(_) => true,
-            LightForm::Point { .. } | LightForm::Distant { .. } => false,
-        }
+        self.form().is_visible()
     }
 
     /// Returns `true` if the key `name` has an effect on a light of this kind.
@@ -178,7 +175,7 @@ impl Light {
             Some(ValidationError::new(
                 "visible",
                 "visible is false, but no light of this kind is visible",
-                "visible = true, or a sphere, rectangle, disk or environment",
+                "visible = true, or a light with a size or an environment",
             ))
         } else {
             None
