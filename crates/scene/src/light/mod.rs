@@ -211,7 +211,7 @@ mod tests {
     fn falloff_belongs_to_point_and_spot_lights() {
         for (kind, has_falloff) in [
             (LightKind::from(Point { position: [0.0; 3] }), true),
-            (LightKind::from(Directional { direction: [0.0, -1.0, 0.0] }), false),
+            (LightKind::from(Directional::along([0.0, -1.0, 0.0])), false),
             (LightKind::from(SPOT), true),
         ] {
             let mut light = Light::new(kind);
@@ -247,7 +247,7 @@ mod tests {
             ..Light::new(Point { position: [f64::NAN, 0.0, 0.0] })
         };
         assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
-        let light = Light::new(Directional { direction: [0.0; 3] });
+        let light = Light::new(Directional::along([0.0; 3]));
         assert_eq!(keys(&light), ["directional.direction"]);
     }
 }
