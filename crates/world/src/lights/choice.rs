@@ -1,19 +1,18 @@
 //! Choice of lights at a surface point, in scenes with many point or spot lights.
 //!
-//! The lights are divided into sets of four to eight lights. Sets of spot lights are larger,
-//! because most surfaces are outside of most cones. At each surface a path chooses one set, all
-//! with the same probability, and traces shadow rays to its lights. A stratum is a group of lights
-//! that are close to each other: consecutive lights in the order of a Morton curve. A set holds at
-//! most one light of each stratum, so that its lights are spread over the scene.
+//! A *set* has four to eight lights; sets of spot lights are larger, because most surfaces are
+//! outside most cones. At each surface a path chooses one set, all with the same probability, and
+//! traces shadow rays to its lights. A *stratum* is a group of lights that are close to each other:
+//! consecutive lights in the order of a Morton curve. A set holds at most one light of each
+//! stratum, so that its lights are spread over the scene.
 //!
 //! The number of sets is a power of two, because successive samples of a pixel are stratified over
 //! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
-//! every light once. If n were no power of two, the noise would be several times as large.
+//! every light once. With another number the noise would be several times as large.
 //!
 //! The probabilities depend neither on the intensities of the lights nor on the surface point.
 //! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
-//! from every surface. All lights are in one light group, see
-//! [`LightGroups`](crate::LightGroups).
+//! from every surface. All lights are in one light group, see [`LightGroups`](crate::LightGroups).
 
 use crate::world::DeltaSource;
 use glam::DVec3;
@@ -24,13 +23,11 @@ use zerkalo_kernel::primitive::BoundingSphere;
 use zerkalo_scene::light::{DeltaLight, Light, LightForm, SpotCone, spot_factor};
 use zerkalo_scene::value::sort_by_number;
 
-/// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
-/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
-/// methods. A spot light counts as a part of a light; see [`ManyLights`].
+/// Smallest number of point lights in a scene for which paths choose. `benches/many-lights.sh`
+/// measures the time of both methods. A spot light counts as a part of a light; see [`ManyLights`].
 pub(crate) const MIN_LIGHTS: usize = 16;
 
-/// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
-/// path traces shadow rays at one surface.
+/// Smallest number of lights in a set of point lights.
 const MIN_SET: usize = 4;
 
 /// Weight of the part of the variance that all lights have in common, relative to the other parts;
@@ -38,49 +35,37 @@ const MIN_SET: usize = 4;
 /// needs 2.3 times as many rays as with this weight.
 const COMMON_VARIANCE: f64 = 0.25;
 
-/// Largest number of bright lights; see [`bright_lights`]. Paths trace shadow rays to all bright
-/// lights at each surface, although they choose among the other lights.
+/// Largest number of bright lights; see [`bright_lights`].
 const MAX_BRIGHT: usize = 16;
 
 /// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
 /// lookup in 16 elements is one instruction.
 const MIN_TABLE: usize = 16;
 
-/// Values of one property of the lights of a stratum (a spatial group). The lights of a scene are
-/// divided into sets, which have at most one light of each stratum. A path chooses one set at a
-/// surface and traces shadow rays to its lights.
+/// Values of one property of the lights of a stratum.
 enum Table<S> {
-    /// Value that all lights of the stratum (spatial group of lights) have.
+    /// Value that all sets share.
     Common(S),
-    /// Value for each set of lights (those to which one path traces shadow rays). Elements beyond
-    /// the number of sets are never read.
+    /// Value for each set. Elements beyond the number of sets are never read.
     BySet(Vec<S>),
 }
 
-/// Stratum: a spatial group of lights. A path traces shadow rays to at most one of them at each
-/// surface.
+/// Group of lights of which each set has at most one.
 struct Stratum<S> {
-    /// Sphere around the lights of the stratum (spatial group of lights).
+    /// Sphere around the lights.
     ball: BoundingSphere,
-    /// Coordinates x, y and z of the stratum's lights, one light for each set (the lights to which
-    /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
-    /// coordinates are NaN; the test whether the surface faces the light then fails.
+    /// Coordinates; NaN in sets without a light of the stratum, so that no surface faces it.
     positions: [Table<S>; 3],
-    /// Irradiance, at normal incidence, of the stratum's light in each set. It is 0 for lights
-    /// whose irradiance decreases with the square of the distance. The irradiance of other lights
-    /// is the same at every distance.
+    /// Irradiance at normal incidence, the same at every distance; 0 for lights whose irradiance
+    /// decreases with the square of the distance.
     constant: Table<S>,
-    /// Emission (colour times intensity) of the stratum's light in each set: red, green and blue.
-    /// The tracer multiplies the samples of the light by its emission. A set without a light of the
-    /// stratum has the emission 1.
+    /// Red, green and blue emission; 1 in sets without a light of the stratum.
     emission: [Table<S>; 3],
-    /// Cones of the stratum's lights. `None` if all of them emit equally in all directions.
+    /// `None` if all lights emit equally in all directions.
     cones: Option<Cones<S>>,
 }
 
-/// Cones of the lights of a stratum (spatial group of lights). The cone of a point light contains
-/// all directions. The fields are those of [`SpotCone`], for the stratum's light in each set (the
-/// lights to which one path traces shadow rays).
+/// Fields of the [`SpotCone`] of each light. The cone of a point light contains all directions.
 struct Cones<S> {
     axis: [Table<S>; 3],
     outer: Table<S>,
@@ -89,17 +74,16 @@ struct Cones<S> {
 
 /// Point and spot lights of a scene, of which each path chooses a few at each surface.
 pub(crate) struct LightChoice<S> {
-    /// Index of the light group that all lights of this choice share.
+    /// Light group of all lights of this choice.
     pub group: usize,
-    /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
+    /// Number of sets, a power of two.
     sets: usize,
     strata: Vec<Stratum<S>>,
 }
 
-/// For each lane of a packet, the set of lights to which it traces shadow rays.
+/// Set of lights that each lane of a packet has chosen.
 pub(crate) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
-    /// Index of the chosen set of lights in each lane.
     sets: [u32; MAX_WIDTH],
 }
 
@@ -153,19 +137,17 @@ impl<S: Float> LightChoice<S> {
         Some(Self { group, sets, strata })
     }
 
-    /// Returns the number of strata (spatial groups of lights).
     pub fn strata(&self) -> usize {
         self.strata.len()
     }
 
     /// Returns the light period: the number of successive samples of a pixel that together trace a
-    /// shadow ray to each light once. It is the number of sets of lights, because each of these
-    /// samples uses a different set.
+    /// shadow ray to each light once.
     pub fn period(&self) -> u32 {
         self.sets as u32
     }
 
-    /// Returns a sphere around the lights of each stratum (spatial group of lights).
+    /// Returns a sphere around the lights of each stratum.
     pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
         self.strata.iter().map(|stratum| stratum.ball)
     }
@@ -181,9 +163,8 @@ impl<S: Float> LightChoice<S> {
 }
 
 impl<S: Float> Table<S> {
-    /// Creates a table of one property of lights, with a value for each of `sets` sets. `values`
-    /// are the values of the lights, and `absent` is the value for sets without a light of the
-    /// stratum.
+    /// Creates a table for `sets` sets from the values of the lights. `absent` is the value of sets
+    /// without a light of the stratum.
     fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
         let absent = S::from_f64(absent);
         let is_full = values.clone().count() == sets;
@@ -206,9 +187,6 @@ impl<S: Float> Table<S> {
 }
 
 impl<S: Float> Stratum<S> {
-    /// Creates a stratum (spatial group of lights) from its `lights`. Each of the `sets` sets holds
-    /// at most one light of the stratum. A path chooses one set at a surface and traces shadow rays
-    /// to its lights.
     fn new(lights: &[DeltaSource<S>], sets: usize) -> Self {
         let coordinate = |axis: usize| {
             let coordinate = move |light: &DeltaSource<S>| match light.light.light {
@@ -238,8 +216,7 @@ impl<S: Float> Stratum<S> {
 }
 
 impl<S: Float> Cones<S> {
-    /// Creates the cones of the `lights` of a stratum (spatial group of lights), at most one for
-    /// each of `sets` sets. Returns `None` if all lights emit equally in all directions.
+    /// Returns `None` if all `lights` emit equally in all directions.
     fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
         let cone = |light: &DeltaSource<S>| match light.light.light {
             DeltaLight::Point { cone, .. } => cone,
@@ -267,17 +244,14 @@ impl<S: Float> ChosenSets<'_, S> {
         Vec3::new(x.gather(&self.sets), y.gather(&self.sets), z.gather(&self.sets))
     }
 
-    /// Returns the position of each lane's chosen light in the stratum number `stratum` (a spatial
-    /// group of lights).
+    /// Returns the position of each lane's light in the stratum number `stratum`.
     #[inline(always)]
     pub fn positions<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].positions)
     }
 
-    /// Returns the irradiance of each lane's chosen light in the stratum number `stratum` (a
-    /// spatial group of lights), divided by the probability of the choice. The irradiance is that
-    /// of a light with unit emission at normal incidence. `inverse` is the reciprocal of the
-    /// distance to the light.
+    /// Returns the irradiance by each lane's light of unit emission at normal incidence, divided by
+    /// the probability of the choice. `inverse` is the reciprocal of the distance to the light.
     #[inline(always)]
     pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
         let count = L::from_f64(self.choice.sets as f64);
@@ -287,9 +261,8 @@ impl<S: Float> ChosenSets<'_, S> {
         L::select(constant.gt(L::zero()), constant, falling) * count
     }
 
-    /// Returns the factor, 0..=1, of the intensity of each lane's chosen light in the stratum
-    /// number `stratum` (a spatial group of lights): that of its cone in the direction `wi`, a unit
-    /// vector from the surface point to the light. Returns `None` if no light of the stratum has a
+    /// Returns the factor, 0..=1, of the intensity of each lane's light towards a surface point.
+    /// `wi` is the unit vector from the point to the light. `None` if no light of the stratum has a
     /// cone.
     #[inline(always)]
     pub fn cone<L: SimdFloat<Scalar = S>>(&self, stratum: usize, wi: Vec3<L>) -> Option<L> {
@@ -298,17 +271,14 @@ impl<S: Float> ChosenSets<'_, S> {
         Some(spot_factor(wi, self.gather(axis), outer, scale))
     }
 
-    /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
-    /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
-    /// multiply the lights' samples by an emission.
+    /// Returns the emission of each lane's light; 1 if the tracer does not multiply samples by it.
     #[inline(always)]
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].emission)
     }
 }
 
-/// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
-/// of such a kind share one light group.
+/// Kinds of lights of which a scene has so many that paths choose a few of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.
