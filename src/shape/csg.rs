@@ -10,7 +10,7 @@ use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
+    Description, Field, KeyNode, KeyValue, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
     written,
 };
 use glam::DVec3;
@@ -82,6 +82,14 @@ impl TomlValue for CsgOperand {
     }
 }
 
+/// List of parts, which edits can only read, as TOML.
+impl KeyNode for Vec<CsgOperand> {
+    fn value(&self) -> Option<KeyValue> {
+        let parts: Vec<_> = self.iter().map(|part| part.to_toml().to_string()).collect();
+        Some(KeyValue::Text(parts.join(", ")))
+    }
+}
+
 macro_rules! compounds {
     ($($kind:ident, $doc:literal);+ $(;)?) => {$(
         #[doc = $doc]
@@ -108,6 +116,12 @@ macro_rules! compounds {
             fn validator(&self) -> Validator {
                 let errors = part_faults(&self.of, 1).into_iter().map(Some);
                 errors.fold(Validator::new(Self::FIELDS), Validator::and)
+            }
+        }
+
+        impl KeyNode for $kind {
+            fn child(&self, key: &str) -> Option<&dyn KeyNode> {
+                (key == "of").then_some(&self.of)
             }
         }
 

@@ -107,22 +107,10 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Reads the mesh file that the shape names: calls `load` with the file's name and stores the
-    /// result. Does nothing if a result is stored already, or if the shape names no file.
+    /// Reads the mesh file that the shape names by `load`, unless it is loaded already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
-        if let Self::MeshDesc(mesh) = self
-            && !mesh.file.is_empty()
-        {
-            mesh.content.resolve(|| load(&mesh.file));
-        }
-    }
-
-    /// Copies the loaded mesh from `other`, if both shapes name the same file.
-    pub fn resolve_as(&mut self, other: &Self) {
-        if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
-            && new.file == old.file
-        {
-            new.content.clone_from(&old.content);
+        if let Self::MeshDesc(mesh) = self {
+            mesh.content.resolve(&mesh.file, load);
         }
     }
 

@@ -3,8 +3,8 @@
 use crate::primitive::{Form, PlaneForm};
 use crate::shape::Shape;
 use crate::value::{
-    Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, ValueType, description,
-    one_of, sin_cos_degrees, unit,
+    Field, FieldValue, KeyNode, KeyValue, NumberRange, TomlError, TomlValue, ValidationError,
+    ValueType, description, one_of, replaced_by, sin_cos_degrees, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
 use toml::de::DeValue;
@@ -51,8 +51,28 @@ impl TomlValue for Scale {
     }
 
     fn to_toml(&self) -> Value {
+        match self.uniform() {
+            Some(factor) => factor.to_toml(),
+            None => self.0.to_toml(),
+        }
+    }
+}
+
+impl Scale {
+    /// Returns the factor of all three axes; `None` if their factors differ.
+    fn uniform(&self) -> Option<f64> {
         let [x, y, z] = self.0;
-        if x == y && y == z { x.to_toml() } else { self.0.to_toml() }
+        (x == y && y == z).then_some(x)
+    }
+}
+
+impl KeyNode for Scale {
+    fn value(&self) -> Option<KeyValue> {
+        self.uniform().map_or_else(|| self.0.value(), |factor| factor.value())
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        replaced_by(self, Self::from_value(value))
     }
 }
 
@@ -60,12 +80,26 @@ impl FieldValue for Scale {
     const TYPE: ValueType = ValueType::Factor;
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let [x, y, z] = &self.0;
-        if x == y && y == z { x.errors(field) } else { self.0.errors(field) }
+        self.uniform().map_or_else(|| self.0.errors(field), |factor| factor.errors(field))
+    }
+
+    fn from_value(value: KeyValue) -> Option<Self> {
+        let uniform = f64::from_value(value.clone()).map(|factor| [factor; 3]);
+        uniform.or_else(|| FieldValue::from_value(value)).map(Self)
     }
 }
 
 impl TransformOp {
+    /// Steps of every kind that change nothing.
+    pub const IDENTITIES: [Self; Self::FIELDS.len()] = [
+        Self::Translate([0.0; 3]),
+        Self::RotateX(0.0),
+        Self::RotateY(0.0),
+        Self::RotateZ(0.0),
+        Self::Rotate(Rotate { axis: [0.0, 1.0, 0.0], degrees: 0.0 }),
+        Self::Scale(Scale([1.0; 3])),
+    ];
+
     /// Returns the transform step as an affine map. The step must be valid.
     pub fn map(&self) -> DAffine3 {
         match *self {
@@ -91,9 +125,23 @@ impl FieldValue for Vec<TransformOp> {
         };
         self.iter().enumerate().flat_map(errors).collect()
     }
+}
 
+impl KeyNode for Vec<TransformOp> {
     fn is_absent(&self) -> bool {
         self.is_empty()
+    }
+
+    fn make_absent(&mut self) {
+        self.clear();
+    }
+
+    fn child(&self, index: &str) -> Option<&dyn KeyNode> {
+        Some(self.get(index.parse::<usize>().ok()?)?)
+    }
+
+    fn child_mut(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.get_mut(index.parse::<usize>().ok()?)?)
     }
 }
 

@@ -4,10 +4,12 @@
 //! its defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an
 //! enum for a key that accepts a fixed set of words.
 
-use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{
+    Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType, replaced_by,
+};
 
 /// Table of a scene file: the keys that it has and the checks of their values.
-pub trait Description {
+pub trait Description: KeyNode {
     /// Help text of the table, for the dashboard and the documentation.
     const DOC: &'static str;
     /// Keys of this kind of table, in the order of their declaration.
@@ -19,7 +21,7 @@ pub trait Description {
 }
 
 /// Rust type to which the values of keys in scene files are converted.
-pub trait FieldValue {
+pub trait FieldValue: KeyNode {
     /// Type of the values in scene files. The range of numbers is [`NumberRange::FINITE`] unless
     /// the declaration of a key gives another.
     const TYPE: ValueType;
@@ -28,10 +30,12 @@ pub trait FieldValue {
     /// dotted key of each error begins with `field.name`.
     fn errors(&self, field: &Field) -> Vec<ValidationError>;
 
-    /// Returns `true` if the value stands for an omitted key. Files are then written without the
-    /// key.
-    fn is_absent(&self) -> bool {
-        false
+    /// Converts `value`; `None` if it has another type, or if this is a table.
+    fn from_value(_value: KeyValue) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
     }
 }
 
@@ -69,34 +73,55 @@ pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements [`FieldValue`] for number types. Declarations write the default values of number keys
-/// as Rust literals.
+/// Implements [`FieldValue`] for number types by their conversions to and from lists of numbers.
 macro_rules! numeric {
-    ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
+    ($([$($n:ident)?] $type:ty => $value_type:expr, $to:expr, $from:expr;)+) => {$(
         impl $(<const $n: usize>)? FieldValue for $type {
             const TYPE: ValueType = $value_type;
 
             fn errors(&self, field: &Field) -> Vec<ValidationError> {
-                let numbers: fn(&Self) -> Vec<f64> = $numbers;
+                let numbers: fn(&Self) -> Vec<f64> = $to;
                 field.check(&numbers(self)).into_iter().collect()
+            }
+
+            fn from_value(value: KeyValue) -> Option<Self> {
+                let convert: fn(&[f64]) -> Option<Self> = $from;
+                let KeyValue::Numbers(numbers) = value else { return None };
+                convert(&numbers)
+            }
+        }
+
+        impl $(<const $n: usize>)? KeyNode for $type {
+            fn value(&self) -> Option<KeyValue> {
+                let numbers: fn(&Self) -> Vec<f64> = $to;
+                Some(KeyValue::Numbers(numbers(self)))
+            }
+
+            fn set_value(&mut self, value: KeyValue) -> bool {
+                replaced_by(self, Self::from_value(value))
             }
         }
     )+};
 }
 
 numeric! {
-    [] f64 => ValueType::Number(NumberRange::FINITE), |x| vec![*x];
-    [N] [f64; N] => ValueType::Numbers(N, NumberRange::FINITE), |list| list.to_vec();
-    [] u32 => ValueType::Whole(NumberRange::FINITE), |x| vec![f64::from(*x)];
-    [N] [u32; N] => ValueType::Wholes(N, NumberRange::FINITE), |list| list.map(f64::from).to_vec();
+    [] f64 => ValueType::Number(NumberRange::FINITE), |x| vec![*x], |list| only(list);
+    [N] [f64; N] => ValueType::Numbers(N, NumberRange::FINITE), |list| list.to_vec(),
+        |list| list.try_into().ok();
+    [] u32 => ValueType::Whole(NumberRange::FINITE), |x| vec![f64::from(*x)],
+        |list| whole(only(list)?);
+    [N] [u32; N] => ValueType::Wholes(N, NumberRange::FINITE), |list| list.map(f64::from).to_vec(),
+        |list| list.iter().map(|x| whole(*x)).collect::<Option<Vec<_>>>()?.try_into().ok();
+    [] Color => ValueType::Color(NumberRange::FINITE), |color| color.0.to_vec(),
+        |list| list.try_into().ok().map(Color);
 }
 
-impl FieldValue for Color {
-    const TYPE: ValueType = ValueType::Color(NumberRange::FINITE);
+fn only(list: &[f64]) -> Option<f64> {
+    if let [x] = list { Some(*x) } else { None }
+}
 
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.0.errors(field)
-    }
+fn whole(x: f64) -> Option<u32> {
+    (f64::from(x as u32) == x).then_some(x as u32)
 }
 
 impl FieldValue for bool {
@@ -104,6 +129,20 @@ impl FieldValue for bool {
 
     fn errors(&self, _: &Field) -> Vec<ValidationError> {
         Vec::new()
+    }
+
+    fn from_value(value: KeyValue) -> Option<Self> {
+        if let KeyValue::Switch(on) = value { Some(on) } else { None }
+    }
+}
+
+impl KeyNode for bool {
+    fn value(&self) -> Option<KeyValue> {
+        Some(KeyValue::Switch(*self))
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        replaced_by(self, Self::from_value(value))
     }
 }
 
@@ -114,8 +153,26 @@ impl FieldValue for String {
         Vec::new()
     }
 
+    fn from_value(value: KeyValue) -> Option<Self> {
+        if let KeyValue::Text(text) = value { Some(text) } else { None }
+    }
+}
+
+impl KeyNode for String {
+    fn value(&self) -> Option<KeyValue> {
+        Some(KeyValue::Text(self.clone()))
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        replaced_by(self, Self::from_value(value))
+    }
+
     fn is_absent(&self) -> bool {
         self.is_empty()
+    }
+
+    fn make_absent(&mut self) {
+        self.clear();
     }
 }
 
@@ -125,9 +182,31 @@ impl<T: FieldValue> FieldValue for Option<T> {
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.as_ref().map(|value| value.errors(field)).unwrap_or_default()
     }
+}
+
+impl<T: FieldValue> KeyNode for Option<T> {
+    fn value(&self) -> Option<KeyValue> {
+        self.as_ref()?.value()
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        replaced_by(self, T::from_value(value).map(Some))
+    }
 
     fn is_absent(&self) -> bool {
         self.is_none()
+    }
+
+    fn make_absent(&mut self) {
+        *self = None;
+    }
+
+    fn child(&self, key: &str) -> Option<&dyn KeyNode> {
+        self.as_ref()?.child(key)
+    }
+
+    fn child_mut(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        self.as_mut()?.child_mut(key)
     }
 }
 
@@ -205,6 +284,22 @@ macro_rules! choices {
 
             fn errors(&self, _: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
                 Vec::new()
+            }
+
+            fn from_value(value: $crate::value::KeyValue) -> Option<Self> {
+                let $crate::value::KeyValue::Text(word) = value else { return None };
+                Self::CHOICES.iter().position(|c| c.name == word).map(|index| Self::ALL[index])
+            }
+        }
+
+        impl $crate::value::KeyNode for $name {
+            fn value(&self) -> Option<$crate::value::KeyValue> {
+                let word = Self::CHOICES[*self as usize].name;
+                Some($crate::value::KeyValue::Text(word.to_string()))
+            }
+
+            fn set_value(&mut self, value: $crate::value::KeyValue) -> bool {
+                $crate::value::replaced_by(self, $crate::value::FieldValue::from_value(value))
             }
         }
     };
@@ -295,6 +390,22 @@ macro_rules! description {
             }
         }
 
+        impl $crate::value::KeyNode for $name {
+            fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
+                match key {
+                    $(stringify!($key) => Some(&self.$key),)+
+                    _ => None,
+                }
+            }
+
+            fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+                match key {
+                    $(stringify!($key) => Some(&mut self.$key),)+
+                    _ => None,
+                }
+            }
+        }
+
         impl $crate::value::TomlValue for $name {
             fn from_toml(
                 value: &::toml::Spanned<::toml::de::DeValue>,
@@ -347,7 +458,7 @@ macro_rules! description {
         Some($value as &dyn $crate::value::TomlValue)
     };
     (@write ($value:expr) $absent:literal) => {
-        (!$crate::value::FieldValue::is_absent($value))
+        (!$crate::value::KeyNode::is_absent($value))
             .then_some($value as &dyn $crate::value::TomlValue)
     };
 

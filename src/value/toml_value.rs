@@ -266,6 +266,29 @@ macro_rules! one_of {
                 $crate::value::written(&[(key, Some(value))])
             }
         }
+
+        impl $crate::value::KeyNode for $name {
+            fn value(&self) -> Option<$crate::value::KeyValue> {
+                let kind = match self {
+                    $(Self::$variant(_) => $key,)+
+                };
+                Some($crate::value::KeyValue::Text(kind.to_string()))
+            }
+
+            fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
+                let (kind, value): (&str, &dyn $crate::value::KeyNode) = match self {
+                    $(Self::$variant(value) => ($key, value),)+
+                };
+                (kind == key).then_some(value)
+            }
+
+            fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+                let (kind, value): (&str, &mut dyn $crate::value::KeyNode) = match self {
+                    $(Self::$variant(value) => ($key, value),)+
+                };
+                (kind == key).then_some(value)
+            }
+        }
     };
 }
 pub(crate) use one_of;

@@ -9,17 +9,15 @@ use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::lens;
-use crate::scene::edit::set::{finish, replace};
-use crate::scene::edit::toml_view::{insert_value, read};
+use crate::scene::edit::set::{label, replace};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
 use crate::value::{
-    Field, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
+    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
     unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
-use toml::{Table, Value};
 
 /// Kinds of light, each with its name and description.
 pub(super) const LIGHT_KINDS: &[Field] = &[
@@ -52,16 +50,6 @@ pub(super) const AIM: Field = Field::required(
     "",
     "Target point or fixed direction of the camera.",
 );
-
-/// Returns the key in `values` that is one of the mutually exclusive keys of the edit target
-/// `subject`, such as the kind `point` of a light. Returns `None` if `values` has none of these
-/// keys.
-pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
-    crate::scene::edit::toml_view::exclusive_keys(subject)
-        .iter()
-        .copied()
-        .find(|key| values.contains_key(*key))
-}
 
 /// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
 /// another shape or light. Nothing changes if it has this kind already.
@@ -98,8 +86,8 @@ pub(super) fn switch(
         }
         _ => {}
     }
-    let values = read(&next, subject)?;
-    Ok(finish(&next, subject, key, values)?.with_note(note))
+    let label = label(&next, subject, key);
+    Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
 }
 
 /// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
@@ -232,16 +220,14 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
 }
 
 /// Changes the falloff of the light at `index`, a point or spot light. The intensity is changed so
-/// that the irradiance at the centre of the scene is kept. `values` has the present values of the
-/// light's keys.
+/// that the irradiance at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
-    values: Table,
-    falloff: Value,
+    falloff: KeyValue,
 ) -> Result<Edit, EditError> {
     let subject = Target::Light(index);
-    let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
+    let mut edit = replace(scene, &subject, "falloff", falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
     if let Some(position) = light.position().filter(|_| light.falloff != old.falloff) {
@@ -327,29 +313,6 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
             }
         }
         _ => {}
-    }
-}
-
-/// Appends a transform step of the kind `name` to the list `key`, with the value that changes
-/// nothing: the vector 0, the angle 0 or the factor 1.
-pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
-    let zero = || Value::Array(vec![Value::Float(0.0); 3]);
-    let value = match name {
-        "translate" => zero(),
-        "scale" => Value::Float(1.0),
-        "rotate" => {
-            let axis = [0.0, 1.0, 0.0].map(Value::Float).to_vec();
-            let turn = [("axis".into(), Value::Array(axis)), ("degrees".into(), 0.0.into())];
-            Value::Table(Table::from_iter(turn))
-        }
-        _ => Value::Float(0.0),
-    };
-    let step = Value::Table(Table::from_iter([(name.to_string(), value)]));
-    match object.get_mut(key).and_then(Value::as_array_mut) {
-        Some(steps) => steps.push(step),
-        None => {
-            insert_value(object, key, Some(Value::Array(vec![step])));
-        }
     }
 }
 
