@@ -139,12 +139,7 @@ fn open(
     state: Option<&Path>,
 ) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
     match SceneFile::open_with(path, assets) {
-        Ok(file) => {
-            if let Some(warning) = file.document().migration_warning() {
-                warn(&format!("warning: {warning}"));
-            }
-            Ok(Ok(file))
-        }
+        Ok(file) => Ok(Ok(file)),
         Err(errors) => match open_regular(path).is_ok() {
             true => Ok(Err((path.to_path_buf(), errors))),
             false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),

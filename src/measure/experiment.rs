@@ -106,13 +106,6 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // The names that earlier versions of the program used are accepted, too.
-        let text = match text {
-            "level" => "ray-types",
-            "depth" => "max-depth",
-            "min-weight" => "min-throughput",
-            current => current,
-        };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
         found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();

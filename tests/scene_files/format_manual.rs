@@ -120,12 +120,6 @@ and every key with a default may be left out. Unknown keys are errors.
   distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.
 
-- Files of earlier versions open, too. `zerkalo check` reports the first renamed word, and saving
-  writes the current words. `index` became `ior`, `reflectance` `f0`, `depth` `max_depth`,
-  `min_weight` `min_throughput`, `level` `ray_types`, `horizon` `below_horizon`, `unit_cylinder`
-  `unit_frustum`, `[views.NAME]` `[cameras.NAME]`, filter `center` `point`; accelerations `projected`,
-  `object`, `world` and `hierarchy` became `screen-bounds`, `obb`, `aabb` and `bvh`.
-
 `zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
 
