@@ -7,12 +7,9 @@
 
 #[path = "common/mod.rs"]
 mod common;
-#[path = "../tests/common/shape_examples.rs"]
-mod shape_examples;
 
 use common::{Random, ball, in_turns, towards};
 use glam::DAffine3;
-use shape_examples::EXAMPLES;
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -26,6 +23,7 @@ use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Document, Scene};
+use zerkalo::shape::EXAMPLES;
 use zerkalo::world::World;
 
 /// Number of rays of each measurement.

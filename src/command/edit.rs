@@ -12,7 +12,7 @@ use crate::film::file::is_film_file;
 use crate::render::schedule::Settings;
 use crate::render::{Checkpoint, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
+use crate::scene::{Recovery, SceneErrors, SceneFile, state_folder};
 use crate::terminal::Environment;
 use crate::value::sanitized;
 use crate::world::{self, Precision};
@@ -64,6 +64,11 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())
 }
+
+/// Text of the scene that the dashboard opens without a file.
+const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
+/// File name under which [`OPENING`] is saved.
+const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
 /// Prints the results of a dashboard that has ended: names of written files on `out`, everything
 /// else on stderr. If a signal ended the dashboard, the error holds the exit status of that signal,

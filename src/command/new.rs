@@ -2,13 +2,30 @@
 
 use crate::command::{Failure, print_line};
 use crate::disk::{Existing, replace_file};
-use crate::scene::starter;
 use std::io::Write;
 use std::path::Path;
 
+/// Text of a small scene with comments, from which users start a scene of their own.
+const STARTER: &str = include_str!("starter.toml");
+
 pub fn run(path: &Path) -> Result<(), Failure> {
-    let starter = starter().as_bytes();
-    replace_file(path, Existing::Refuse, |file| file.write_all(starter))?;
+    replace_file(path, Existing::Refuse, |file| file.write_all(STARTER.as_bytes()))?;
     let shown = path.display();
     print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::STARTER;
+    use crate::scene::Scene;
+    use crate::shape::KINDS;
+
+    #[test]
+    fn starter_scene_has_no_warnings_and_names_every_shape() {
+        let scene = Scene::parse(STARTER, "starter").unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(scene.warnings(), []);
+        for kind in KINDS {
+            assert!(STARTER.contains(kind.name), "{}", kind.name);
+        }
+    }
 }

@@ -283,7 +283,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::Scene;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
@@ -295,7 +295,8 @@ mod tests {
             seed: 0,
             display: Display::default(),
         };
-        let all = plan.variants(&Arc::new(built_in()));
+        let text = include_str!("../../scenes/mirror-room.toml");
+        let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
         assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }

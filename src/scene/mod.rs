@@ -6,7 +6,6 @@
 //! it is given.
 
 mod asset_resolver;
-mod builtin;
 mod contents_hash;
 mod diagnostic;
 mod document;
@@ -24,7 +23,6 @@ pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use asset_resolver::AssetResolver;
-pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
@@ -106,3 +104,5 @@ mod file_test;
 mod recovery_test;
 #[cfg(test)]
 mod tables_test;
+#[cfg(test)]
+mod testing;

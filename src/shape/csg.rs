@@ -10,8 +10,8 @@ use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, KeyNode, KeyValue, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
-    written,
+    Description, Field, KeyNode, KeyValue, TableReader, TomlError, TomlValue, ValidationError,
+    Validator, ValueType, written,
 };
 use glam::DVec3;
 use toml::de::DeValue;
@@ -91,7 +91,7 @@ impl KeyNode for Vec<CsgOperand> {
 }
 
 macro_rules! compounds {
-    ($($kind:ident, $doc:literal);+ $(;)?) => {$(
+    ($($kind:ident, $doc:literal, $example:literal;)+) => {$(
         #[doc = $doc]
         #[derive(Clone, Debug, PartialEq)]
         pub struct $kind {
@@ -126,6 +126,8 @@ macro_rules! compounds {
         }
 
         impl ShapeDesc for $kind {
+            const EXAMPLE: &str = $example;
+
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }
@@ -146,18 +148,37 @@ macro_rules! compounds {
                 Self { of: fitted_to(base, size).map(CsgOperand::new).into() }
             }
 
+            fn parts(&self) -> Option<&[CsgOperand]> {
+                Some(&self.of)
+            }
+
+            fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                &mut self.of
+            }
         }
     )+};
 }
 
 compounds! {
     Union,
-    "Solids joined into one: every point that is in any part.";
+    "Solids joined into one: every point that is in any part.",
+    "shape.union.of = [
+    { shape.sphere = { center = [0.0, 0.4, 0.0], radius = 0.4 } },
+    { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
+]";
     Intersection,
-    "The common part of solids: every point that is in all parts.";
+    "The common part of solids: every point that is in all parts.",
+    "shape.intersection.of = [
+    { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
+    { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
+]";
     Difference,
     "The first part without the others: every point of it that is in none of them. A cut shows \
-     the material of the part that cut it.";
+     the material of the part that cut it.",
+    "shape.difference.of = [
+    { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
+    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
+]";
 }
 
 /// Returns the example parts of a new compound that fills a box. `base` is the centre of the lower
@@ -176,26 +197,6 @@ impl CsgOperand {
     /// Creates a part of a compound without a transform, with the material of the whole.
     pub fn new(shape: Shape) -> Self {
         Self { shape, material: String::new(), transform: Vec::new() }
-    }
-}
-
-/// Returns the parts of a compound; `None` if the shape is no compound.
-pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
-    match shape {
-        Shape::Union(Union { of })
-        | Shape::Intersection(Intersection { of })
-        | Shape::Difference(Difference { of }) => Some(of),
-        _ => None,
-    }
-}
-
-/// Returns the mutable parts of a compound; empty if the shape is no compound.
-fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
-    match shape {
-        Shape::Union(Union { of })
-        | Shape::Intersection(Intersection { of })
-        | Shape::Difference(Difference { of }) => of,
-        _ => &mut [],
     }
 }
 
@@ -226,7 +227,21 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
             Some("is flat: nothing is inside it")
         }
         Shape::MeshDesc(_) => Some("cannot be a part of a compound"),
-        _ => None,
+        // A plane stands for a half-space.
+        Shape::Sphere(_)
+        | Shape::Cube(_)
+        | Shape::Cuboid(_)
+        | Shape::Pyramid(_)
+        | Shape::Prism(_)
+        | Shape::Cylinder(_)
+        | Shape::Cone(_)
+        | Shape::TaperedCylinder(_)
+        | Shape::UnitFrustum(_)
+        | Shape::Torus(_)
+        | Shape::Plane(_)
+        | Shape::Union(_)
+        | Shape::Intersection(_)
+        | Shape::Difference(_) => None,
     }
 }
 
@@ -247,7 +262,7 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
         return faults;
     }
     for (i, part) in of.iter().enumerate() {
-        let inner = match parts_of(&part.shape) {
+        let inner = match part.shape.parts() {
             Some(of) => part_faults(of, depth + 1)
                 .into_iter()
                 .map(|fault| fault.prefixed(part.shape.key()))
@@ -282,7 +297,7 @@ impl Shape {
     /// that has one. If there is no such compound, its material is `whole`. A shape that is no
     /// compound is one solid.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
-        match parts_of(self) {
+        match self.parts() {
             None => vec![whole],
             Some(of) => of
                 .iter()
@@ -298,7 +313,7 @@ impl Shape {
     /// empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
-        for part in parts_of_mut(self) {
+        for part in self.parts_mut() {
             names.push(&mut part.material);
             names.extend(part.shape.part_names_mut());
         }
@@ -309,7 +324,7 @@ impl Shape {
     /// without a material of their own. Empty if the shape is no compound.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
-        for (i, part) in parts_of(self).into_iter().flatten().enumerate() {
+        for (i, part) in self.parts().into_iter().flatten().enumerate() {
             let key = format!("{}.of.{i}", self.key());
             if !part.material.is_empty() {
                 named.push((format!("{key}.material"), part.material.as_str()));

@@ -86,6 +86,9 @@ impl MeshDesc {
 }
 
 impl ShapeDesc for MeshDesc {
+    const EXAMPLE: &str =
+        "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
+
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
         Form::Mesh(MeshForm {
@@ -116,19 +119,15 @@ impl Shape {
 
     /// Returns the mesh file that the shape names; `None` if the shape is no mesh or names no file.
     pub fn file(&self) -> Option<&str> {
-        match self {
-            Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
-            _ => None,
-        }
+        let Self::MeshDesc(mesh) = self else { return None };
+        Some(mesh.file.as_str()).filter(|file| !file.is_empty())
     }
 
     /// Returns the mesh that was read from the file that the shape names. Returns `None` if the
     /// shape names no file or the file could not be read.
     pub fn mesh(&self) -> Option<&Arc<Mesh>> {
-        match self {
-            Self::MeshDesc(mesh) => mesh.content.content(),
-            _ => None,
-        }
+        let Self::MeshDesc(mesh) = self else { return None };
+        mesh.content.content()
     }
 }
 

@@ -17,6 +17,8 @@ description! {
 }
 
 impl ShapeDesc for Plane {
+    const EXAMPLE: &str = "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
+
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane(PlaneForm { normal, offset: normal.dot(DVec3::from_array(self.point)) })
@@ -37,9 +39,6 @@ impl ShapeDesc for Plane {
     }
 
     fn texture_axes(&self) -> DMat3 {
-        match self.form() {
-            Form::Plane(PlaneForm { normal, .. }) => on_plane(normal),
-            _ => DMat3::IDENTITY,
-        }
+        on_plane(unit(self.normal).unwrap_or(DVec3::Y))
     }
 }

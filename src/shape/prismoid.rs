@@ -17,6 +17,10 @@ macro_rules! by_corner_and_rotation {
             true
         }
 
+        fn rotation(&self) -> f64 {
+            self.rotation
+        }
+
         fn texture_axes(&self) -> glam::DMat3 {
             $crate::shape::texture_space::turned_axes(self.rotation)
         }

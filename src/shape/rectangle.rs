@@ -38,6 +38,9 @@ impl Rectangle {
 }
 
 impl ShapeDesc for Rectangle {
+    const EXAMPLE: &str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
+        normal = [0.0, 0.0, 1.0] }";
+
     fn form(&self) -> Form {
         let [right, up, _] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
         let (u, v) = (right * self.size[0], up * self.size[1]);

@@ -1,11 +1,10 @@
 //! Table of shape kinds. A new kind needs a file of its own and one line in this table.
-//! Tests then demand an example of it, in `tests/common/shape_examples.rs`.
 
 use crate::primitive::Form;
 use crate::shape::csg::OF_FIELDS;
 use crate::shape::{
-    Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
-    Prism, Pyramid,
+    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
+    MeshDesc, Plane, Prism, Pyramid,
 };
 use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
 use crate::value::{
@@ -15,6 +14,9 @@ use glam::{DMat3, DVec3};
 
 /// Description of one kind of shape, with the keys that users write in scene files.
 pub trait ShapeDesc: Description {
+    /// Example of an `[[object]]` in TOML, for the manual and for tests.
+    const EXAMPLE: &str;
+
     /// Converts the description to its canonical form: the geometry as one of the kinds of
     /// primitives, in double precision. The description must be valid.
     fn form(&self) -> Form;
@@ -39,6 +41,21 @@ pub trait ShapeDesc: Description {
     /// rotation.
     fn rotate_y(&mut self, _degrees: f64) -> bool {
         false
+    }
+
+    /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
+    fn rotation(&self) -> f64 {
+        0.0
+    }
+
+    /// Returns the parts of a compound; `None` for any other kind.
+    fn parts(&self) -> Option<&[CsgOperand]> {
+        None
+    }
+
+    /// Returns the parts of a compound; empty for any other kind.
+    fn parts_mut(&mut self) -> &mut [CsgOperand] {
+        &mut []
     }
 
     /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
@@ -93,6 +110,9 @@ macro_rules! kinds {
         /// Every kind of shape, with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
 
+        /// Key and example of every kind of shape, in the order of [`KINDS`].
+        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
+
         impl Shape {
             /// Returns the key of the shape's kind.
             pub fn key(&self) -> &'static str {
@@ -122,6 +142,28 @@ macro_rules! kinds {
             pub(super) fn texture_axes(&self) -> DMat3 {
                 match self {
                     $(Self::$kind(kind) => kind.texture_axes(),)+
+                }
+            }
+
+            /// Returns the rotation about the vertical [degrees], as far as the keys of the kind
+            /// express it.
+            pub fn rotation(&self) -> f64 {
+                match self {
+                    $(Self::$kind(kind) => kind.rotation(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; `None` for any other kind.
+            pub(super) fn parts(&self) -> Option<&[CsgOperand]> {
+                match self {
+                    $(Self::$kind(kind) => kind.parts(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; empty for any other kind.
+            pub(super) fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                match self {
+                    $(Self::$kind(kind) => kind.parts_mut(),)+
                 }
             }
 

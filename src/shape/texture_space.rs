@@ -2,7 +2,6 @@
 
 use crate::primitive::DefaultMapping;
 use crate::shape::Shape;
-use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -49,7 +48,7 @@ impl Shape {
     /// Returns the texture space of each part of the shape, in the order of
     /// [`CanonicalShape::parts`](crate::primitive::CanonicalShape::parts). The shape must be valid.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
-        let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
+        let Some(of) = self.parts() else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
             let map = compose(&part.transform);
             let spaces = part.shape.texture_spaces().into_iter();

@@ -22,6 +22,9 @@ description! {
 }
 
 impl ShapeDesc for Torus {
+    const EXAMPLE: &str = "shape.torus = { center = [0.0, 0.25, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, \
+        tube = 0.25 }";
+
     fn form(&self) -> Form {
         let scene_from_torus =
             DAffine3::from_mat3_translation(self.texture_axes(), self.center.into());

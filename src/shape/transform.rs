@@ -1,6 +1,6 @@
 //! Transforms: steps that move, rotate and scale an object or a part of one, applied in order.
 
-use crate::primitive::{Form, PlaneForm};
+use crate::primitive::Form;
 use crate::shape::Shape;
 use crate::value::{
     Field, FieldValue, KeyNode, KeyValue, NumberRange, TomlError, TomlValue, ValidationError,
@@ -189,15 +189,9 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
         ));
     }
     let form = shape.form().transformed(&map);
-    let (max_coordinate, extent) = match (&form, form.bounds()) {
-        (_, Some((low, high))) => {
-            let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
-            let size = if is_empty { f64::INFINITY } else { (high - low).max_element() };
-            (low.abs().max(high.abs()).max_element(), size)
-        }
-        (Form::Plane(PlaneForm { offset, .. }), None) => (offset.abs(), f64::INFINITY),
-        (_, None) => (0.0, f64::INFINITY),
-    };
+    let max_coordinate = form.max_coordinate();
+    let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
+    let is_tiny = |(low, high): (DVec3, DVec3)| (high - low).max_element() < 1e-12 * max_coordinate;
     if !NumberRange::COORDINATE.holds(max_coordinate) {
         return Some(ValidationError::new(
             "transform",
@@ -205,7 +199,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
             "coordinates from -1e9 to 1e9",
         ));
     }
-    (extent < 1e-12 * max_coordinate).then(|| {
+    (!is_empty && form.bounds().is_some_and(is_tiny)).then(|| {
         ValidationError::new(
             "transform",
             "transform makes the object too small for its distance from the origin",

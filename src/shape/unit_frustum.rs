@@ -17,6 +17,8 @@ description! {
 }
 
 impl ShapeDesc for UnitFrustum {
+    const EXAMPLE: &str = "shape.unit_frustum = { s = 0.5 }";
+
     fn form(&self) -> Form {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }

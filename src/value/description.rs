@@ -5,7 +5,8 @@
 //! enum for a key that accepts a fixed set of words.
 
 use crate::value::{
-    Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType, replaced_by,
+    Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
+    replaced_by,
 };
 
 /// Table of a scene file: the keys that it has and the checks of their values.

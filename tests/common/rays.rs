@@ -3,13 +3,13 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use crate::common::Numbers;
-use crate::common::shape_examples::EXAMPLES;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::bvh::{Hit, Ray};
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo::primitive::{Aggregate, Form, SurfacePoint};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
+use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.

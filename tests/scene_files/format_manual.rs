@@ -1,8 +1,8 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
-use crate::common::shape_examples::EXAMPLES;
 use std::fmt::Write as _;
 use zerkalo::scene::FIELDS;
+use zerkalo::shape::EXAMPLES;
 use zerkalo::shape::{KINDS, TransformOp};
 use zerkalo::value::{DefaultValue, Field, ValueType};
 

@@ -5,7 +5,6 @@ use crate::film::Noise;
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
 use crate::render::session::*;
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::built_in;
 use crate::world;
 use std::time::{Duration, Instant};
 
@@ -28,7 +27,8 @@ fn session(stop: Stop) -> Session {
 }
 
 fn scene(width: u32) -> Arc<Scene> {
-    let mut scene = built_in();
+    let text = include_str!(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room.toml"));
+    let mut scene = Scene::parse(text, "mirror-room.toml").unwrap();
     scene.film.size = [width, 64];
     Arc::new(scene)
 }

@@ -213,11 +213,11 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
 
     #[test]
     fn added_objects_are_visible_and_intersect_nothing() {
-        let scene = built_in();
+        let scene = mirror_room();
         for word in object_kinds() {
             let edit = add_object(&scene, &word.name, None).unwrap();
             let Target::Object(i) = edit.subject else { panic!() };
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn ten_added_cubes_do_not_intersect() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         for _ in 0..10 {
             scene = add_object(&scene, "cube", Some("red")).unwrap().scene;
         }
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn added_lights_alternate_sides() {
-        let scene = built_in();
+        let scene = mirror_room();
         for word in light_kinds() {
             let edit = add_light(&scene, &word.name).unwrap();
             let light = &edit.scene.lights[1];

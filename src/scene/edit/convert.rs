@@ -13,8 +13,8 @@ use crate::scene::edit::set::{label, replace};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::shape::Shape;
 use crate::value::{
-    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
-    unit,
+    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant,
+    rounded_to, unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -99,7 +99,7 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
             // The size is that of the bounding box before rotation, because the bounding box of a
             // rotated shape is larger than the shape.
             let mut straight = shape.clone();
-            straight.rotate_y(-rotation(shape));
+            straight.rotate_y(-shape.rotation());
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
             let size = h - l;
             let usual = size.max_element();
@@ -114,19 +114,8 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let base = base.map(|x| round_nice(x, scale));
     let size = size.map(|x| round_significant(x, 6));
     let mut next = Shape::fitted_to(name, base, size)?;
-    next.rotate_y(rotation(shape));
+    next.rotate_y(shape.rotation());
     Some(next)
-}
-
-/// Returns the rotation of a shape about the vertical [degrees]; 0 for a kind without the key
-/// `rotation`.
-fn rotation(shape: &Shape) -> f64 {
-    match shape {
-        Shape::Cube(cube) => cube.rotation,
-        Shape::Pyramid(pyramid) => pyramid.rotation,
-        Shape::Prism(prism) => prism.rotation,
-        _ => 0.0,
-    }
 }
 
 /// Angle between the axis and the edge of the cone of a spot light that is added or converted
@@ -319,13 +308,13 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
     use crate::scene::edit::{rows, set};
+    use crate::scene::testing::mirror_room;
     use crate::shape::KINDS;
 
     #[test]
     fn converted_shapes_keep_place_and_size() {
-        let scene = built_in();
+        let scene = mirror_room();
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
@@ -353,7 +342,7 @@ mod tests {
 
     #[test]
     fn lights_of_every_kind_become_each_other() {
-        let scene = built_in();
+        let scene = mirror_room();
         let lamp = Target::Light(0);
         let center = DVec3::from_array(scene_bounds(&scene).center);
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
@@ -372,7 +361,7 @@ mod tests {
 
     #[test]
     fn converted_lights_keep_side_and_brightness() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
         let lamp = Target::Light(0);
@@ -418,7 +407,7 @@ mod tests {
 
     #[test]
     fn converted_cameras_keep_the_picture() {
-        let scene = built_in();
+        let scene = mirror_room();
         let camera = |scene: &Scene| scene.camera.clone();
         let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;
         let angle = camera(&free).view().unwrap().angle_between(scene.camera.view().unwrap());

@@ -98,9 +98,7 @@ pub fn toggle(
         ValueType::OneOf(kinds) => {
             (kinds.iter().map(|k| k.name).collect(), word.or_else(|| given_key(part, subject)))
         }
-        ValueType::Choice(choices) => {
-            (choices.iter().map(|c| c.name).collect(), word)
-        }
+        ValueType::Choice(choices) => (choices.iter().map(|c| c.name).collect(), word),
         _ if is_material(subject, field) => {
             let names = scene.materials.keys().map(String::as_str);
             (names.collect(), word)

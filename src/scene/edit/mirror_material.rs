@@ -74,11 +74,11 @@ pub fn step_mirror(
 mod tests {
     use super::*;
     use crate::material::Lobe;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
 
     #[test]
     fn mirror_prefers_selection_then_rectangle() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
         assert_eq!(at(&scene, Some(Target::Object(2))), "red");
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn adjust_roughness_from_zero_and_back() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
         let start = scene.clone();
         let mut seen = vec![0.0];
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn next_lobe_cycles_and_reflect_steps() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let mut lobes = Vec::new();
         for _ in 0..5 {
             scene = step_mirror(&scene, None, "lobe", 1.0).unwrap().scene;

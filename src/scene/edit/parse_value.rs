@@ -2,9 +2,7 @@
 
 use crate::scene::edit::EditError;
 use crate::scene::format::suggest::did_you_mean;
-use crate::value::{
-    Color, Field, KeyValue, NumberRange, ValueType, number, sanitized, truncated,
-};
+use crate::value::{Color, Field, KeyValue, NumberRange, ValueType, number, sanitized, truncated};
 
 /// Parses `text` as a value of `field`. A whole number must be in its range. The ranges of other
 /// numbers are checked later, by the validation of the edited scene.

@@ -194,8 +194,8 @@ fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
     use crate::scene::edit::move_by;
+    use crate::scene::testing::mirror_room;
 
     fn lowest(scene: &Scene, i: usize) -> f64 {
         scene.objects[i].form().bounds().unwrap().0.y
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn snap_to_ground_rests_exactly_on_the_surface() {
-        let scene = built_in();
+        let scene = mirror_room();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
                 let subject = Target::Object(i);

@@ -289,8 +289,8 @@ fn expected(takes: ValueType) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
     use crate::scene::edit::{outline, set};
+    use crate::scene::testing::mirror_room;
 
     fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
         let rows = rows(scene, subject).unwrap();
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn rows_flatten_nested_tables_and_show_kinds() {
-        let scene = built_in();
+        let scene = mirror_room();
         let keys = |subject: &Target| -> Vec<String> {
             rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
         };
@@ -337,7 +337,7 @@ mod tests {
     /// Checks that setting a property to the text of its displayed value changes nothing.
     #[test]
     fn every_row_value_can_be_typed_back() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let steps = "[{ rotate = { axis = [1, 0, 0], degrees = 5 } }, { scale = 2.0 }]";
         let text = format!(
             "[[object]]\nshape.plane = {{ point = [0, -9, 0], normal = [0, 1, 0] }}\ntransform = {steps}\n"

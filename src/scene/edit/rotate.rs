@@ -93,7 +93,7 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
     use crate::shape::{KINDS, Shape};
 
     fn middle(object: &Object) -> DVec3 {
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn turn_changes_the_rotation_key_of_a_shape() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = turn(&scene, &Target::Object(3), 5.0).unwrap();
         let Shape::Cube(cube) = &edit.scene.objects[3].shape else { panic!() };
         assert!(cube.rotation == 35.0 && edit.scene.objects[3].transform.is_empty());
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn turn_rotates_lights_about_the_scene() {
-        let scene = built_in();
+        let scene = mirror_room();
         let mut round = scene.clone();
         for _ in 0..72 {
             round = turn(&round, &Target::Light(0), 5.0).unwrap().scene;

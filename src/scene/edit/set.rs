@@ -157,7 +157,7 @@ pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
     use crate::shape::Shape;
 
     fn ball() -> Target {
@@ -165,12 +165,12 @@ mod tests {
     }
 
     fn refused(subject: &Target, key: &str, text: &str) -> String {
-        set(&built_in(), subject, key, text).unwrap_err().to_string()
+        set(&mirror_room(), subject, key, text).unwrap_err().to_string()
     }
 
     #[test]
     fn typed_values_are_set() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = set(&scene, &ball(), "shape.sphere.radius", " .75").unwrap();
         assert_eq!(edit.label, "radius of ball");
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
@@ -206,15 +206,17 @@ mod tests {
             let message = refused(&subject, key, text);
             assert!(message.contains(words), "{message}");
         }
-        let one = set_component(&built_in(), &ball(), "shape.sphere.center", 3, "1").unwrap_err();
+        let one =
+            set_component(&mirror_room(), &ball(), "shape.sphere.center", 3, "1").unwrap_err();
         assert!(one.found.contains("has no number 4"), "{one}");
-        let two = set_component(&built_in(), &ball(), "shape.sphere.center", 0, "1 2").unwrap_err();
+        let two =
+            set_component(&mirror_room(), &ball(), "shape.sphere.center", 0, "1 2").unwrap_err();
         assert!(two.help.contains("one number"), "{two}");
     }
 
     #[test]
     fn empty_text_restores_the_default() {
-        let scene = built_in();
+        let scene = mirror_room();
         let red = Target::Material("red".into());
         let edit = set(&scene, &red, "exponent", "").unwrap();
         assert_eq!(edit.scene.materials["red"].exponent, 32.0);
@@ -226,7 +228,7 @@ mod tests {
 
     #[test]
     fn setting_a_key_removes_exclusive_keys() {
-        let scene = built_in();
+        let scene = mirror_room();
         let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
         let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
@@ -238,7 +240,7 @@ mod tests {
 
     #[test]
     fn transform_steps_are_appended_and_removed() {
-        let scene = built_in();
+        let scene = mirror_room();
         let turned = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
         let turned = set(&turned, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
         let moved = set(&turned, &ball(), "transform", "tr").unwrap().scene;

@@ -173,12 +173,12 @@ impl Target {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
     use std::collections::HashSet;
 
     #[test]
     fn outline_lists_every_target_once_in_order() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
         let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn targets_exist_and_have_materials() {
-        let scene = built_in();
+        let scene = mirror_room();
         assert!(!Target::Object(6).exists(&scene) && !Target::View("x".into()).exists(&scene));
         assert_eq!(Target::Object(2).material(&scene), Some(Target::Material("red".into())));
         assert_eq!(Target::Camera.material(&scene), None);

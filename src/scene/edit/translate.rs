@@ -94,12 +94,12 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use crate::scene::testing::mirror_room;
     use crate::shape::Shape;
 
     #[test]
     fn objects_move_by_shape_key_or_last_translation() {
-        let scene = built_in();
+        let scene = mirror_room();
         let ball = Target::Object(2);
         let edit = move_by(&scene, &ball, [0.1, 0.0, -0.2]).unwrap();
         assert_eq!(edit.label, "move ball");
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn point_lights_move_and_directional_lights_rotate() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn move_beyond_coordinate_range_is_refused() {
-        let scene = built_in();
+        let scene = mirror_room();
         assert!(move_by(&scene, &Target::Object(2), [1e10, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Film, [1.0, 0.0, 0.0]).is_err());
