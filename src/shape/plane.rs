@@ -3,7 +3,7 @@
 use crate::primitive::{Form, PlaneForm};
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{description, turned, unit};
+use crate::value::{description, rotated_y, unit};
 use glam::{DMat3, DVec3};
 
 description! {
@@ -34,7 +34,7 @@ impl ShapeDesc for Plane {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.normal = turned(self.normal, degrees);
+        self.normal = rotated_y(self.normal, degrees);
         true
     }
 

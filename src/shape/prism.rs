@@ -7,7 +7,7 @@ use crate::value::{Description, ValidationError, description};
 use glam::{DVec2, DVec3};
 
 description! {
-    /// A right prism on a base with three equal sides. Unturned, the base has an edge along +x from
+    /// A right prism on a base with three equal sides. Without a rotation, the base has an edge along +x from
     /// `corner` and its third vertex towards -z.
     pub struct Prism {
         /// Lower left near corner of the base, before the rotation (near is +z).

@@ -2,7 +2,7 @@
 
 use crate::primitive::{Form, ParallelogramForm};
 use crate::shape::ShapeDesc;
-use crate::value::{Description, ValidationError, description, turned, unit};
+use crate::value::{Description, ValidationError, description, rotated_y, unit};
 use glam::{DMat3, DVec3};
 
 description! {
@@ -79,8 +79,8 @@ impl ShapeDesc for Rectangle {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.normal = turned(self.normal, degrees);
-        self.up = turned(self.up, degrees);
+        self.normal = rotated_y(self.normal, degrees);
+        self.up = rotated_y(self.up, degrees);
         true
     }
 

@@ -67,7 +67,7 @@ pub trait ShapeDesc: Description {
 
 /// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
 /// than -180 and at most 180 degrees.
-pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }

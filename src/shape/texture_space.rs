@@ -81,7 +81,7 @@ pub(super) fn on_plane(z: DVec3) -> DMat3 {
 
 /// Returns the texture axes of a shape that is rotated by `degrees` about the vertical,
 /// counter-clockwise seen from above, as the columns of a matrix.
-pub(super) fn turned_axes(degrees: f64) -> DMat3 {
+pub(super) fn axes_rotated_y(degrees: f64) -> DMat3 {
     let (sin, cos) = crate::value::sin_cos_degrees(degrees);
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
 }

@@ -4,7 +4,7 @@
 use crate::primitive::{Form, TorusForm};
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
-use crate::value::{Description, ValidationError, description, round_nice, turned, unit};
+use crate::value::{Description, ValidationError, description, rotated_y, round_nice, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
 description! {
@@ -59,7 +59,7 @@ impl ShapeDesc for Torus {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.axis = turned(self.axis, degrees);
+        self.axis = rotated_y(self.axis, degrees);
         true
     }
 

@@ -62,7 +62,7 @@ fn perform(
             ("add light", edit::add_light(scene, kind))
         }
         8 => ("move", edit::move_by(scene, &subject, by)),
-        9 => ("turn", edit::turn(scene, &subject, amount)),
+        9 => ("rotate", edit::rotate(scene, &subject, amount)),
         10 => ("drop", edit::snap_to_ground(scene, &subject)),
         11 if subjects.len() < 30 => ("duplicate", edit::duplicate(scene, &subject)),
         12 => ("delete", edit::delete(scene, &subject)),
@@ -143,7 +143,7 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
         "add object",
         "add light",
         "move",
-        "turn",
+        "rotate",
         "drop",
         "duplicate",
         "delete",

@@ -132,7 +132,7 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Turns a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
+/// Rotates a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
 /// camera. Other shapes and flat shapes that are nearly horizontal stay unchanged.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };

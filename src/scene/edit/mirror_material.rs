@@ -93,7 +93,7 @@ mod tests {
         for material in scene.materials.values_mut() {
             material.reflection = 0.0;
         }
-        assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
+        assert_eq!(at(&scene, None), "mirror", "so that it can be increased again");
         assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);

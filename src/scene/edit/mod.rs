@@ -32,7 +32,7 @@ pub use lens::{change_aperture, focus_on};
 pub use mirror_material::{mirror, step_mirror};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
-pub use rotate::turn;
+pub use rotate::rotate;
 pub use set::{set, set_component};
 pub use target::{Section, Target, outline};
 pub use translate::move_by;

@@ -241,15 +241,15 @@ mod tests {
     #[test]
     fn transform_steps_are_appended_and_removed() {
         let scene = mirror_room();
-        let turned = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
-        let turned = set(&turned, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
-        let moved = set(&turned, &ball(), "transform", "tr").unwrap().scene;
+        let rotated = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
+        let rotated = set(&rotated, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
+        let moved = set(&rotated, &ball(), "transform", "tr").unwrap().scene;
         let moved = set(&moved, &ball(), "transform", "rotate").unwrap().scene;
         assert_eq!(moved.objects[2].transform.len(), 3);
         let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "5").unwrap().scene;
         let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "").unwrap().scene;
         let back = set(&moved, &ball(), "transform.1.translate", "").unwrap().scene;
-        assert_eq!(back, turned);
+        assert_eq!(back, rotated);
         assert_eq!(set(&back, &ball(), "transform", "").unwrap().scene, scene);
         assert!(set(&back, &ball(), "transform.7.rotate_y", "").is_err());
         assert!(set(&back, &ball(), "transform.7.rotate_y", "1").is_err());

@@ -105,14 +105,14 @@ mod tests {
         assert_eq!(edit.label, "move ball");
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
         assert_eq!(sphere.center, [-0.8, 0.5, -0.2]);
-        let mut turned = scene.clone();
-        turned.objects[2].transform = vec![TransformOp::RotateY(30.0)];
-        let once = move_by(&turned, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
+        let mut rotated = scene.clone();
+        rotated.objects[2].transform = vec![TransformOp::RotateY(30.0)];
+        let once = move_by(&rotated, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
         let twice = move_by(&once, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
         let steps = [TransformOp::RotateY(30.0), TransformOp::Translate([0.2, 0.4, 0.0])];
         assert_eq!(twice.objects[2].transform, steps);
         let back = move_by(&twice, &ball, [-0.2, -0.4, 0.0]).unwrap().scene;
-        assert_eq!(back, turned);
+        assert_eq!(back, rotated);
     }
 
     #[test]
