@@ -6,79 +6,34 @@
 
 use crate::primitive::Form;
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};
-use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, KeyNode, KeyValue, TableReader, TomlError, TomlValue, ValidationError,
-    Validator, ValueType, written,
+    Description, Field, FieldValue, KeyNode, KeyValue, TomlValue, ValidationError, Validator,
+    ValueType, description,
 };
 use glam::DVec3;
-use toml::de::DeValue;
-use toml::{Spanned, Value};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
 
-/// Part of a compound: a solid with its own material and transform.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CsgOperand {
-    /// Solid of the part. A plane stands for the half-space behind it.
-    pub shape: Shape,
-    /// Name of one of the scene's materials; empty for the material of the whole compound.
-    pub material: String,
-    /// Steps that move, rotate and scale the part inside the whole compound, in order.
-    pub transform: Vec<TransformOp>,
+description! {
+    /// Part of a compound: a solid with its own material and transform.
+    pub struct CsgOperand {
+        /// Shape of the part: a solid, or a plane for the half-space behind it.
+        shape: Shape;
+        /// Name of one of the `[materials.NAME]`.
+        material: String, or "that of the whole";
+        /// Steps that move, rotate and scale it, in order.
+        transform: Vec<TransformOp>, or "it stays as its shape says";
+    }
 }
 
-// These fields are a static. The macro `description!` would declare a constant, and constants
-// cannot refer to each other in a cycle. The fields of shapes contain the fields of parts, and the
-// fields of parts contain those of shapes.
-static PART_FIELDS: [Field; 3] = [
-    Field::required(
-        "shape",
-        ValueType::OneOf(&KIND_TABLE),
-        "",
-        "Shape of the part: a solid, or a plane for the half-space behind it.",
-    ),
-    Field::optional(
-        "material",
-        ValueType::Text,
-        "",
-        "that of the whole",
-        "Name of one of the `[materials.NAME]`.",
-    ),
-    Field::optional(
-        "transform",
-        ValueType::ListOf(TransformOp::FIELDS),
-        "",
-        "it stays as its shape says",
-        "Steps that move, rotate and scale it, in order.",
-    ),
-];
+impl FieldValue for Vec<CsgOperand> {
+    const TYPE: ValueType = ValueType::Tables(|| CsgOperand::FIELDS);
 
-/// Keys of a compound (a union, an intersection or a difference): its list of parts.
-pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
-    "of",
-    ValueType::Tables(&PART_FIELDS),
-    "",
-    "Two parts or more, each written like an object: `shape`, `material`, `transform`.",
-)];
-
-impl TomlValue for CsgOperand {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        let table = TableReader::new(value, &PART_FIELDS)?;
-        Ok(Self {
-            shape: table.required("shape")?,
-            material: table.optional("material")?.unwrap_or_default(),
-            transform: table.optional("transform")?.unwrap_or_default(),
-        })
-    }
-
-    fn to_toml(&self) -> Value {
-        let material = (!self.material.is_empty()).then_some(&self.material as &dyn TomlValue);
-        let transform = (!self.transform.is_empty()).then_some(&self.transform as &dyn TomlValue);
-        written(&[("shape", Some(&self.shape)), ("material", material), ("transform", transform)])
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        part_faults(self, 1)
     }
 }
 
@@ -92,36 +47,11 @@ impl KeyNode for Vec<CsgOperand> {
 
 macro_rules! compounds {
     ($($kind:ident, $doc:literal, $example:literal;)+) => {$(
-        #[doc = $doc]
-        #[derive(Clone, Debug, PartialEq)]
-        pub struct $kind {
-            /// Parts of the compound, two or more.
-            pub of: Vec<CsgOperand>,
-        }
-
-        impl TomlValue for $kind {
-            fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-                TableReader::new(value, &OF_FIELDS)?.required("of").map(|of| Self { of })
-            }
-
-            fn to_toml(&self) -> Value {
-                written(&[("of", Some(&self.of))])
-            }
-        }
-
-        impl Description for $kind {
-            const DOC: &'static str = $doc;
-            const FIELDS: &'static [Field] = &OF_FIELDS;
-
-            fn validator(&self) -> Validator {
-                let errors = part_faults(&self.of, 1).into_iter().map(Some);
-                errors.fold(Validator::new(Self::FIELDS), Validator::and)
-            }
-        }
-
-        impl KeyNode for $kind {
-            fn child(&self, key: &str) -> Option<&dyn KeyNode> {
-                (key == "of").then_some(&self.of)
+        description! {
+            #[doc = $doc]
+            pub struct $kind {
+                /// Two parts or more, each written like an object: `shape`, `material`, `transform`.
+                of: Vec<CsgOperand>;
             }
         }
 
@@ -161,19 +91,19 @@ macro_rules! compounds {
 
 compounds! {
     Union,
-    "Solids joined into one: every point that is in any part.",
+    " Solids joined into one: every point that is in any part.",
     "shape.union.of = [
     { shape.sphere = { center = [0.0, 0.4, 0.0], radius = 0.4 } },
     { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
 ]";
     Intersection,
-    "The common part of solids: every point that is in all parts.",
+    " The common part of solids: every point that is in all parts.",
     "shape.intersection.of = [
     { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
     { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
 ]";
     Difference,
-    "The first part without the others: every point of it that is in none of them. A cut shows \
+    " The first part without the others: every point of it that is in none of them. A cut shows \
      the material of the part that cut it.",
     "shape.difference.of = [
     { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
@@ -273,7 +203,7 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             let found = format!("a {} {reason}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
-        let checks = Validator::new(&PART_FIELDS)
+        let checks = Validator::new(CsgOperand::FIELDS)
             .nested("shape", inner)
             .and(unfit)
             .field("transform", &part.transform);

@@ -1,7 +1,6 @@
 //! Table of shape kinds. A new kind needs a file of its own and one line in this table.
 
 use crate::primitive::Form;
-use crate::shape::csg::OF_FIELDS;
 use crate::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
     MeshDesc, Plane, Prism, Pyramid,
@@ -72,21 +71,8 @@ pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Expands to the keys of the shape kind `$kind`, for the table of kinds. The keys of a compound
-/// are in the static `$fields`. These keys refer to the table of kinds, because the parts of a
-/// compound can be of any kind. Such a cycle is possible between statics, but not between
-/// constants.
-macro_rules! keys {
-    ($kind:ident) => {
-        $kind::FIELDS
-    };
-    ($kind:ident $fields:path) => {
-        &$fields
-    };
-}
-
 macro_rules! kinds {
-    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
+    ($($key:literal => $kind:ident),+ $(,)?) => {
         /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
         /// with one key, the name of the kind.
         #[derive(Clone, Debug, PartialEq)]
@@ -103,8 +89,8 @@ macro_rules! kinds {
 
         // A static instead of a constant, because the table refers to itself through the keys of
         // compounds: their parts are shapes of any kind in this table.
-        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
-            $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
+        static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
         ];
 
         /// Every kind of shape, with its key, its fields and its help text.
@@ -211,9 +197,9 @@ kinds! {
     "rectangle" => Rectangle,
     "plane" => Plane,
     "mesh" => MeshDesc,
-    "union" => Union with OF_FIELDS,
-    "intersection" => Intersection with OF_FIELDS,
-    "difference" => Difference with OF_FIELDS,
+    "union" => Union,
+    "intersection" => Intersection,
+    "difference" => Difference,
 }
 
 impl FieldValue for Shape {

@@ -129,7 +129,7 @@ pub fn format_manual() -> String {
     for field in FIELDS {
         let (title, fields): (String, &[Field]) = match field.takes {
             ValueType::Table(fields) => (format!("[{}]", field.name), fields),
-            ValueType::Tables(fields) => (format!("[[{}]]", field.name), fields),
+            ValueType::Tables(fields) => (format!("[[{}]]", field.name), fields()),
             ValueType::Named(fields) => (format!("[{}.NAME]", field.name), fields),
             _ => continue,
         };
