@@ -5,6 +5,7 @@
 //! without such an edit. A render session (the rendering thread) therefore validates the scene that
 //! it is given.
 
+mod acceleration;
 mod asset_resolver;
 mod contents_hash;
 mod diagnostic;
@@ -19,9 +20,9 @@ mod recovery;
 mod settings;
 mod validate;
 
-pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
+pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
