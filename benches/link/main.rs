@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
 use tunnel::Tunnel;
-use zerkalo::terminal::cells::Oklab;
+use zerkalo_terminal::cells::Oklab;
 
 /// Text of `scenes/mirror-room.toml`.
 const MIRROR_ROOM: &str = include_str!("../../scenes/mirror-room.toml");

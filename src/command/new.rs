@@ -1,7 +1,7 @@
 //! `zerkalo new`: writes a starter scene to a new file.
 
 use crate::command::{Failure, print_line};
-use crate::disk::{Existing, replace_file};
+use zerkalo_scene::disk::{Existing, replace_file};
 use std::io::Write;
 use std::path::Path;
 
@@ -17,8 +17,8 @@ pub fn run(path: &Path) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::STARTER;
-    use crate::scene::Scene;
-    use crate::shape::KINDS;
+    use zerkalo_scene::Scene;
+    use zerkalo_scene::shape::KINDS;
 
     #[test]
     fn starter_scene_has_no_warnings_and_names_every_shape() {

@@ -1,9 +1,9 @@
 //! Scenes and simulated reports of the renderer for tests.
 
-use crate::film::{Mse, Noise};
-use crate::render::schedule::Spp;
-use crate::render::session::{QUALITIES, Report, State};
-use crate::scene::Scene;
+use zerkalo_render::film::{Mse, Noise};
+use zerkalo_render::schedule::Spp;
+use zerkalo_render::session::{QUALITIES, Report, State};
+use zerkalo_scene::Scene;
 
 /// Text of the scene that `zerkalo new` writes.
 pub const STARTER: &str = include_str!("../command/starter.toml");

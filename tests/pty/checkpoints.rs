@@ -3,8 +3,8 @@
 use super::*;
 use crate::support::test_film::TestFilm;
 use std::time::{Duration, Instant};
-use zerkalo::film::Film;
-use zerkalo::film::file::FilmReader;
+use zerkalo_render::film::Film;
+use zerkalo_render::film::file::FilmReader;
 
 fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1

@@ -5,7 +5,7 @@ use super::*;
 use crate::common::MIRROR_ROOM;
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
-use zerkalo::terminal::{ENTER, LEAVE};
+use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Starts a shell with job control and a plain prompt in the test terminal.
 fn shell(fixture: &Fixture) -> Terminal {

@@ -1,10 +1,10 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
 use std::fmt::Write as _;
-use zerkalo::scene::FIELDS;
-use zerkalo::shape::EXAMPLES;
-use zerkalo::shape::{KINDS, TransformOp};
-use zerkalo::value::{DefaultValue, Field, ValueType};
+use zerkalo_scene::FIELDS;
+use zerkalo_scene::shape::EXAMPLES;
+use zerkalo_scene::shape::{KINDS, TransformOp};
+use zerkalo_scene::value::{DefaultValue, Field, ValueType};
 
 const INTRODUCTION: &str = "\
 # Scene files

@@ -9,9 +9,9 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::update;
-use zerkalo::render::schedule::Stop;
-use zerkalo::scene::edit::Target;
-use zerkalo::scene::{SaveError, Scene};
+use zerkalo_render::schedule::Stop;
+use zerkalo_scene::edit::Target;
+use zerkalo_scene::{SaveError, Scene};
 
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);

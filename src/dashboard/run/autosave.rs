@@ -2,8 +2,8 @@
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::dashboard::model::first_line;
-use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
-use crate::value::sanitized;
+use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
+use zerkalo_scene::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};

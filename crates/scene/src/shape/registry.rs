@@ -1,0 +1,222 @@
+//! Table of shape kinds. A new kind needs a file of its own and one line in this table.
+
+use crate::shape::{
+    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
+    MeshDesc, Plane, Prism, Pyramid,
+};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
+use crate::value::{
+    Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
+};
+use glam::{DMat3, DVec3};
+use zerkalo_kernel::primitive::Form;
+
+/// Description of one kind of shape, with the keys that users write in scene files.
+pub trait ShapeDesc: Description {
+    /// Example of an `[[object]]` in TOML, for the manual and for tests.
+    const EXAMPLE: &str;
+
+    /// Converts the description to its canonical form: the geometry as one of the kinds of
+    /// primitives, in double precision. The description must be valid.
+    fn form(&self) -> Form;
+
+    /// Returns the validation errors of the description.
+    fn faults(&self) -> Vec<ValidationError> {
+        self.validator().errors()
+    }
+
+    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's
+    /// lower side. `size` is its lengths along x, y and z, all greater than 0.
+    fn fitted_to(base: DVec3, size: DVec3) -> Self;
+
+    /// Returns the points that determine the shape's position: adding a vector to all of them moves
+    /// the shape by that vector. Empty if only a transform can move the shape.
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+        Vec::new()
+    }
+
+    /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
+    /// from above. Returns `false`, without a change, if the keys of the kind cannot express the
+    /// rotation.
+    fn rotate_y(&mut self, _degrees: f64) -> bool {
+        false
+    }
+
+    /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
+    fn rotation(&self) -> f64 {
+        0.0
+    }
+
+    /// Returns the parts of a compound; `None` for any other kind.
+    fn parts(&self) -> Option<&[CsgOperand]> {
+        None
+    }
+
+    /// Returns the parts of a compound; empty for any other kind.
+    fn parts_mut(&mut self) -> &mut [CsgOperand] {
+        &mut []
+    }
+
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
+    /// matrix. They are right-handed, orthonormal vectors in the shape's space.
+    fn texture_axes(&self) -> DMat3 {
+        DMat3::IDENTITY
+    }
+}
+
+/// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
+/// than -180 and at most 180 degrees.
+pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
+    let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
+    if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
+}
+
+macro_rules! kinds {
+    ($($key:literal => $kind:ident),+ $(,)?) => {
+        /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
+        /// with one key, the name of the kind.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Shape {
+            $(
+                #[doc = concat!("`shape.", $key, "`")]
+                $kind($kind),
+            )+
+        }
+
+        one_of! {
+            Shape { $($key => $kind),+ }
+        }
+
+        // A static instead of a constant, because the table refers to itself through the keys of
+        // compounds: their parts are shapes of any kind in this table.
+        static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
+        ];
+
+        /// Every kind of shape, with its key, its fields and its help text.
+        pub const KINDS: &[Field] = &KIND_TABLE;
+
+        /// Key and example of every kind of shape, in the order of [`KINDS`].
+        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
+
+        impl Shape {
+            /// Returns the key of the shape's kind.
+            pub fn key(&self) -> &'static str {
+                match self {
+                    $(Self::$kind(_) => $key,)+
+                }
+            }
+
+            /// Converts the shape to its canonical form in double precision, without the object's
+            /// transform. The shape must be valid.
+            pub fn form(&self) -> Form {
+                match self {
+                    $(Self::$kind(kind) => kind.form(),)+
+                }
+            }
+
+            /// Returns the validation errors of the shape. Each key begins with the key of the
+            /// shape's kind.
+            pub fn faults(&self) -> Vec<ValidationError> {
+                let faults = match self {
+                    $(Self::$kind(kind) => kind.faults(),)+
+                };
+                faults.into_iter().map(|f| f.prefixed(self.key())).collect()
+            }
+
+            /// Returns the axes of the shape's texture space, as the columns of a rotation matrix.
+            pub(super) fn texture_axes(&self) -> DMat3 {
+                match self {
+                    $(Self::$kind(kind) => kind.texture_axes(),)+
+                }
+            }
+
+            /// Returns the rotation about the vertical [degrees], as far as the keys of the kind
+            /// express it.
+            pub fn rotation(&self) -> f64 {
+                match self {
+                    $(Self::$kind(kind) => kind.rotation(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; `None` for any other kind.
+            pub(super) fn parts(&self) -> Option<&[CsgOperand]> {
+                match self {
+                    $(Self::$kind(kind) => kind.parts(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; empty for any other kind.
+            pub(super) fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                match self {
+                    $(Self::$kind(kind) => kind.parts_mut(),)+
+                }
+            }
+
+            /// Creates a shape of the kind `key` that roughly fills a box, see
+            /// [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
+            pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+                match key {
+                    $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
+                    _ => None,
+                }
+            }
+
+            /// Returns the points that determine the shape's position: adding a vector to all of
+            /// them moves the shape by that vector. Empty if only a transform can move the shape.
+            pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+                match self {
+                    $(Self::$kind(kind) => kind.anchor_points_mut(),)+
+                }
+            }
+
+            /// Rotates the shape by `degrees` about the vertical through its centre,
+            /// counter-clockwise seen from above. Returns `false`, without a change, if the keys of
+            /// its kind cannot express the rotation.
+            pub fn rotate_y(&mut self, degrees: f64) -> bool {
+                match self {
+                    $(Self::$kind(kind) => kind.rotate_y(degrees),)+
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    "sphere" => Sphere,
+    "cube" => Cube,
+    "box" => Cuboid,
+    "pyramid" => Pyramid,
+    "prism" => Prism,
+    "cylinder" => Cylinder,
+    "cone" => Cone,
+    "tapered_cylinder" => TaperedCylinder,
+    "unit_frustum" => UnitFrustum,
+    "torus" => Torus,
+    "platform" => HorizontalRectangle,
+    "rectangle" => Rectangle,
+    "plane" => Plane,
+    "mesh" => MeshDesc,
+    "union" => Union,
+    "intersection" => Intersection,
+    "difference" => Difference,
+}
+
+impl FieldValue for Shape {
+    const TYPE: ValueType = ValueType::OneOf(KINDS);
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()
+    }
+}
+
+impl Shape {
+    /// Returns the position of the shape: the first of its anchor points, or the origin if it has
+    /// none. Moving all anchor points by a vector moves the shape by that vector.
+    pub fn position(&self) -> DVec3 {
+        self.clone()
+            .anchor_points_mut()
+            .first()
+            .map_or(DVec3::ZERO, |point| DVec3::from_array(**point))
+    }
+}
