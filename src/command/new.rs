@@ -1,9 +1,9 @@
 //! `zerkalo new`: writes a starter scene to a new file.
 
 use crate::command::{Failure, print_line};
-use zerkalo_scene::disk::{Existing, replace_file};
 use std::io::Write;
 use std::path::Path;
+use zerkalo_scene::disk::{Existing, replace_file};
 
 /// Text of a small scene with comments, from which users start a scene of their own.
 const STARTER: &str = include_str!("starter.toml");

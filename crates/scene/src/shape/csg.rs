@@ -12,7 +12,7 @@ use crate::value::{
 };
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
-use zerkalo_kernel::primitive::csg_tree::{CsgSolid, CsgTree};
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;

@@ -10,6 +10,8 @@ use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};
 use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
@@ -17,8 +19,6 @@ use zerkalo_render::session::{
 };
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{self, Target};
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
