@@ -2,12 +2,10 @@
 
 use crate::shape::Shape;
 use crate::value::{
-    Field, FieldValue, KeyNode, KeyValue, NumberRange, TomlError, TomlValue, ValidationError,
-    ValueType, description, one_of, replaced_by, sin_cos_degrees, unit,
+    Field, FieldValue, KeyNode, KeyValue, NumberRange, ValidationError, ValueType, description,
+    one_of, sin_cos_degrees, single_value, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
-use toml::de::DeValue;
-use toml::{Spanned, Value};
 use zerkalo_kernel::primitive::Form;
 
 one_of! {
@@ -42,51 +40,16 @@ description! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
-impl TomlValue for Scale {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        if value.get_ref().is_array() {
-            return TomlValue::from_toml(value).map(Self);
-        }
-        f64::from_toml(value).map(|factor| Self([factor; 3]))
-    }
-
-    fn to_toml(&self) -> Value {
-        match self.uniform() {
-            Some(factor) => factor.to_toml(),
-            None => self.0.to_toml(),
-        }
-    }
-}
-
-impl Scale {
-    /// Returns the factor of all three axes; `None` if their factors differ.
-    fn uniform(&self) -> Option<f64> {
-        let [x, y, z] = self.0;
-        (x == y && y == z).then_some(x)
-    }
-}
-
-impl KeyNode for Scale {
-    fn value(&self) -> Option<KeyValue> {
-        self.uniform().map_or_else(|| self.0.value(), |factor| factor.value())
-    }
-
-    fn set_value(&mut self, value: KeyValue) -> bool {
-        replaced_by(self, Self::from_value(value))
-    }
-}
-
-impl FieldValue for Scale {
-    const TYPE: ValueType = ValueType::Factor;
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.uniform().map_or_else(|| self.0.errors(field), |factor| factor.errors(field))
-    }
-
-    fn from_value(value: KeyValue) -> Option<Self> {
-        let uniform = f64::from_value(value.clone()).map(|factor| [factor; 3]);
-        uniform.or_else(|| FieldValue::from_value(value)).map(Self)
-    }
+single_value! {
+    [] Scale: ValueType::Factor,
+        |scale| {
+            let [x, y, z] = scale.0;
+            KeyValue::Numbers(if x == y && y == z { vec![x] } else { vec![x, y, z] })
+        },
+        |value| match value {
+            KeyValue::Numbers(list) if list.len() == 1 => Some(Self([list[0]; 3])),
+            list => list.numbers().map(Self),
+        };
 }
 
 impl TransformOp {

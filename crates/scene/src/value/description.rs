@@ -6,7 +6,6 @@
 
 use crate::value::{
     Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
-    replaced_by,
 };
 
 /// Table of a scene file: the keys that it has and the checks of their values.
@@ -29,7 +28,12 @@ pub trait FieldValue: KeyNode {
 
     /// Returns the validation errors of `self`, the value of the key that `field` describes. The
     /// dotted key of each error begins with `field.name`.
-    fn errors(&self, field: &Field) -> Vec<ValidationError>;
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        match self.value() {
+            Some(KeyValue::Numbers(numbers)) => field.check(&numbers).into_iter().collect(),
+            Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
+        }
+    }
 
     /// Converts `value`; `None` if it has another type, or if this is a table.
     fn from_value(_value: KeyValue) -> Option<Self>
@@ -74,107 +78,76 @@ pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements [`FieldValue`] for number types by their conversions to and from lists of numbers.
-macro_rules! numeric {
-    ($([$($n:ident)?] $type:ty => $value_type:expr, $to:expr, $from:expr;)+) => {$(
-        impl $(<const $n: usize>)? FieldValue for $type {
-            const TYPE: ValueType = $value_type;
+/// Implements the traits of values for types by their conversions to and from [`KeyValue`].
+macro_rules! single_value {
+    ($(
+        [$($n:ident)?] $type:ty: $value_type:expr, $to:expr, $from:expr
+        $(, absent $is_absent:expr, $make_absent:expr)?;
+    )+) => {$(
+        impl $(<const $n: usize>)? $crate::value::FieldValue for $type {
+            const TYPE: $crate::value::ValueType = $value_type;
 
-            fn errors(&self, field: &Field) -> Vec<ValidationError> {
-                let numbers: fn(&Self) -> Vec<f64> = $to;
-                field.check(&numbers(self)).into_iter().collect()
-            }
-
-            fn from_value(value: KeyValue) -> Option<Self> {
-                let convert: fn(&[f64]) -> Option<Self> = $from;
-                let KeyValue::Numbers(numbers) = value else { return None };
-                convert(&numbers)
+            fn from_value(value: $crate::value::KeyValue) -> Option<Self> {
+                let from: fn($crate::value::KeyValue) -> Option<Self> = $from;
+                from(value)
             }
         }
 
-        impl $(<const $n: usize>)? KeyNode for $type {
-            fn value(&self) -> Option<KeyValue> {
-                let numbers: fn(&Self) -> Vec<f64> = $to;
-                Some(KeyValue::Numbers(numbers(self)))
+        impl $(<const $n: usize>)? $crate::value::KeyNode for $type {
+            fn value(&self) -> Option<$crate::value::KeyValue> {
+                let to: fn(&Self) -> $crate::value::KeyValue = $to;
+                Some(to(self))
             }
 
-            fn set_value(&mut self, value: KeyValue) -> bool {
-                replaced_by(self, Self::from_value(value))
+            fn set_value(&mut self, value: $crate::value::KeyValue) -> bool {
+                let new = <Self as $crate::value::FieldValue>::from_value(value);
+                new.map(|new| *self = new).is_some()
+            }
+
+            $(
+                fn is_absent(&self) -> bool {
+                    let is_absent: fn(&Self) -> bool = $is_absent;
+                    is_absent(self)
+                }
+
+                fn make_absent(&mut self) {
+                    let make_absent: fn(&mut Self) = $make_absent;
+                    make_absent(self);
+                }
+            )?
+        }
+
+        impl $(<const $n: usize>)? $crate::value::TomlValue for $type {
+            fn from_toml(
+                value: &::toml::Spanned<::toml::de::DeValue>,
+            ) -> Result<Self, $crate::value::TomlError> {
+                $crate::value::read_single(value)
+            }
+
+            fn to_toml(&self) -> ::toml::Value {
+                $crate::value::write_single(self)
             }
         }
     )+};
 }
+pub(crate) use single_value;
 
-numeric! {
-    [] f64 => ValueType::Number(NumberRange::FINITE), |x| vec![*x], |list| only(list);
-    [N] [f64; N] => ValueType::Numbers(N, NumberRange::FINITE), |list| list.to_vec(),
-        |list| list.try_into().ok();
-    [] u32 => ValueType::Whole(NumberRange::FINITE), |x| vec![f64::from(*x)],
-        |list| whole(only(list)?);
-    [N] [u32; N] => ValueType::Wholes(N, NumberRange::FINITE), |list| list.map(f64::from).to_vec(),
-        |list| list.iter().map(|x| whole(*x)).collect::<Option<Vec<_>>>()?.try_into().ok();
-    [] Color => ValueType::Color(NumberRange::FINITE), |color| color.0.to_vec(),
-        |list| list.try_into().ok().map(Color);
-}
-
-fn only(list: &[f64]) -> Option<f64> {
-    if let [x] = list { Some(*x) } else { None }
-}
-
-fn whole(x: f64) -> Option<u32> {
-    (f64::from(x as u32) == x).then_some(x as u32)
-}
-
-impl FieldValue for bool {
-    const TYPE: ValueType = ValueType::Switch;
-
-    fn errors(&self, _: &Field) -> Vec<ValidationError> {
-        Vec::new()
-    }
-
-    fn from_value(value: KeyValue) -> Option<Self> {
-        if let KeyValue::Switch(on) = value { Some(on) } else { None }
-    }
-}
-
-impl KeyNode for bool {
-    fn value(&self) -> Option<KeyValue> {
-        Some(KeyValue::Switch(*self))
-    }
-
-    fn set_value(&mut self, value: KeyValue) -> bool {
-        replaced_by(self, Self::from_value(value))
-    }
-}
-
-impl FieldValue for String {
-    const TYPE: ValueType = ValueType::Text;
-
-    fn errors(&self, _: &Field) -> Vec<ValidationError> {
-        Vec::new()
-    }
-
-    fn from_value(value: KeyValue) -> Option<Self> {
-        if let KeyValue::Text(text) = value { Some(text) } else { None }
-    }
-}
-
-impl KeyNode for String {
-    fn value(&self) -> Option<KeyValue> {
-        Some(KeyValue::Text(self.clone()))
-    }
-
-    fn set_value(&mut self, value: KeyValue) -> bool {
-        replaced_by(self, Self::from_value(value))
-    }
-
-    fn is_absent(&self) -> bool {
-        self.is_empty()
-    }
-
-    fn make_absent(&mut self) {
-        self.clear();
-    }
+single_value! {
+    [] f64: ValueType::Number(NumberRange::FINITE),
+        |x| KeyValue::Numbers(vec![*x]), |value| value.numbers().map(|[x]| x);
+    [N] [f64; N]: ValueType::Numbers(N, NumberRange::FINITE),
+        |list| KeyValue::Numbers(list.to_vec()), |value| value.numbers();
+    [] u32: ValueType::Whole(NumberRange::FINITE),
+        |x| KeyValue::Numbers(vec![f64::from(*x)]), |value| value.wholes().map(|[x]| x);
+    [N] [u32; N]: ValueType::Wholes(N, NumberRange::FINITE),
+        |list| KeyValue::Numbers(list.map(f64::from).to_vec()), |value| value.wholes();
+    [] Color: ValueType::Color(NumberRange::FINITE),
+        |color| KeyValue::Numbers(color.0.to_vec()), |value| value.numbers().map(Color);
+    [] bool: ValueType::Switch,
+        |on| KeyValue::Switch(*on), |value| value.switch();
+    [] String: ValueType::Text,
+        |text| KeyValue::Text(text.clone()), |value| value.text(),
+        absent String::is_empty, String::clear;
 }
 
 impl<T: FieldValue> FieldValue for Option<T> {
@@ -191,7 +164,7 @@ impl<T: FieldValue> KeyNode for Option<T> {
     }
 
     fn set_value(&mut self, value: KeyValue) -> bool {
-        replaced_by(self, T::from_value(value).map(Some))
+        T::from_value(value).map(|new| *self = Some(new)).is_some()
     }
 
     fn is_absent(&self) -> bool {
@@ -258,18 +231,6 @@ macro_rules! choices {
             pub const ALL: [Self; Self::CHOICES.len()] = [$(Self::$variant),+];
         }
 
-        impl $crate::value::TomlValue for $name {
-            fn from_toml(
-                value: &::toml::Spanned<::toml::de::DeValue>,
-            ) -> Result<Self, $crate::value::TomlError> {
-                $crate::value::choice(value, Self::CHOICES).map(|index| Self::ALL[index])
-            }
-
-            fn to_toml(&self) -> ::toml::Value {
-                ::toml::Value::String(Self::CHOICES[*self as usize].name.to_string())
-            }
-        }
-
         impl $crate::value::FromWritten<&'static str> for $name {
             fn from_written(written: &'static str) -> Self {
                 match written {
@@ -279,29 +240,13 @@ macro_rules! choices {
             }
         }
 
-        impl $crate::value::FieldValue for $name {
-            const TYPE: $crate::value::ValueType =
-                $crate::value::ValueType::Choice(Self::CHOICES);
-
-            fn errors(&self, _: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
-                Vec::new()
-            }
-
-            fn from_value(value: $crate::value::KeyValue) -> Option<Self> {
-                let $crate::value::KeyValue::Text(word) = value else { return None };
-                Self::CHOICES.iter().position(|c| c.name == word).map(|index| Self::ALL[index])
-            }
-        }
-
-        impl $crate::value::KeyNode for $name {
-            fn value(&self) -> Option<$crate::value::KeyValue> {
-                let word = Self::CHOICES[*self as usize].name;
-                Some($crate::value::KeyValue::Text(word.to_string()))
-            }
-
-            fn set_value(&mut self, value: $crate::value::KeyValue) -> bool {
-                $crate::value::replaced_by(self, $crate::value::FieldValue::from_value(value))
-            }
+        $crate::value::single_value! {
+            [] $name: $crate::value::ValueType::Choice(Self::CHOICES),
+                |choice| $crate::value::KeyValue::Text(Self::CHOICES[*choice as usize].name.into()),
+                |value| match value.text()?.as_str() {
+                    $($word => Some(Self::$variant),)+
+                    _ => None,
+                };
         }
     };
 }
@@ -329,26 +274,22 @@ pub(crate) use choices;
 /// ```
 ///
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default`, and its `Default` consists of the declared defaults. If some key is
-/// required, a default declared by `=` must equal the default of the key's Rust type. Any other
-/// default is declared in the form `up: [f64; 3] => up "[0.0, 1.0, 0.0]"`: the function `up`
-/// returns the default, and the string is the same default as TOML.
+/// `Example: Default`, and its `Default` consists of the declared defaults. A default whose Rust
+/// expression is not TOML is declared as `=> expression, written "TOML"`.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [all] [$($doc)+] [] $name $($fields)+);
+        $crate::value::description!(@struct [$($doc)+] [] $name $($fields)+);
         $crate::value::description!(@default $name $($fields)+);
     };
     ($(#[doc = $doc:literal])+ pub struct $name:ident $(: $derived:ident)? { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [] [$($doc)+] [$($derived)?] $name $($fields)+);
+        $crate::value::description!(@struct [$($doc)+] [$($derived)?] $name $($fields)+);
     };
 
-    // `$all` is given if the declaration has `: Default`. The values of missing keys are then taken
-    // from the `Default` of the struct.
     (
-        @struct [$($all:ident)?] [$($doc:literal)+] [$($derived:ident)?] $name:ident
+        @struct [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(
             $(#[doc = $help:literal])+
-            $key:ident: $type:ty $(= $default:expr)? $(=> $function:ident $toml:literal)?
+            $key:ident: $type:ty $(= $default:expr)? $(=> $value:expr, written $toml:literal)?
             $(, or $absent:literal)?
             $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
             $(, as $value_type:ident)?;
@@ -413,12 +354,17 @@ macro_rules! description {
             ) -> Result<Self, $crate::value::TomlError> {
                 let fields = <Self as $crate::value::Description>::FIELDS;
                 let table = $crate::value::TableReader::new(value, fields)?;
-                $crate::value::description!(@read [$($all)?] [$($hidden)?] table $(
-                    $key
-                    $([Default::default; $default])?
-                    $([$function; $toml])?
-                    $([Default::default; $absent])?,
-                )+)
+                Ok(Self {
+                    $(
+                        $key: $crate::value::description!(
+                            @read table $key
+                            $(, $crate::value::FromWritten::from_written($default))?
+                            $(, $value)?
+                            $(, { let _ = $absent; Default::default() })?
+                        ),
+                    )+
+                    $($hidden: Default::default(),)?
+                })
             }
 
             fn to_toml(&self) -> ::toml::Value {
@@ -432,25 +378,11 @@ macro_rules! description {
         }
     };
 
-    (@read [all] [$($hidden:ident)?] $table:ident $($key:ident $([$($default:tt)+])?,)+) => {{
-        let mut new = Self::default();
-        $($table.replace(stringify!($key), &mut new.$key)?;)+
-        Ok(new)
-    }};
-    (
-        @read [] [$($hidden:ident)?] $table:ident
-        $($key:ident $([$($function:ident)::+; $unused:tt])?,)+
-    ) => {
-        Ok(Self {
-            $($key: $crate::value::description!(@value_of $table $key $($($function)::+)?),)+
-            $($hidden: Default::default(),)?
-        })
-    };
-    (@value_of $table:ident $key:ident) => {
+    (@read $table:ident $key:ident) => {
         $table.required(stringify!($key))?
     };
-    (@value_of $table:ident $key:ident $($function:ident)::+) => {
-        $table.optional(stringify!($key))?.unwrap_or_else($($function)::+)
+    (@read $table:ident $key:ident, $default:expr) => {
+        $table.optional(stringify!($key))?.unwrap_or_else(|| $default)
     };
 
     // The first rule is for keys that are always written. The second is for keys declared with

@@ -11,6 +11,30 @@ pub enum KeyValue {
     Text(String),
 }
 
+impl KeyValue {
+    /// Returns the value as `N` numbers, if it has this type.
+    pub(crate) fn numbers<const N: usize>(self) -> Option<[f64; N]> {
+        if let Self::Numbers(list) = self { list.try_into().ok() } else { None }
+    }
+
+    /// Returns the value as `N` whole numbers, if it has this type.
+    pub(crate) fn wholes<const N: usize>(self) -> Option<[u32; N]> {
+        let list: [f64; N] = self.numbers()?;
+        let wholes = list.map(|x| x as u32);
+        (wholes.map(f64::from) == list).then_some(wholes)
+    }
+
+    /// Returns the value as a switch, if it is one.
+    pub(crate) fn switch(self) -> Option<bool> {
+        if let Self::Switch(on) = self { Some(on) } else { None }
+    }
+
+    /// Returns the value as text, if it is one.
+    pub(crate) fn text(self) -> Option<String> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+}
+
 /// Node of a description: a table, an entry of a list, or a single value.
 pub trait KeyNode {
     /// Returns the value of the node; `None` for tables and absent values.
@@ -52,9 +76,4 @@ pub fn node_at<'a>(root: &'a dyn KeyNode, path: &str) -> Option<&'a dyn KeyNode>
 /// Returns [`node_at`] as a mutable reference.
 pub fn node_at_mut<'a>(root: &'a mut dyn KeyNode, path: &str) -> Option<&'a mut dyn KeyNode> {
     path.split('.').try_fold(root, |node, key| node.child_mut(key))
-}
-
-/// Replaces `place` by `new`, if there is a new value. Returns `true` if there is.
-pub(crate) fn replaced_by<T>(place: &mut T, new: Option<T>) -> bool {
-    new.map(|new| *place = new).is_some()
 }
