@@ -1,5 +1,7 @@
 //! Camera: description in scene files, lens, navigation, and compiled form.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod lens;
 mod navigate;
 mod perspective;

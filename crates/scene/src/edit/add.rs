@@ -1,5 +1,7 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::edit::bounds::{BoundingSphere, scene_bounds};
 use crate::edit::convert::{LIGHT_KINDS, set_kind};
 use crate::edit::placement::place_for;
@@ -96,11 +98,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
 /// longest side of its bounding box to `size` and place the shape upright on the point `base`. The
 /// list is empty if the shape has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
-    // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
-    let mut steps = match shape {
-        Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
-        _ => Vec::new(),
-    };
+    let mut steps: Vec<_> = shape.upright().into_iter().collect();
     let Some((low, high)) = shape.form().transformed(&compose(&steps)).bounds() else {
         return Vec::new();
     };

@@ -1,6 +1,8 @@
 //! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
 //! brightness are kept where possible.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::camera::{Camera, Focus, ViewAngle};
 use crate::edit::bounds::scene_bounds;
@@ -84,7 +86,7 @@ pub(super) fn switch(
                 next.materials.get_mut(material).ok_or_else(|| EditError::gone(subject))?;
             switch_texture(material, key, name);
         }
-        _ => {}
+        Target::Ambient | Target::Background | Target::Film | Target::IntegratorSettings => {}
     }
     let label = label(&next, subject, key);
     Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
@@ -201,7 +203,7 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
             // A sphere shows a quarter of its area to a distant point.
             let shown = match surface {
                 EmitterSurface::Sphere(_) => 0.25 * surface.area(),
-                _ => surface.area(),
+                EmitterSurface::Rectangle(_) | EmitterSurface::Disk(_) => surface.area(),
             };
             radiance * (shown / squared).min(PI)
         }

@@ -1,10 +1,12 @@
 //! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
 //! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
-use zerkalo_kernel::primitive::Form;
+use crate::shape::Shape;
 
 /// Returns the name of the material that the mirror commands change: the first of the following
 /// that reflects.
@@ -19,9 +21,9 @@ use zerkalo_kernel::primitive::Form;
 /// the reflection can be increased from 0 again. Returns `None` if there is neither.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
-    let chosen = selected.and_then(|subject| match subject.material(scene) {
-        Some(Target::Material(name)) => Some(name),
-        _ => None,
+    let chosen = selected.and_then(|subject| {
+        let Target::Material(name) = subject.material(scene)? else { return None };
+        Some(name)
     });
     let is_specular = |material: &String| {
         scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
@@ -35,10 +37,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
         return Some(part);
     }
     // Rectangles of any orientation count; the ground (`platform`) does not.
-    let rectangle = |i: &usize| {
-        let object = &scene.objects[*i];
-        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))
-    };
+    let rectangle = |i: &usize| matches!(scene.objects[*i].shape, Shape::Rectangle(_));
     let mut all = 0..scene.objects.len();
     if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
         return Some(name);

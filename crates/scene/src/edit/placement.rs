@@ -1,6 +1,8 @@
 //! Placement of objects: on the surfaces that support them, and at positions that are free of other
 //! objects.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::camera::Camera;
 use crate::edit::bounds::{BoundingSphere, Extent, scene_bounds};
 use crate::edit::{Edit, EditError, Target};

@@ -155,18 +155,15 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns the target of a material: that of the object if this target is an object, or this
-    /// target itself if it is a material. Returns `None` for other targets, or if the scene does
-    /// not have the material.
+    /// Returns this target if it is a material, or the material of this object. Returns `None` if
+    /// the scene does not have it.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
-        match self {
-            Self::Material(_) => self.exists(scene).then(|| self.clone()),
-            Self::Object(i) => {
-                let name = &scene.objects.get(*i)?.material;
-                scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
-            }
-            _ => None,
-        }
+        let name = match self {
+            Self::Material(name) => name,
+            Self::Object(i) => &scene.objects.get(*i)?.material,
+            _ => return None,
+        };
+        scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
     }
 }
 

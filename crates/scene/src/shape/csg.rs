@@ -136,15 +136,13 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
     for part in of {
-        match part.shape.form().transformed(&compose(&part.transform)) {
-            Form::Csg(inner) => {
-                trees.push(inner.tree.shifted(parts.len()));
-                parts.extend(inner.parts);
-            }
-            simple => {
-                trees.push(CsgTree::Part(parts.len()));
-                parts.push(simple);
-            }
+        let form = part.shape.form().transformed(&compose(&part.transform));
+        if let Form::Csg(inner) = form {
+            trees.push(inner.tree.shifted(parts.len()));
+            parts.extend(inner.parts);
+        } else {
+            trees.push(CsgTree::Part(parts.len()));
+            parts.push(form);
         }
     }
     CsgSolid { parts, tree: join(trees) }

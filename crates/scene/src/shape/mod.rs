@@ -3,6 +3,8 @@
 //! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
 //! intersection kernels.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod axial;
 mod cone;
 mod csg;

@@ -4,7 +4,7 @@ use crate::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
     MeshDesc, Plane, Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
 use crate::value::{
     Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
 };
@@ -45,6 +45,11 @@ pub trait ShapeDesc: Description {
     /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
     fn rotation(&self) -> f64 {
         0.0
+    }
+
+    /// Returns the step that makes the kind stand upright, if its axis is not y.
+    fn upright(&self) -> Option<TransformOp> {
+        None
     }
 
     /// Returns the parts of a compound; `None` for any other kind.
@@ -136,6 +141,13 @@ macro_rules! kinds {
             pub fn rotation(&self) -> f64 {
                 match self {
                     $(Self::$kind(kind) => kind.rotation(),)+
+                }
+            }
+
+            /// Returns the step that makes the shape stand upright, if its axis is not y.
+            pub fn upright(&self) -> Option<TransformOp> {
+                match self {
+                    $(Self::$kind(kind) => kind.upright(),)+
                 }
             }
 

@@ -39,7 +39,7 @@ impl TextureSpace {
         match self.default_mapping {
             DefaultMapping::Uv => true,
             DefaultMapping::Planar => low != high,
-            _ => false,
+            DefaultMapping::Spherical | DefaultMapping::Cylindrical | DefaultMapping::Box => false,
         }
     }
 }

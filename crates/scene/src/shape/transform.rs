@@ -46,9 +46,9 @@ single_value! {
             let [x, y, z] = scale.0;
             KeyValue::Numbers(if x == y && y == z { vec![x] } else { vec![x, y, z] })
         },
-        |value| match value {
-            KeyValue::Numbers(list) if list.len() == 1 => Some(Self([list[0]; 3])),
-            list => list.numbers().map(Self),
+        |value| {
+            let uniform = value.clone().numbers().map(|[factor]| [factor; 3]);
+            uniform.or_else(|| value.numbers()).map(Self)
         };
 }
 
