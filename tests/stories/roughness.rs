@@ -3,8 +3,8 @@
 
 use crate::common::MIRROR_ROOM;
 use crate::stories::simulated_dashboard::Desk;
-use crate::support::test_film::TestFilm;
 use crate::support::{pool, rendered, sized};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::{FirstHitBuffer, RenderState};
 use zerkalo_scene::Scene;
 use zerkalo_scene::value::Color;

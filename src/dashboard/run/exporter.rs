@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::{Depth, Film, ImageOutput};
+use zerkalo_render::film::Film;
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::Settings;
 use zerkalo_render::session::{Report, Session, State};
 use zerkalo_render::{EncodedCheckpoint, Options, RenderState};
@@ -197,7 +198,7 @@ pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
         path,
         size: [film.width(), film.height()],
         spp: report.spp.mean,
-        noise_codes: report.noise.map(|noise| noise.rmse_codes),
+        noise_levels: report.noise.map(|noise| noise.rmse_levels),
     }
 }
 

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use zerkalo_render::film::file::FilmFileHeader;
-use zerkalo_render::film::{Depth, Film, ImageOutput, LinearImage};
+use zerkalo_render::film::{Film, LinearImage};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::plan::WatchedFilms;
 use zerkalo_render::session::{Report, Snapshot, WatchSession};
 
@@ -63,7 +64,7 @@ fn write(
     let stem = stem(None, header.source().unwrap_or_default());
     let create = |path: &Path| {
         let output = ImageOutput::from_path(path)?.create_new();
-        header.write_picture(film, Depth::Eight, &output)
+        output.write_film(header, film, Depth::Eight)
     };
     let path = numbered(&stem, format.extension(), create)?;
     Ok(exported(path, film, report))

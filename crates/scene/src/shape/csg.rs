@@ -11,8 +11,7 @@ use crate::value::{
     ValueType, description,
 };
 use glam::DVec3;
-use zerkalo_kernel::primitive::Form;
-use zerkalo_kernel::primitive::{CsgSolid, CsgTree};
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree, Form};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
@@ -140,9 +139,10 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
         if let Form::Csg(inner) = form {
             trees.push(inner.tree.shifted(parts.len()));
             parts.extend(inner.parts);
-        } else {
+        } else if let Some(solid) = form.into_solid() {
+            // Other geometry is left out; `unfit_reason` reports it.
             trees.push(CsgTree::Part(parts.len()));
-            parts.push(form);
+            parts.push(solid);
         }
     }
     CsgSolid { parts, tree: join(trees) }
