@@ -11,10 +11,10 @@ mod common;
 use common::{Random, ball, in_turns, towards};
 use std::hint::black_box;
 use std::time::Instant;
-use zerkalo::asset::Mesh;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::triangle_mesh;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::triangle_mesh;
+use zerkalo_scene::asset::Mesh;
 
 /// Number of random rays in each measurement.
 const RAYS: usize = 1 << 19;

@@ -5,11 +5,11 @@ use crate::common;
 
 use common::Numbers;
 use std::sync::Arc;
-use zerkalo::asset::Assets;
-use zerkalo::asset::Mesh;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::triangle_mesh;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::triangle_mesh;
+use zerkalo_scene::asset::Assets;
+use zerkalo_scene::asset::Mesh;
 
 /// Returns a closed mesh of a ball around the origin, read from OBJ. The triangles at the poles can
 /// be a thousand times as long as wide.

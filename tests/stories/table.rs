@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::terminal::event::Key;
+use zerkalo_terminal::event::Key;
 
 #[test]
 fn every_key_runs_one_command_per_context() {

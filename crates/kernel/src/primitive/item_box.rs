@@ -1,0 +1,141 @@
+//! Bounding boxes of single primitives, axis-aligned or oriented, which rays are tested against
+//! before the primitive's own intersection.
+
+use crate::bvh::Ray;
+use crate::bvh::packet::SlabPacket;
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::primitive::form::Form;
+use glam::DVec3;
+use zerkalo_scene::value::choices;
+
+choices! {
+    /// Acceleration structure. Every choice renders the same image; only speed differs.
+    pub enum Acceleration {
+        /// the fastest by measurement: `bvh` in scenes with many objects, otherwise a list for each
+        /// tile of the picture
+        Auto = "auto",
+        /// every ray tests every primitive
+        None = "none",
+        /// screen bounds of each primitive, for camera rays
+        ScreenBounds = "screen-bounds",
+        /// oriented bounding boxes: one per primitive, in its own space
+        Obb = "obb",
+        /// axis-aligned bounding boxes: one per primitive, in the scene's space
+        Aabb = "aabb",
+        /// a bounding volume hierarchy
+        Bvh = "bvh",
+    }
+}
+
+impl Acceleration {
+    /// Returns the name of this acceleration structure in scene files and on the command line.
+    pub fn name(self) -> &'static str {
+        Self::CHOICES[self as usize].name
+    }
+
+    /// Returns the former name of this structure; `None` if its name has not changed. Scene files
+    /// and the command line still accept the former name.
+    pub fn former_name(self) -> Option<&'static str> {
+        match self {
+            Self::Auto | Self::None => None,
+            Self::ScreenBounds => Some("projected"),
+            Self::Obb => Some("object"),
+            Self::Aabb => Some("world"),
+            Self::Bvh => Some("hierarchy"),
+        }
+    }
+
+    /// Returns the structure whose name or former name is `name`; `None` if there is none.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
+    }
+}
+
+/// Bounding box of one primitive.
+pub struct ItemBox<S> {
+    low: [S; 3],
+    high: [S; 3],
+    /// Object space of the box; `None` if its axes are those of the scene.
+    space: Option<BoxFrame<S>>,
+}
+
+/// Object space of an oriented bounding box. A point p of the scene has the coordinates
+/// `rows (p - center)` in it.
+struct BoxFrame<S> {
+    center: [S; 3],
+    rows: [[S; 3]; 3],
+    /// Sum of the magnitudes of the entries of each row of `rows`, one sum for each axis of object
+    /// space. It is the largest factor by which the map to object space enlarges a rounding error
+    /// on that axis.
+    growth: [S; 3],
+    /// Largest magnitude of a coordinate of the primitive in the scene.
+    reach: S,
+}
+
+/// Returns the lowest and the highest corner of a bounding box, moved outward by a margin. The
+/// margin is 4 times the largest coordinate times `epsilon`, the relative rounding error. It bounds
+/// the rounding errors of the box and of the primitive's own intersection test.
+pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
+    let reach = low.abs().max(high.abs()).max_element();
+    let pad = DVec3::splat(reach * 4.0 * epsilon);
+    [low - pad, high + pad]
+}
+
+/// Assumed largest distance between a side of a solid's bounding box and the part of the solid that
+/// touches this side, as a fraction of the box's largest coordinate. Double precision rounds the
+/// box and the solid differently; far from the origin of the scene file, the distance is therefore
+/// not 0.
+const GIVEN: f64 = 1.0 / 4_294_967_296.0;
+
+impl<S: Float> ItemBox<S> {
+    /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
+    /// object space, the box is in that space. Returns `None` for a form without finite bounds.
+    pub fn new(form: &Form, oriented: bool) -> Option<Self> {
+        let bounds = form.bounds()?;
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        let made = |bounds, space| {
+            let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
+            Self { low, high, space }
+        };
+        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| oriented) else {
+            return Some(made(bounds, None));
+        };
+        let rows = scene_from_own.matrix3.inverse().transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let middle = 0.5 * (low + high);
+        let space = BoxFrame {
+            center: vector(scene_from_own.transform_point3(middle)),
+            rows: rows.map(vector),
+            growth: rows.map(|r| S::from_f64(r.abs().element_sum())),
+            reach: S::from_f64(bounds.0.abs().max(bounds.1.abs()).max_element()),
+        };
+        Some(made((low - middle, high - middle), Some(space)))
+    }
+
+    /// Returns the lanes whose ray may hit the primitive in this box at a distance up to `limit`.
+    #[inline(always)]
+    pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
+        let far = ray.origin.max_abs();
+        let packet = match &self.space {
+            None => {
+                let pad = far * L::from_f64(4.0 * L::EPSILON);
+                SlabPacket::new(ray, Vec3::new(pad, pad, pad))
+            }
+            Some(space) => {
+                // Bound of the ray's rounding error at the distance of the primitive, in scene
+                // units. It covers the errors of the ray's origin, of its direction and of the
+                // box's centre.
+                let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
+                let rows = space.rows.map(Vec3::splat);
+                let transform =
+                    |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
+                let inner = Ray {
+                    origin: transform(ray.origin - Vec3::splat(space.center)),
+                    direction: transform(ray.direction),
+                };
+                SlabPacket::new(&inner, Vec3::splat(space.growth) * lost)
+            }
+        };
+        packet.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
+    }
+}

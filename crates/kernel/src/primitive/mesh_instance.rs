@@ -1,0 +1,539 @@
+//! Triangle meshes as primitives. A ray is transformed into the space of the mesh and traverses the
+//! mesh's BVH there; hits are transformed back.
+//!
+//! Coordinates of a mesh are in single precision for every SIMD type; computation has the precision
+//! of the lanes.
+
+use crate::bvh::{Hit, LEAF_FLAG, Ray};
+use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
+use crate::primitive::batch::{SurfacePoint, UvGradients};
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
+};
+use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::item_box::ItemBox;
+use crate::primitive::keep_visible;
+use crate::primitive::triangle_mesh;
+use glam::{DAffine3, DVec3};
+use std::ops::Range;
+use std::sync::Arc;
+use zerkalo_scene::asset;
+use zerkalo_scene::value::insertion_sort;
+
+/// Assumed ratio of a mesh's extent to the size of its smallest details. It determines the choice
+/// of single or double precision.
+const EXTENT_PER_DETAIL: f64 = 64.0;
+
+/// Canonical form of a mesh: the image of a triangle mesh under an invertible affine map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshForm {
+    /// Triangles in the space of the mesh.
+    pub mesh: Arc<asset::Mesh>,
+    /// Map from the space of the mesh to the scene.
+    pub scene_from_mesh: DAffine3,
+    /// `true` if shading normals are interpolated between vertices.
+    pub smooth: bool,
+}
+
+impl CanonicalShape for MeshForm {
+    fn transformed(self, map: &DAffine3) -> Form {
+        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }.into()
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        let m = &self.scene_from_mesh;
+        let rows = m.matrix3.transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());
+        let high = rows.map(|r| self.mesh.support(r));
+        let low = rows.map(|r| -self.mesh.support(r.map(|x| -x)));
+        Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        let [low, high] = self.mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        Some((self.scene_from_mesh, (low, high)))
+    }
+
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    fn thickness(&self) -> f64 {
+        let [low, high] = self.mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
+        let m = self.scene_from_mesh.matrix3;
+        let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+        let size = ((high - low) * DVec3::from(stretched)).to_array();
+        let longest = size.into_iter().fold(0.0, f64::max);
+        // The thickness of a needle or a thin sheet is the shortest side of its bounding box. Sides
+        // of length 0 are left out, because a flat mesh encloses no volume.
+        let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
+        thinnest.min(longest / EXTENT_PER_DETAIL)
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let away = box_distance(self.bounds()?, point);
+        let inside = || surface_distance(&self.mesh, &self.scene_from_mesh, point);
+        Some(if away > 0.0 { away } else { inside() })
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let Some((low, high)) = self.bounds() else { return Vec::new() };
+        if point.cmplt(low - slack).any() || point.cmpgt(high + slack).any() {
+            return Vec::new();
+        }
+        let mesh = self.mesh.mesh();
+        let corner = |i: u32| {
+            let position = mesh.positions[i as usize].map(f64::from);
+            self.scene_from_mesh.transform_point3(DVec3::from(position))
+        };
+        let mut normals: Vec<DVec3> = Vec::new();
+        for triangle in &mesh.triangles {
+            let Some(normal) = normal_of_triangle(triangle.map(corner), point, slack) else {
+                continue;
+            };
+            if normals.iter().all(|known| known.distance(normal) > 1e-3) {
+                normals.push(normal);
+            }
+        }
+        if normals.is_empty() { Vec::new() } else { vec![normals] }
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_compiled(self.clone().into(), origin, direction)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        match self.mesh.mesh().uvs {
+            Some(_) => DefaultMapping::Uv,
+            None => DefaultMapping::Box,
+        }
+    }
+
+    /// Returns no proxies (simplified geometry for the search for narrow gaps): a mesh has many
+    /// faces, and its corners are in single precision.
+    fn proxies(&self) -> Vec<Proxy> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        self.mesh.mesh().triangles.len()
+    }
+}
+
+/// Returns the unit normal of the triangle `[a, b, c]` if the triangle is within the distance
+/// `slack` of `point`; otherwise `None`.
+fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    if normal.dot(point - a).abs() > slack {
+        return None;
+    }
+    // The point is inside, or beyond an edge by at most the slack.
+    let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
+        let inward = normal.cross(to - from);
+        inward.dot(point - from) >= -slack * inward.length()
+    });
+    inside.then_some(normal)
+}
+
+fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
+    let (u, v, to) = (b - a, c - a, point - a);
+    let normal = u.cross(v);
+    let size2 = normal.length_squared();
+    let (s, t) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
+    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+        return normal.dot(to).abs() / size2.sqrt();
+    }
+    [[a, b], [b, c], [c, a]]
+        .map(|edge| segment_distance(edge, point))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Returns the distance between `point` and the closest triangle of the mesh, in scene units.
+fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
+    let inverse = scene_from_mesh.inverse();
+    let inside = inverse.transform_point3(point);
+    // Lower bound of the ratio of a length in the scene to the same length in mesh space.
+    let columns = inverse.matrix3.to_cols_array();
+    let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+    let mut least = f64::INFINITY;
+    let mut stack = vec![(0u32, 0.0)];
+    while let Some((branch, bound)) = stack.pop() {
+        if bound >= least {
+            continue;
+        }
+        let branch = &mesh.boxes().nodes()[branch as usize];
+        let first = stack.len();
+        for i in branch.children() {
+            let corner =
+                |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.bounds[a + from][i])));
+            let away = (corner(0) - inside).max(inside - corner(3)).max(DVec3::ZERO).length();
+            let bound = away * shrinks;
+            if bound >= least {
+                continue;
+            }
+            if branch.child[i] & LEAF_FLAG == 0 {
+                stack.push((branch.child[i], bound));
+                continue;
+            }
+            let leaf = &mesh.leaves()[(branch.child[i] & !LEAF_FLAG) as usize];
+            for place in 0..leaf.corners[0][0].len() {
+                let corners = leaf.corners.map(|corner| {
+                    scene_from_mesh
+                        .transform_point3(DVec3::from(corner.map(|axis| f64::from(axis[place]))))
+                });
+                // Unused places of a leaf hold NaN, which `min` ignores.
+                least = least.min(triangle_distance(corners, point));
+            }
+        }
+        // The nearest box is last and popped first.
+        insertion_sort(&mut stack[first..], |(_, distance)| -distance);
+    }
+    least
+}
+
+/// Mesh placed in the scene, compiled for ray intersection.
+struct MeshInstance<S> {
+    mesh: Arc<asset::Mesh>,
+    /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
+    extent: ItemBox<S>,
+    /// Columns of the linear map from scene space to mesh space.
+    mesh_from_scene: [[S; 3]; 3],
+    /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
+    /// space. Points are transformed relative to the centre. The rounding error of the linear map
+    /// is then in proportion to the distance between the point and the centre.
+    center: [S; 3],
+    mesh_center: [S; 3],
+    reach: S,
+    smooth: bool,
+}
+
+/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive. A hit holds
+/// the id of the mesh and the id of the triangle.
+pub struct Meshes<S> {
+    items: Vec<MeshInstance<S>>,
+}
+
+/// Corners of one mesh triangle per lane, in the space of the mesh.
+struct Triangle<L> {
+    corners: [Vec3<L>; 3],
+}
+
+impl<S: Float> MeshInstance<S> {
+    fn new(form: &Form) -> Option<Self> {
+        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = form else { return None };
+        let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
+        let inverse = scene_from_mesh.matrix3.inverse();
+        let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
+        let linear = scene_from_mesh.matrix3;
+        let scale = [linear.x_axis, linear.y_axis, linear.z_axis]
+            .into_iter()
+            .map(DVec3::length)
+            .fold(0.0, f64::max);
+        // Rounding errors in mesh space are at most those of the largest corner coordinate. `inner`
+        // is this coordinate, converted to scene units.
+        let inner = low.abs().max(high.abs()).max_element() * scale;
+        let outer = form.max_coordinate();
+        Some(Self {
+            mesh: mesh.clone(),
+            extent: ItemBox::new(form, false)?,
+            mesh_from_scene: columns.map(|c| c.to_array().map(S::from_f64)),
+            center: scene_from_mesh.transform_point3(middle).to_array().map(S::from_f64),
+            mesh_center: middle.to_array().map(S::from_f64),
+            reach: S::from_f64(outer.max(inner)),
+            smooth: *smooth,
+        })
+    }
+
+    #[inline(always)]
+    fn vector<L: SimdFloat<Scalar = S>>(&self, v: Vec3<L>) -> Vec3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
+        x * v.x + y * v.y + z * v.z
+    }
+
+    /// Transforms the normal `n` from mesh space to the scene by the transpose of
+    /// `mesh_from_scene`. The result is not normalised.
+    #[inline(always)]
+    fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
+        let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
+        Vec3::new(x.dot(n), y.dot(n), z.dot(n))
+    }
+
+    #[inline(always)]
+    fn point<L: SimdFloat<Scalar = S>>(&self, p: Vec3<L>) -> Vec3<L> {
+        self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
+    }
+
+    /// Returns two values for each ray: the ray in mesh space, and the length in mesh space of a
+    /// step along the ray whose length in the scene is 1.
+    #[inline(always)]
+    fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
+        let direction = self.vector(ray.direction);
+        let length = direction.length_squared().sqrt();
+        let direction = direction * (L::one() / length);
+        (Ray { origin: self.point(ray.origin), direction }, length)
+    }
+
+    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
+    /// triangle with the id `triangle_tag`. Each lane has its own triangle.
+    #[inline(always)]
+    fn vertices<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle_tag: L,
+        attributes: &[[f32; 3]],
+    ) -> [Vec3<L>; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        // Indices: vertex, axis, lane. Each triangle and each vertex is read once.
+        let mut values = [[[S::default(); MAX_WIDTH]; 3]; 3];
+        for lane in 0..L::WIDTH {
+            // Lanes that hit another primitive may hold any triangle id. It is clamped to a valid
+            // index.
+            let triangle =
+                triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)];
+            for (vertex, values) in triangle.into_iter().zip(&mut values) {
+                for (x, values) in attributes[vertex as usize].into_iter().zip(values) {
+                    values[lane] = S::from_f64(f64::from(x));
+                }
+            }
+        }
+        let [a, b, c] = &values;
+        [a, b, c].map(|[x, y, z]| {
+            Vec3::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
+        })
+    }
+
+    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
+    /// triangle with the id `triangle_tag`. A value is a pair of numbers. Each lane has its own
+    /// triangle.
+    #[inline(always)]
+    fn pairs<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle_tag: L,
+        attributes: &[[f32; 2]],
+    ) -> [[L; 2]; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
+        let component = |vertex: usize, k: usize| {
+            let pair = |lane| attributes[triangles[number(lane)][vertex] as usize][k];
+            L::from_fn(|lane| S::from_f64(f64::from(pair(lane))))
+        };
+        array_from_fn(|vertex| [component(vertex, 0), component(vertex, 1)])
+    }
+
+    #[inline(always)]
+    fn triangle<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L) -> Triangle<L> {
+        Triangle { corners: self.vertices(triangle_tag, &self.mesh.mesh().positions) }
+    }
+}
+
+impl<L: SimdFloat> Triangle<L> {
+    /// Returns the normal on the triangle's front, with twice the triangle's area as its length.
+    #[inline(always)]
+    fn normal(&self) -> Vec3<L> {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a)
+    }
+
+    /// Returns two gradients in the plane of the triangle: those of the barycentric weights of the
+    /// second and of the third corner.
+    #[inline(always)]
+    fn gradients(&self) -> [Vec3<L>; 2] {
+        let [a, b, c] = self.corners;
+        let (to_b, to_c) = (b - a, c - a);
+        let normal = to_b.cross(to_c);
+        let inverse = L::one() / normal.length_squared();
+        [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
+    }
+
+    /// Returns approximate barycentric weights of the triangle's point closest to `p`. None is
+    /// negative, and their sum is 1.
+    #[inline(always)]
+    fn weights(&self, p: Vec3<L>) -> [L; 3] {
+        let normal = self.normal();
+        let [a, b, c] = self.corners.map(|c| c - p);
+        let part = |a: Vec3<L>, b| normal.dot(a.cross(b)).max(L::zero());
+        let parts = [part(b, c), part(c, a), part(a, b)];
+        let inverse = L::one() / (parts[0] + parts[1] + parts[2]);
+        parts.map(|part| part * inverse)
+    }
+}
+
+impl<S: Float> Meshes<S> {
+    /// Compiles the meshes among the canonical forms `forms`, in order.
+    pub fn new(forms: &[Form]) -> Self {
+        Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
+    }
+
+    /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
+    /// the numbers in `range` are tested. The id of a mesh is `base` plus its number.
+    #[inline(never)]
+    pub fn closest<L: SimdFloat<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        base: u32,
+        ray: &Ray<L>,
+        hit: &mut Hit<L>,
+    ) {
+        for (tag, item) in (base + range.start as u32..).zip(&self.items[range]) {
+            let near = item.extent.meets(ray, hit.t);
+            if near.none() {
+                continue;
+            }
+            let (inner, length) = item.ray(ray);
+            // The distance limit in mesh space is enlarged by the rounding error of the transform.
+            // Whether a hit is closer than earlier hits is decided below by distances in the scene.
+            // The result therefore does not depend on the order of the primitives.
+            let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
+            let limit = L::select(near, limit, L::from_f64(-1.0));
+            let found = triangle_mesh::closest(&item.mesh, &inner, limit);
+            let hit_mask = found.t.lt(limit);
+            let before = hit.t;
+            hit.keep_closer(hit_mask, found.t / length, tag);
+            hit.triangle = L::select(hit.t.lt(before), found.triangle, hit.triangle);
+        }
+    }
+
+    /// Returns the lanes of `wanted` whose ray hits a mesh with a number in `range` at a distance
+    /// between 0 and `limit`.
+    #[inline(never)]
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
+        let mut occluded = L::mask(false);
+        for item in &self.items[range] {
+            let open = wanted.and_not(occluded);
+            if open.none() {
+                break;
+            }
+            let open = open & item.extent.meets(ray, limit);
+            if open.none() {
+                continue;
+            }
+            let (inner, length) = item.ray(ray);
+            let limit = L::select(open, limit * length, L::from_f64(-1.0));
+            occluded = occluded | triangle_mesh::occluded(&item.mesh, &inner, limit);
+        }
+        occluded
+    }
+
+    /// Returns the projection of `point` onto the plane of the hit triangle of mesh `item`, with
+    /// the normal of the triangle. `point` is the computed hit point of a ray, with rounding
+    /// errors. `triangle_tag` is the id of the triangle.
+    #[inline(never)]
+    pub fn surface<L: SimdFloat<Scalar = S>>(
+        &self,
+        item: usize,
+        triangle_tag: L,
+        point: Vec3<L>,
+    ) -> SurfacePoint<L> {
+        let item = &self.items[item];
+        let triangle = item.triangle(triangle_tag);
+        // The normal is divided by its largest component. Otherwise the square of its length would
+        // overflow for large triangles and underflow for small ones.
+        let flat = triangle.normal();
+        let largest = flat.max_abs();
+        let sound = largest.gt(L::zero());
+        let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
+        let height = flat.dot(item.point(point) - triangle.corners[0]);
+        let normal = item.normal(flat);
+        let inverse = L::one() / normal.length_squared().sqrt();
+        let normal = normal * inverse;
+        let point = normal.mul_add(-height * inverse, point);
+        SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
+    }
+
+    /// Returns the shading normal of mesh `item` at the hit point `point` on the triangle with the
+    /// id `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
+    /// direction of the rays.
+    ///
+    /// The shading normal is on the viewer's side. A normal that would turn away from the viewer is
+    /// bent towards the viewer.
+    #[inline(never)]
+    pub fn shading_normal<L: SimdFloat<Scalar = S>>(
+        &self,
+        item: usize,
+        triangle_tag: L,
+        (point, normal): (Vec3<L>, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
+        let item = &self.items[item];
+        if !item.smooth {
+            return normal;
+        }
+        let weights = item.triangle(triangle_tag).weights(item.point(point));
+        let [a, b, c] = item.vertices(triangle_tag, item.mesh.smooth_normals());
+        let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
+        let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
+        // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
+        // replaces it by `normal`.
+        keep_visible(smooth, normal, direction)
+    }
+
+    /// Returns the texture coordinates of mesh `item` at `point` in the triangle with the id
+    /// `triangle_tag`; `None` if the mesh file has none.
+    #[inline(never)]
+    pub fn uv<L: SimdFloat<Scalar = S>>(
+        &self,
+        item: usize,
+        triangle_tag: L,
+        point: Vec3<L>,
+    ) -> Option<UvGradients<L>> {
+        let item = &self.items[item];
+        let triangle = item.triangle(triangle_tag);
+        let corners = item.pairs(triangle_tag, item.mesh.mesh().uvs.as_deref()?);
+        let weights = triangle.weights(item.point(point));
+        let gradient = triangle.gradients();
+        let along = |k: usize| {
+            let [a, b, c] = corners.map(|pair| pair[k]);
+            let value = a * weights[0] + b * weights[1] + c * weights[2];
+            (value, gradient[0] * (b - a) + gradient[1] * (c - a))
+        };
+        let ((u, du), (v, dv)) = (along(0), along(1));
+        Some(UvGradients { uv: [u, v], gradients: [du, dv] })
+    }
+
+    /// Returns the colour of the triangle with the id `triangle_tag` of mesh `item`; `None` if the
+    /// mesh file has no colours.
+    #[inline(never)]
+    pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, triangle_tag: L) -> Option<Vec3<L>> {
+        let mesh = self.items[item].mesh.mesh();
+        mesh.color(0)?;
+        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
+        let white = [1.0; 3];
+        Some(Vec3::from_fn(|lane| {
+            mesh.color(number(lane)).unwrap_or(white).map(|x| S::from_f64(f64::from(x)))
+        }))
+    }
+
+    /// Returns `true` if some mesh has interpolated normals.
+    pub fn is_smooth(&self) -> bool {
+        self.items.iter().any(|item| item.smooth)
+    }
+
+    /// Returns `true` if some mesh has vertex or face colours.
+    pub fn is_colored(&self) -> bool {
+        self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangle_distance_to_face_edge_and_corner() {
+        let point = DVec3::new(0.3, 0.2, 0.1);
+        let [a, b, c] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert!((triangle_distance([a, b, c], point) - 0.1).abs() < 1e-15);
+        assert!(
+            (triangle_distance([a, b, c], DVec3::new(1.0, 1.0, 0.0)) - 0.5f64.sqrt()).abs() < 1e-15
+        );
+        assert!((triangle_distance([a, b, c], DVec3::new(-1.0, 0.0, 0.0)) - 1.0).abs() < 1e-15);
+        assert!((triangle_distance([a, b, c], DVec3::new(0.5, -2.0, 0.0)) - 2.0).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,192 @@
+//! Worker of a session that shows films of other processes: it reads film files when they are
+//! replaced, and publishes snapshots of the sum of all films.
+
+use crate::export::{update_display, update_metadata};
+use crate::film::file::FilmFileHeader;
+use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
+use crate::plan::{WatchedFilms, WatchedShards};
+use crate::session::Command;
+use crate::session::active_render::WorkContext;
+use crate::session::picture::{Picture, Source};
+use crate::session::report::Report;
+use crate::session::snapshot::{Frame, tile_estimates};
+use crossbeam_channel::{Receiver, RecvTimeoutError};
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant, SystemTime};
+
+/// Interval at which the watched film files are checked.
+const POLL: Duration = Duration::from_secs(1);
+/// Smallest pause after a check of the watched files, as a multiple of the duration of this check.
+/// With 2, checks take at most a third of the time.
+const REST: u32 = 2;
+
+/// State of the film files that a session watches. A film states size, display transform and scene
+/// file; before the first film they are those of the plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WatchReport {
+    /// Rows of [`WatchedFilms::shards`], with ages in whole seconds below a minute, and else in
+    /// whole minutes.
+    pub shards: Vec<WatchedShards>,
+    /// Value of [`WatchedFilms::complete_shards`].
+    pub complete: Option<[usize; 2]>,
+    /// Value of [`WatchedFilms::progress`].
+    pub progress: Option<f64>,
+    /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
+    /// plan.
+    pub target_codes: Option<f64>,
+    /// Width and height of the picture in pixels. `None` if they are unknown.
+    pub size: Option<[u32; 2]>,
+    /// Display transform of the picture.
+    pub display: Display,
+    /// Path of the scene file; empty if it is unknown.
+    pub source: String,
+}
+
+pub(super) struct Watcher {
+    films: WatchedFilms,
+    context: WorkContext,
+    /// Display transform that the client has set in place of the one in the film files.
+    display: Option<Display>,
+    /// `None` without a film.
+    shown: Option<Shown>,
+    downsample: Option<IncrementalDownsample>,
+    /// Latest report that was sent to the client.
+    reported: Option<WatchReport>,
+}
+
+/// Header, report and noise estimates of the sum of all films, under the present display transform.
+struct Shown {
+    header: FilmFileHeader,
+    report: Report,
+    tiles: Vec<Option<TileNoise>>,
+}
+
+impl Watcher {
+    pub fn new(films: WatchedFilms, context: WorkContext) -> Self {
+        Self { films, context, display: None, shown: None, downsample: None, reported: None }
+    }
+
+    pub fn run(mut self, inbox: &Receiver<Command>, on_report: &dyn Fn(WatchReport)) {
+        self.estimate();
+        let mut changed = false;
+        let mut due = Instant::now();
+        loop {
+            match inbox.recv_deadline(due) {
+                Ok(Command::View(view)) => {
+                    changed |= std::mem::replace(&mut self.context.view, view) != view;
+                }
+                Ok(Command::Display(display)) => {
+                    self.display = Some(display);
+                    self.estimate();
+                    changed = true;
+                }
+                Ok(Command::Task(task)) => task(self.picture()),
+                Ok(Command::Quit) | Err(RecvTimeoutError::Disconnected) => return,
+                Ok(
+                    Command::Scene(..)
+                    | Command::Resume(..)
+                    | Command::Restart(_)
+                    | Command::Pause(_)
+                    | Command::Stop(_)
+                    | Command::Pool(_),
+                ) => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    let start = Instant::now();
+                    if self.films.poll() {
+                        // The cache finds changed tiles by their sample counts. It is dropped,
+                        // because equal counts in two sums of films do not mean equal samples.
+                        self.downsample = None;
+                        self.estimate();
+                        changed = true;
+                    }
+                    self.report(on_report);
+                    due = Instant::now() + POLL.max(REST * start.elapsed());
+                }
+            }
+            if changed && inbox.is_empty() {
+                self.publish();
+                changed = false;
+            }
+        }
+    }
+
+    fn picture(&self) -> Option<Picture<'_>> {
+        let (film, Shown { header, report, .. }) = self.films.film().zip(self.shown.as_ref())?;
+        Some(Picture { film, mix: &header.weights, report, source: Source::Files(header) })
+    }
+
+    /// Estimates the noise of the picture that the sum of all films shows.
+    fn estimate(&mut self) {
+        self.shown = self.films.film().zip(self.films.header()).and_then(|(film, header)| {
+            let mut header = header.clone();
+            header.display = self.display.unwrap_or(header.display);
+            let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
+            let pool = &self.context.pool;
+            let tiles = tile_estimates(film, &estimator, pool, &AtomicBool::new(false))?;
+            let report = Report {
+                generation: 1,
+                rays: self.films.rays(),
+                seconds: self.films.seconds(),
+                noise: Noise::of_tiles(tiles.iter().copied()),
+                progress: self.films.progress(),
+                threads: pool.current_num_threads(),
+                ..Report::of_samples(film)
+            };
+            update_metadata(&mut header.metadata, &report);
+            update_display(&mut header.metadata, &header.display);
+            Some(Shown { header, report, tiles })
+        });
+    }
+
+    fn publish(&mut self) {
+        let Some((film, shown)) = self.films.film().zip(self.shown.as_ref()) else { return };
+        let Shown { header, report, tiles } = shown;
+        let frame = Frame {
+            view: self.context.view,
+            mix: header.weights.clone(),
+            display: header.display,
+            lighting: None,
+            first_hits: None,
+        };
+        let (downsample, pool) = (&mut self.downsample, &self.context.pool);
+        self.context.put(frame.snapshot(film, tiles, report.clone(), downsample, pool));
+    }
+
+    /// Sends a report to the client if it differs from the latest one.
+    fn report(&mut self, on_report: &dyn Fn(WatchReport)) {
+        let report = WatchReport::new(&self.films);
+        if self.reported.as_ref() != Some(&report) {
+            on_report(report.clone());
+            self.reported = Some(report);
+        }
+    }
+}
+
+impl WatchReport {
+    fn new(films: &WatchedFilms) -> Self {
+        let mut shards = films.shards(SystemTime::now());
+        for age in shards.iter_mut().filter_map(|row| row.age.as_mut()) {
+            let seconds = age.as_secs();
+            let unit = if seconds < 60 { 1 } else { 60 };
+            *age = Duration::from_secs(seconds / unit * unit);
+        }
+        let settings = films.plan().map(|plan| &plan.settings);
+        let (size, display, source) = match (films.header(), settings) {
+            (Some(header), _) => {
+                let size = [header.film.width, header.film.height].map(|n| n as u32);
+                (Some(size), header.display, header.source().unwrap_or_default())
+            }
+            (None, Some(plan)) => (Some(plan.size), plan.display, plan.source.as_str()),
+            (None, None) => (None, Display::default(), ""),
+        };
+        Self {
+            shards,
+            complete: films.complete_shards(),
+            progress: films.progress(),
+            target_codes: settings.map(|plan| plan.noise_codes),
+            size,
+            display,
+            source: source.to_string(),
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! BVH over the triangles of a mesh, built once per mesh. A leaf has up to eight triangles in
+//! structure-of-arrays layout. A single ray is intersected with all eight at once; a packet of rays
+//! is intersected with one triangle after the other.
+
+use crate::asset::mesh::TriangleMesh;
+use crate::asset::mesh::normals::smooth;
+use crate::value::insertion_sort;
+use std::fmt;
+use std::sync::OnceLock;
+use zerkalo_kernel::bvh::build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
+
+/// Leaf of a mesh's BVH: up to eight triangles. The coordinates of unused slots are NaN.
+#[derive(Clone, Debug)]
+#[repr(align(32))]
+pub struct TriangleBlock {
+    /// Coordinates of the triangles' corners, indexed by `[corner][axis][triangle]`.
+    pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
+}
+
+/// Triangle mesh with its BVH. Memory: about 58 bytes per triangle for the BVH, 12 per triangle for
+/// vertex indices, and 12 to 32 per vertex.
+pub struct Mesh {
+    mesh: TriangleMesh,
+    boxes: Bvh8,
+    leaves: Vec<TriangleBlock>,
+    /// Index of the first triangle of each BVH leaf. The triangles of a leaf have consecutive
+    /// indices.
+    firsts: Vec<u32>,
+    smooth: OnceLock<Vec<[f32; 3]>>,
+}
+
+/// Two meshes are equal only if they are the same allocation. Two meshes that were read from the
+/// same file are therefore not equal.
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
+}
+
+impl fmt::Debug for Mesh {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Mesh")
+            .field("triangles", &self.mesh.triangles.len())
+            .field("bounds", &self.mesh.bounds)
+            .finish_non_exhaustive()
+    }
+}
+
+impl TriangleBlock {
+    fn new(mesh: &TriangleMesh, first: u32, count: u32) -> Self {
+        let mut leaf = Self { corners: [[[f32::NAN; BVH_WIDTH]; 3]; 3] };
+        let triangles = &mesh.triangles[first as usize..][..count as usize];
+        for (i, triangle) in triangles.iter().enumerate() {
+            for (corner, vertex) in leaf.corners.iter_mut().zip(triangle) {
+                let position = mesh.positions[*vertex as usize];
+                for (axis, x) in corner.iter_mut().zip(position) {
+                    axis[i] = x;
+                }
+            }
+        }
+        leaf
+    }
+}
+
+impl Mesh {
+    /// Builds the BVH of a mesh. The triangles are reordered so that those of a leaf are
+    /// consecutive.
+    pub fn new(mut mesh: TriangleMesh) -> Self {
+        let corners = |i: usize| {
+            let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
+            let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
+            [reduce(f32::min), reduce(f32::max)]
+        };
+        // A high traversal cost gives large leaves. Large leaves are cheap, because a single ray is
+        // intersected with all triangles of a leaf at once by SIMD.
+        let quality = BuildQuality { traversal_cost: 8.0, ..BuildQuality::FAST };
+        let Bvh8Build { bvh: boxes, order, leaves } =
+            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
+        mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
+        if !mesh.color_of.is_empty() {
+            mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
+        }
+        let firsts = leaves.iter().map(|(first, _)| *first).collect();
+        let leaves =
+            leaves.iter().map(|(first, count)| TriangleBlock::new(&mesh, *first, *count)).collect();
+        Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
+    }
+
+    /// Returns the triangles of the mesh, in the order of the BVH's leaves.
+    pub fn mesh(&self) -> &TriangleMesh {
+        &self.mesh
+    }
+
+    /// Returns the inner nodes of the mesh's BVH, without its leaves.
+    pub fn boxes(&self) -> &Bvh8 {
+        &self.boxes
+    }
+
+    /// Returns the leaves of the mesh's BVH, as blocks of triangles.
+    pub fn leaves(&self) -> &[TriangleBlock] {
+        &self.leaves
+    }
+
+    /// Returns the index of the first triangle of a BVH leaf. The triangles of a leaf have
+    /// consecutive indices.
+    pub fn first_triangle(&self, leaf: usize) -> u32 {
+        self.firsts[leaf]
+    }
+
+    /// Returns a unit normal per vertex. If the file has normals, these are returned. Otherwise a
+    /// vertex has the mean normal of the adjacent triangles; the first call computes these means.
+    pub fn smooth_normals(&self) -> &[[f32; 3]] {
+        match &self.mesh.normals {
+            Some(normals) => normals,
+            None => self.smooth.get_or_init(|| smooth(&self.mesh.positions, &self.mesh.triangles)),
+        }
+    }
+
+    /// Returns the largest dot product of `direction` with a corner of a triangle: the support
+    /// function of the mesh.
+    pub fn support(&self, direction: [f64; 3]) -> f64 {
+        let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
+        let mut best = f64::NEG_INFINITY;
+        let mut stack = vec![(0u32, f64::INFINITY)];
+        while let Some((index, bound)) = stack.pop() {
+            if bound <= best {
+                continue;
+            }
+            let node = &self.boxes.nodes()[index as usize];
+            let first = stack.len();
+            for i in node.children() {
+                let reach = |a| along(a, node.bounds[a][i]).max(along(a, node.bounds[a + 3][i]));
+                let bound: f64 = (0..3).map(reach).sum();
+                if bound <= best {
+                    continue;
+                }
+                if node.child[i] & LEAF_FLAG == 0 {
+                    stack.push((node.child[i], bound));
+                    continue;
+                }
+                let leaf = &self.leaves[(node.child[i] & !LEAF_FLAG) as usize];
+                for [x, y, z] in &leaf.corners {
+                    for ((x, y), z) in x.iter().zip(y).zip(z) {
+                        // `max` ignores the NaNs of unused slots.
+                        best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
+                    }
+                }
+            }
+            insertion_sort(&mut stack[first..], |(_, bound)| *bound);
+        }
+        best
+    }
+
+    /// Returns the memory of the mesh and its BVH in bytes.
+    pub fn bytes(&self) -> usize {
+        self.mesh.bytes()
+            + self.boxes.bytes()
+            + (size_of::<TriangleBlock>() + size_of::<u32>()) * self.leaves.len()
+            + self.smooth.get().map_or(0, |n| 12 * n.len())
+    }
+}

@@ -1,0 +1,120 @@
+//! OKLab: a colour space in which distances approximate visible differences.
+//!
+//! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
+//! linear sRGB as he published them in 2021.
+
+use std::sync::LazyLock;
+use zerkalo_scene::value::linear_from_srgb;
+
+/// Colour in the OKLab colour space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Oklab {
+    /// Lightness, from 0 (black) to 1 (white).
+    pub l: f32,
+    /// Green (negative) to red (positive). The range within sRGB is -0.24..=0.28.
+    pub a: f32,
+    /// Blue (negative) to yellow (positive). The range within sRGB is -0.32..=0.2.
+    pub b: f32,
+}
+
+/// Linear light, 0..=1, of each 8-bit sRGB level (IEC 61966-2-1).
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
+
+/// Converts 8-bit sRGB to linear light, 0..=1.
+pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
+    let table = &*LINEAR;
+    rgb.map(|code| table[usize::from(code)])
+}
+
+/// Converts linear light to the nearest 8-bit sRGB level, by the distance in linear light. `linear`
+/// is clamped to 0..=1.
+pub(crate) fn code(linear: f32) -> u8 {
+    let table = &*LINEAR;
+    let above = table.partition_point(|l| *l < linear).min(255);
+    let below = above.saturating_sub(1);
+    if linear - table[below] < table[above] - linear { below as u8 } else { above as u8 }
+}
+
+impl Oklab {
+    /// Converts 8-bit sRGB to OKLab.
+    pub fn of(rgb: [u8; 3]) -> Self {
+        Self::of_linear(linear(rgb))
+    }
+
+    /// Converts linear sRGB to OKLab. Components are usually in 0..=1.
+    pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
+        let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
+        let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
+        let s = (0.088_302_46 * r + 0.281_718_84 * g + 0.629_978_7 * b).cbrt();
+        Self {
+            l: 0.210_454_26 * l + 0.793_617_8 * m - 0.004_072_047 * s,
+            a: 1.977_998_5 * l - 2.428_592_2 * m + 0.450_593_7 * s,
+            b: 0.025_904_037 * l + 0.782_771_77 * m - 0.808_675_77 * s,
+        }
+    }
+
+    /// Returns the Euclidean distance of two colours. It is 1 between black and white. Differences
+    /// of about 0.02 are just visible side by side.
+    pub fn distance(self, other: Self) -> f32 {
+        self.distance_squared(other).sqrt()
+    }
+
+    pub(crate) fn distance_squared(self, other: Self) -> f32 {
+        let (l, a, b) = (self.l - other.l, self.a - other.a, self.b - other.b);
+        l * l + a * a + b * b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(got: Oklab, [l, a, b]: [f32; 3], tolerance: f32) {
+        let worst = (got.l - l).abs().max((got.a - a).abs()).max((got.b - b).abs());
+        assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
+    }
+
+    /// Checks the conversion from XYZ to OKLab against the pairs of colours in the publication of
+    /// OKLab, which gives them rounded to three places.
+    #[test]
+    fn oklab_matches_published_pairs() {
+        // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).
+        let from_xyz = |[x, y, z]: [f32; 3]| {
+            [
+                3.240_625_5 * x - 1.537_208 * y - 0.498_628_6 * z,
+                -0.968_930_7 * x + 1.875_756_1 * y + 0.041_517_524 * z,
+                0.055_710_12 * x - 0.204_021_05 * y + 1.056_995_9 * z,
+            ]
+        };
+        for (xyz, lab) in [
+            ([0.950, 1.000, 1.089], [1.000, 0.000, 0.000]),
+            ([1.000, 0.000, 0.000], [0.450, 1.236, -0.019]),
+            ([0.000, 1.000, 0.000], [0.922, -0.671, 0.263]),
+            ([0.000, 0.000, 1.000], [0.153, -1.415, -0.449]),
+        ] {
+            near(Oklab::of_linear(from_xyz(xyz)), lab, 2e-3);
+        }
+    }
+
+    /// Checks the OKLab values of the sRGB primaries against CSS Color 4 and its test suite.
+    #[test]
+    fn oklab_of_primaries_matches_css() {
+        near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);
+        near(Oklab::of([0, 0, 0]), [0.0, 0.0, 0.0], 1e-6);
+        near(Oklab::of([255, 0, 0]), [0.627_96, 0.224_86, 0.125_85], 1e-4);
+        near(Oklab::of([0, 255, 0]), [0.866_44, -0.233_89, 0.179_5], 1e-4);
+        near(Oklab::of([0, 0, 255]), [0.452_01, -0.032_46, -0.311_53], 1e-4);
+    }
+
+    #[test]
+    fn levels_and_linear_light_round_trip() {
+        for c in 0..=255u8 {
+            assert_eq!(code(linear([c; 3])[0]), c);
+        }
+        assert_eq!([code(-1.0), code(2.0), code(f32::NAN)], [0, 255, 0]);
+        // The threshold between two levels is the midpoint of their linear light.
+        let [low, high] = [100, 101].map(|c| linear([c; 3])[0]);
+        assert_eq!([code(0.51 * low + 0.49 * high), code(0.49 * low + 0.51 * high)], [100, 101]);
+    }
+}
