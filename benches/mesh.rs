@@ -13,8 +13,8 @@ use std::hint::black_box;
 use std::time::Instant;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo_kernel::primitive::triangle_mesh;
-use zerkalo_scene::asset::Mesh;
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::mesh::intersection;
 
 /// Number of random rays in each measurement.
 const RAYS: usize = 1 << 19;
@@ -79,8 +79,8 @@ fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) ->
             let hits: u32 = rays
                 .iter()
                 .map(|ray| match as_packet {
-                    None => triangle_mesh::closest(mesh, ray, limit),
-                    Some(as_packet) => triangle_mesh::closest_with(mesh, ray, limit, as_packet),
+                    None => intersection::closest(mesh, ray, limit),
+                    Some(as_packet) => intersection::closest_with(mesh, ray, limit, as_packet),
                 })
                 .map(|hit| hit.t.lt(limit).bits().count_ones())
                 .sum();

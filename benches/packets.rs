@@ -19,12 +19,12 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::Mesh;
 use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo_render::pass::{self, PassContext};
 use zerkalo_render::wave::{Job, Wave};
-use zerkalo_scene::asset::Mesh;
 use zerkalo_scene::{Document, Scene};
 use zerkalo_world::World;
 

@@ -7,19 +7,19 @@ use crate::command::regions::Division;
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
 use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
-use zerkalo_scene::disk::{self, WriteError, check_writable};
-use zerkalo_render::film::ImageOutput;
-use zerkalo_scene::process_memory::resident_memory;
-use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{Checkpoint, Options, RegionRender};
-use zerkalo_kernel::sampling::SampleSettings;
-use zerkalo_scene::Scene;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::film::ImageOutput;
+use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo_render::session::{Report, Session, State};
+use zerkalo_render::{Checkpoint, Options, RegionRender};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::{self, WriteError, check_writable};
+use zerkalo_scene::process_memory::resident_memory;
 
 /// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
 /// of an 8-bit file.

@@ -1,5 +1,8 @@
 //! Messages that `update` receives, and effects that it returns.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage};
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{Snapshot, View, WatchReport};
@@ -7,9 +10,6 @@ use zerkalo_scene::{SaveError, Scene, SceneErrors};
 use zerkalo_terminal::event::{Key, Mouse};
 use zerkalo_terminal::flow::LinkStatus;
 use zerkalo_terminal::image::ViewerImage;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Message to `update`: an event that changes the model.
 #[derive(Debug)]

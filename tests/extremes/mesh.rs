@@ -9,9 +9,10 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::sync::Arc;
 use zerkalo_kernel::lanes::{Double, Mask, SimdFloat, Single};
+use zerkalo_kernel::primitive::Mesh;
 use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
 use zerkalo_scene::Scene;
-use zerkalo_scene::asset::{Assets, Mesh};
+use zerkalo_scene::asset::Assets;
 use zerkalo_world::{AnyWorld, Options};
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`

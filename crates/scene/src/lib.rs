@@ -5,6 +5,9 @@
 //! without such an edit. A render session (the rendering thread) therefore validates the scene that
 //! it is given.
 
+#[cfg(not(unix))]
+compile_error!("zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX file locks.");
+
 pub mod asset;
 pub mod camera;
 pub mod disk;
@@ -14,6 +17,7 @@ pub mod process_memory;
 pub mod shape;
 pub mod value;
 
+mod acceleration;
 mod asset_resolver;
 mod builtin;
 mod contents_hash;
@@ -31,6 +35,7 @@ mod validate;
 
 pub use crate::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
+pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
 pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};
@@ -43,7 +48,6 @@ pub use settings::{
     Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings, RayTypes,
 };
 pub use validate::Problem;
-pub use zerkalo_kernel::primitive::Acceleration;
 
 use crate::camera::Camera;
 use crate::light::Light;

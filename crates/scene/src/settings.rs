@@ -1,7 +1,7 @@
 //! Settings of the whole picture: film, integrator, background, ambient light.
 
+use crate::Acceleration;
 use crate::value::{Color, choices, description};
-use zerkalo_kernel::primitive::Acceleration;
 
 description! {
     /// Film settings: size, pixel filter, sample limit of glossy pixels.

@@ -8,13 +8,13 @@ use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene_and_warn};
-use zerkalo_scene::disk::{self, check_writable};
-use zerkalo_render::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
-use zerkalo_world::{self as world, AnyWorld};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
+use zerkalo_render::film::{self, Display};
+use zerkalo_scene::disk::{self, check_writable};
+use zerkalo_world::{self as world, AnyWorld};
 
 /// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];

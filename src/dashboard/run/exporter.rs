@@ -5,20 +5,20 @@ use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::export_paths::{numbered, scp};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use zerkalo_scene::disk::Existing;
-use zerkalo_render::film::{Depth, ImageOutput};
-use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Picture, Session, State};
-use zerkalo_render::{EncodedCheckpoint, Options};
-use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::Scene;
 use crossbeam_channel::{Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::film::{Depth, ImageOutput};
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::session::{Picture, Session, State};
+use zerkalo_render::{EncodedCheckpoint, Options};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::Existing;
 
 /// Interval at which the progress of a render for an exported image is polled.
 const LOOK: Duration = Duration::from_millis(200);

@@ -7,7 +7,6 @@ use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
@@ -15,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);

@@ -15,6 +15,7 @@ mod input;
 mod job_control;
 mod latency;
 mod shared_file;
+mod shrink;
 mod signals;
 mod watch_runner;
 mod worker;
@@ -23,15 +24,6 @@ mod writer;
 use crate::dashboard::message::{Effect, Exported, Message};
 use crate::dashboard::model::Model;
 use crate::dashboard::update::update;
-use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::schedule::{Settings, Stop};
-use zerkalo_render::session::{Snapshot, State};
-use zerkalo_render::{Checkpoint, Options};
-use zerkalo_scene::{SceneErrors, SceneFile};
-use zerkalo_terminal::flow::LinkStatus;
-use zerkalo_terminal::{
-    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
-};
 use crossbeam_channel::{Receiver, after, never, select, unbounded};
 use effects::{EffectRunner, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
@@ -44,6 +36,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use watch_runner::WatchRunner;
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::{
+    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
+};
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};

@@ -5,15 +5,15 @@ use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
 use crate::dashboard::run::exporter::Exporter;
 use crate::dashboard::run::frames::FramePipeline;
-use zerkalo_render::film::LinearImage;
-use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::session::{Session, Snapshot};
-use zerkalo_kernel::sampling::SamplerKind;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::film::LinearImage;
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::session::{Session, Snapshot};
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {

@@ -8,13 +8,13 @@ use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns, paragraphs, skip};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::film::Display;
-use zerkalo_scene::edit::{Property, Widget};
-use zerkalo_scene::value::{number, round_significant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
+use zerkalo_render::film::Display;
+use zerkalo_scene::edit::{Property, Widget};
+use zerkalo_scene::value::{number, round_significant};
 
 /// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
 /// the property under the cursor.

@@ -23,13 +23,13 @@ mod watch;
 use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use zerkalo_terminal::cells::{Colors, PictureCells};
 use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use text::Row;
 use theme::Theme;
+use zerkalo_terminal::cells::{Colors, PictureCells};
 
 /// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]
@@ -70,7 +70,9 @@ impl View {
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
             let cells = image_viewer::draw(model, viewed, &theme, buffer);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
-                (Some(cells), Some(image)) => picture::visible_mask(&cells, image.place, buffer),
+                (Some(cells), Some(image)) => {
+                    picture::visible_mask(&cells, image.layout.place, buffer)
+                }
                 _ => (Rect::ZERO, Vec::new()),
             };
             return None;

@@ -10,10 +10,10 @@ use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::session::QUALITIES;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
+use zerkalo_render::session::QUALITIES;
 
 /// Draws the open overlay. Returns the position of the text cursor, or `None` if the cursor is
 /// hidden.

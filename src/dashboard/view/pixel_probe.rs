@@ -5,11 +5,11 @@ use crate::dashboard::model::Model;
 use crate::dashboard::view::frame::overlay;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::film::quantised_8;
-use zerkalo_scene::edit::Target;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
+use zerkalo_render::film::quantised_8;
+use zerkalo_scene::edit::Target;
 
 /// Width in columns of the box with the values of the probed pixel, with its border.
 const WIDTH: u16 = 36;

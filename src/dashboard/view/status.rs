@@ -6,13 +6,13 @@ use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, State};
 use zerkalo_terminal::Multiplexer;
 use zerkalo_terminal::flow::PacingMode;
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::style::{Modifier, Style};
 
 /// Part of the status line, such as the noise or the sample count. A part is shown or omitted as a
 /// whole.

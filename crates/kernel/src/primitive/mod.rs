@@ -14,30 +14,29 @@ mod csg_interval;
 pub(crate) mod csg_tree;
 pub(crate) mod ellipsoid;
 pub(crate) mod form;
-pub(crate) mod item_box;
-pub(crate) mod mesh_instance;
+pub mod mesh;
 mod parallelogram;
 mod plane;
+pub(crate) mod primitive_box;
 mod scene_bvh;
 mod shading_normal;
 pub(crate) mod solid;
 pub(crate) mod sphere;
 mod torus;
-pub mod triangle_mesh;
 
-pub use aggregate::{Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
+pub use aggregate::{AccelerationStructure, Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
 pub use batch::{PrimitiveId, SurfacePoint, UvGradients};
 pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
 pub use canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, box_distance,
 };
-pub use conical_frustum::ConicalFrustumForm;
+pub use conical_frustum::{AROUND_TIP, ConicalFrustumForm};
 pub use convex_polyhedron::ConvexPolyhedronForm;
 pub use csg_tree::{CsgSolid, CsgTree};
 pub use ellipsoid::EllipsoidForm;
 pub use form::Form;
-pub use item_box::Acceleration;
-pub use mesh_instance::MeshForm;
+pub use mesh::instance::MeshForm;
+pub use mesh::{Mesh, TriangleMesh};
 pub use parallelogram::ParallelogramForm;
 pub use plane::PlaneForm;
 pub use shading_normal::keep_visible;

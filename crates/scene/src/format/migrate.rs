@@ -2,13 +2,13 @@
 //! are called former words. Reading treats a former word like the present word; saving writes the
 //! present word.
 
+use crate::Acceleration;
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::format::parts::Part;
 use crate::format::source_map::{line_column, subject_in};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml_edit::{DocumentMut, Item, Key};
-use zerkalo_kernel::primitive::Acceleration;
 
 /// Key or value that was renamed: `(former name, current name)`.
 type Pair = (&'static str, &'static str);

@@ -1,11 +1,11 @@
 //! Triangle meshes from files.
 
-use crate::asset::{AssetError, Loaded, Mesh, TriangleMesh};
+use crate::asset::{AssetError, Loaded};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{ValidationError, choices, description};
 use glam::{DAffine3, DVec3};
 use std::sync::{Arc, LazyLock};
-use zerkalo_kernel::primitive::{Form, MeshForm};
+use zerkalo_kernel::primitive::{Form, Mesh, MeshForm, TriangleMesh};
 
 description! {
     /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by

@@ -5,16 +5,16 @@
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
-use zerkalo_render::film::Display;
-use zerkalo_render::Options;
-use zerkalo_render::schedule::{Criterion, Settings, Stop};
-use zerkalo_render::session::{Session, Snapshot, State, View};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_terminal::diff::Encoder;
-use zerkalo_world as world;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::Options;
+use zerkalo_render::film::Display;
+use zerkalo_render::schedule::{Criterion, Settings, Stop};
+use zerkalo_render::session::{Session, Snapshot, State, View};
+use zerkalo_terminal::diff::Encoder;
+use zerkalo_world as world;
 
 fn rendered(model: &Model, spp: u32) -> Snapshot {
     let options = Options {

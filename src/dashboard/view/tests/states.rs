@@ -9,6 +9,8 @@ use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};
 use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
@@ -16,8 +18,6 @@ use zerkalo_render::session::{
 };
 use zerkalo_scene::edit::{self, Target};
 use zerkalo_scene::{Scene, built_in};
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));

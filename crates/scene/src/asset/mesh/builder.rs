@@ -3,10 +3,11 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::normals::smooth;
-use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES};
 use glam::DVec3;
 use std::collections::HashMap;
+use zerkalo_kernel::primitive::TriangleMesh;
+use zerkalo_kernel::primitive::mesh::smooth;
 
 /// Largest absolute value of a mesh coordinate.
 const MAX_COORDINATE: f64 = 1e9;

@@ -8,7 +8,6 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use crate::value::truncated;
 use base64::Engine;
@@ -17,6 +16,7 @@ use gltf::accessor::{DataType, Dimensions};
 use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Node, Primitive, Semantic};
 use std::borrow::Cow;
+use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Parses a glTF or GLB file.
 ///

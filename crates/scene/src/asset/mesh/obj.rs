@@ -6,13 +6,13 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use crate::value::truncated;
 use std::cell::RefCell;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 use tobj::{LoadError, LoadOptions, MTLLoadResult};
+use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Largest size of an MTL file in bytes: 16 MiB.
 const MAX_MTL_BYTES: u64 = 16 << 20;

@@ -3,13 +3,13 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
     ScalarType,
 };
+use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Number of PLY elements that the parser library parses at a time. It limits the memory for parsed
 /// elements.

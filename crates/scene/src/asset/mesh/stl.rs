@@ -4,9 +4,9 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
+use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Number of bytes of the header of a binary STL file.
 const HEADER: usize = 84;

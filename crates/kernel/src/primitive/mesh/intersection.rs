@@ -12,7 +12,7 @@ use crate::bvh::packet::{
 };
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
-use zerkalo_scene::asset::{Mesh, TriangleBlock};
+use crate::primitive::mesh::{Mesh, TriangleBlock};
 
 /// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
 /// whole. The rays of other packets traverse it separately.
