@@ -1,10 +1,10 @@
 //! Lengths of directions: a direction of any length that a file can contain gives the same picture.
 
 use crate::common::tables::{keys, scene, table, value_at};
-use crate::support::test_film::TestFilm;
 use crate::support::{parsed, rendered};
 use std::collections::BTreeSet;
 use toml::Value;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_scene::value::{Field, ValueType};
 use zerkalo_scene::{FIELDS, Scene};
 use zerkalo_world::Precision;

@@ -1,10 +1,10 @@
 //! Checkpoints of the dashboard, which are written on request and continued after a kill.
 
 use super::*;
-use crate::support::test_film::TestFilm;
 use std::time::{Duration, Instant};
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1

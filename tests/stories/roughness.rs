@@ -2,8 +2,8 @@
 //! leave all others equal in every bit.
 
 use crate::stories::simulated_dashboard::Desk;
-use crate::support::test_film::TestFilm;
 use crate::support::{pool, rendered, sized};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::{FirstHitBuffer, RenderState};
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{BUILT_IN, Scene};

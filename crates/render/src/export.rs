@@ -1,8 +1,9 @@
 //! Export of pictures as files, with metadata about their origin. The metadata hold no dates,
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
+use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Display, ImageOutput};
+use crate::image_file::{Depth, ImageOutput};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
@@ -36,7 +37,7 @@ impl RenderState {
         depth: Depth,
         output: &ImageOutput,
     ) -> Result<(), WriteError> {
-        film_header(self, report, provenance).write_picture(&self.film, depth, output)
+        output.write_film(&film_header(self, report, provenance), &self.film, depth)
     }
 }
 
@@ -117,7 +118,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let noise = match report.noise {
         Some(n) => format!(
             "{:.4} 8-bit levels, {:.4} in 95% of the tiles, linear RMSE {:.6e}",
-            n.rmse_codes, n.p95_codes, n.rmse_linear
+            n.rmse_levels, n.p95_levels, n.rmse_linear
         ),
         None => "unknown".to_string(),
     };

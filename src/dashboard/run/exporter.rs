@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::{Depth, ImageOutput};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::Settings;
 use zerkalo_render::session::{Picture, Session, State};
 use zerkalo_render::{EncodedCheckpoint, Options};
@@ -45,7 +45,7 @@ impl Exporter {
         let header = picture.header(|scene| self.provenance(scene));
         let write = |path: &Path| {
             let output = ImageOutput::from_path(path)?.create_new();
-            header.write_picture(picture.film, Depth::Eight, &output)
+            output.write_film(&header, picture.film, Depth::Eight)
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;
@@ -54,7 +54,7 @@ impl Exporter {
             path,
             size: [picture.film.width(), picture.film.height()],
             spp: picture.report.spp.mean,
-            noise_codes: picture.report.noise.map(|noise| noise.rmse_codes),
+            noise_levels: picture.report.noise.map(|noise| noise.rmse_levels),
         })
     }
 
