@@ -111,8 +111,7 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries of a picture that depend on the film alone: samples per pixel,
-/// noise, and the numbers of bad samples (NaN or negative) and of saturated samples (above the
-/// film's limit).
+/// noise, and the numbers of bad samples and of saturated samples.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {

@@ -1,8 +1,8 @@
 //! Watched films: film files that other processes write, and the sum of their films. A file is read
 //! again when it is replaced.
 //!
-//! After a change all films are added again, which takes the memory of one film, whatever the number
-//! of files.
+//! After a change all films are added again, which takes the memory of one film, whatever the
+//! number of files.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
@@ -383,8 +383,8 @@ impl WatchedFilms {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns the plan that all files share, with all shards in the files. Returns `None` without a
-    /// shard.
+    /// Returns the plan that all files share, with all shards in the files. Returns `None` without
+    /// a shard.
     pub(super) fn part(&self) -> Option<Part> {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
