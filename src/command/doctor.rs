@@ -2,8 +2,8 @@
 //! dashboard uses them, and how to improve them.
 
 use crate::command::{Failure, print_line};
-use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
+use crate::dashboard::text::wrapped;
 use crate::scene::{kept_in, state_folder};
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use crate::terminal::image::Protocol;

@@ -6,7 +6,7 @@ use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::overlay_layout::wrapped;
+use crate::dashboard::text::wrapped;
 use crate::film::{Display, LinearImage, PixelProbe};
 use crate::render::schedule::Stop;
 use crate::render::session::{Snapshot, WatchReport};
@@ -313,7 +313,7 @@ impl Model {
             (None, Focus::Picture, mode) => match mode {
                 Mode::Orbit => KeyContext::Picture,
                 Mode::Move => KeyContext::Moving,
-                Mode::Rotate => KeyContext::Turning,
+                Mode::Rotate => KeyContext::Rotating,
                 Mode::Fly => KeyContext::Flying,
                 Mode::Probe => KeyContext::Probing,
             },

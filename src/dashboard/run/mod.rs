@@ -195,7 +195,7 @@ fn run_on_terminal(
     // This message also informs the renderer of the size of the picture in half cells (upper and
     // lower halves of terminal cells).
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
-    let result = dashboard.watch();
+    let result = dashboard.event_loop();
     // If the user quits, the program waits without limit for pictures that are being written. If a
     // signal or the loss of the terminal ends it, the wait is limited.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
@@ -254,7 +254,7 @@ struct Dashboard {
 impl Dashboard {
     /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
     /// loss of the terminal ends the program, and `None` if the user quits.
-    fn watch(&mut self) -> io::Result<Option<u8>> {
+    fn event_loop(&mut self) -> io::Result<Option<u8>> {
         let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
         let wakeup = self.effects.wakeup().clone();
         let done = self.done.clone();

@@ -255,7 +255,7 @@ pub const STATES: &[Named] = &[
         select_first(m);
         m.mode = Mode::Move;
     }),
-    ("turning", |m| {
+    ("rotating", |m| {
         select_first(m);
         m.mode = Mode::Rotate;
     }),
