@@ -6,10 +6,10 @@ use crate::common;
 use common::Numbers;
 use std::sync::Arc;
 use zerkalo::asset::Assets;
-use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::triangle_mesh;
+use zerkalo::primitive::Mesh;
+use zerkalo::primitive::mesh::intersection;
 
 /// Returns a closed mesh of a ball around the origin, read from OBJ. The triangles at the poles can
 /// be a thousand times as long as wide.
@@ -77,9 +77,9 @@ fn check_watertight<L: SimdFloat>(mesh: &Mesh, rays: usize) {
             origin: Vec3::<L>::of(origin),
             direction: Vec3::<L>::from_fn(|i| directions[i].map(L::Scalar::from_f64)),
         };
-        let found = triangle_mesh::closest(mesh, &ray, limit);
-        let blocked = triangle_mesh::occluded(mesh, &ray, limit);
-        let both = [true, false].map(|how| triangle_mesh::closest_with(mesh, &ray, limit, how));
+        let found = intersection::closest(mesh, &ray, limit);
+        let blocked = intersection::occluded(mesh, &ray, limit);
+        let both = [true, false].map(|how| intersection::closest_with(mesh, &ray, limit, how));
         for (i, direction) in directions.iter().enumerate() {
             let t = found.t.lane(i);
             assert!(t < limit.lane(i), "missed from {origin:?} to {direction:?}");
@@ -127,7 +127,7 @@ fn mesh_bvh_finds_same_hits_as_list() {
         let origin: [f64; 3] = std::array::from_fn(|_| 4.0 * (random.unit() - 0.5));
         let direction = unit(std::array::from_fn(|_| random.unit() - 0.5));
         let ray = Ray { origin: Vec3::<f64>::of(origin), direction: Vec3::<f64>::of(direction) };
-        let found = triangle_mesh::closest(&mesh, &ray, f64::MAX);
+        let found = intersection::closest(&mesh, &ray, f64::MAX);
         // Möller-Trumbore intersection with every triangle.
         let mut best = f64::MAX;
         for t in &mesh.mesh().triangles {

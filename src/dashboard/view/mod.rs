@@ -74,7 +74,7 @@ impl View {
             let cells = image_viewer::draw(model, viewed, painter);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
                 (Some(cells), Some(image)) => {
-                    picture::visible_mask(&cells, image.place, painter.buffer)
+                    picture::visible_mask(&cells, image.layout.place, painter.buffer)
                 }
                 _ => (Rect::ZERO, Vec::new()),
             };
