@@ -122,7 +122,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("ratatui", &["dashboard", "terminal"]),
     ("rayon", &["render"]),
     // `scene` uses rustix in tests only.
-    ("rustix", &["render", "dashboard", "terminal", "process_memory", "scene", "disk"]),
+    ("rustix", &["render", "dashboard", "terminal", "scene", "disk"]),
     ("safe_arch", &["lanes"]),
     ("serde", &["command", "measure"]),
     ("serde_json", &["command"]),
