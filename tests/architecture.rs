@@ -126,7 +126,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("safe_arch", &["lanes"]),
     ("serde", &["command", "measure"]),
     ("serde_json", &["command"]),
-    ("signal_hook", &["command", "dashboard"]),
+    ("signal_hook", &["terminal"]),
     ("stl_io", &["asset"]),
     ("strsim", &["scene"]),
     // `asset` uses tempfile in tests only.

@@ -17,13 +17,13 @@ mod progress;
 mod regions;
 mod render;
 mod shard;
-mod signals;
 mod stats;
 mod watch;
 
 pub use cpu::require as require_cpu;
 
 use crate::scene::{Document, Scene};
+use crate::terminal::{SignalQueue, Signals};
 use crate::value::sanitized;
 use crate::world::{self, Precision, requires_double};
 use args::{Cli, Command};
@@ -122,6 +122,20 @@ fn end(error: &clap::Error) -> ! {
     let printed = error.print();
     let failed = printed.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe);
     std::process::exit(if failed { 1 } else { error.exit_code() })
+}
+
+/// Handles SIGINT and SIGTERM. After the first of them the program saves the picture so far and
+/// ends; a second one ends it at once.
+fn handle_signals() -> Result<Signals, Failure> {
+    let mut is_ending = false;
+    let signals = SignalQueue::of_end().and_then(|queue| {
+        queue.handle(move |status| {
+            if std::mem::replace(&mut is_ending, true) {
+                std::process::exit(status.into());
+            }
+        })
+    });
+    signals.map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
 
 /// Prints a line on stderr. Errors of writing are ignored.

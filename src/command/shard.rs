@@ -7,8 +7,7 @@
 use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
-use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, read_scene, warn};
+use crate::command::{Failure, handle_signals, print_line, read_scene, warn};
 use crate::film::Film;
 use crate::film::file::{FilmReader, ReadError};
 use crate::render::export::scene_hash;
@@ -17,6 +16,7 @@ use crate::render::session::Report;
 use crate::render::{Options, RenderState};
 use crate::sampling::SampleSettings;
 use crate::scene::Document;
+use crate::terminal::Signals;
 use crate::world::{self, Precision};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -62,7 +62,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     if let Some((_, rays, true)) = saved {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let render =
         start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
     let (render, signal) = trace(render, &mut part, &output, &signals)?;

@@ -2,12 +2,11 @@
 //! returns.
 
 use crate::dashboard::message::{Effect, Format, Message};
-use crate::dashboard::run::autosave_worker::AutosaveJob;
-use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport};
-use crate::dashboard::run::file_worker::{Files, Job};
+use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport};
+use crate::dashboard::run::exports::{image_viewer, paths};
+use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
-use crate::dashboard::run::{export_paths, image_viewer};
 use crate::film::LinearImage;
 use crate::render::Options;
 use crate::render::schedule::Settings;
@@ -257,7 +256,7 @@ pub fn run_on_terminal(
             let viewport = image_viewer::viewport(frames, screen);
             image_viewer::prepare(path, display, viewport, results.clone());
         }
-        Effect::Copy(path) => frames.copy(&export_paths::full(&path)),
+        Effect::Copy(path) => frames.copy(&paths::full(&path)),
         Effect::Suspend => return Outcome::Suspend,
         Effect::Quit => return Outcome::Quit,
         _ => {}

@@ -3,8 +3,8 @@
 
 use crate::dashboard::message::{Effect, Exported, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
-use crate::dashboard::run::export_paths::numbered;
-use crate::dashboard::run::exporter::{exported, stem};
+use crate::dashboard::run::exports::paths::numbered;
+use crate::dashboard::run::exports::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::film::file::FilmFileHeader;
 use crate::film::{Depth, Film, ImageOutput, LinearImage};

@@ -1,9 +1,13 @@
 //! Exports of image files: the current picture, or a separate render at a size of the user's
 //! choice.
 
+pub mod image_upload;
+pub mod image_viewer;
+pub mod paths;
+mod shrink;
+
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::export_paths::{numbered, scp};
-use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
 use crate::disk::Existing;
 use crate::film::{Depth, Film, ImageOutput};
@@ -14,6 +18,7 @@ use crate::render::{EncodedCheckpoint, Options, RenderState};
 use crate::sampling::SamplerKind;
 use crate::scene::Scene;
 use crossbeam_channel::Sender;
+use paths::{numbered, scp};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
