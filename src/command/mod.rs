@@ -23,7 +23,7 @@ mod watch;
 pub use cpu::require as require_cpu;
 
 use crate::scene::{Document, Scene};
-use crate::terminal::{SignalQueue, Signals};
+use crate::terminal::Signals;
 use crate::value::sanitized;
 use crate::world::{self, Precision, requires_double};
 use args::{Cli, Command};
@@ -124,18 +124,9 @@ fn end(error: &clap::Error) -> ! {
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
-/// Handles SIGINT and SIGTERM. After the first of them the program saves the picture so far and
-/// ends; a second one ends it at once.
+/// Handles SIGINT and SIGTERM: the first one saves the picture so far, a second one ends the program.
 fn handle_signals() -> Result<Signals, Failure> {
-    let mut is_ending = false;
-    let signals = SignalQueue::of_end().and_then(|queue| {
-        queue.handle(move |status| {
-            if std::mem::replace(&mut is_ending, true) {
-                std::process::exit(status.into());
-            }
-        })
-    });
-    signals.map_err(|error| Failure::Failed(format!("no signals: {error}")))
+    Signals::catch_end().map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
 
 /// Prints a line on stderr. Errors of writing are ignored.

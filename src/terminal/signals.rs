@@ -2,10 +2,10 @@
 
 use crossbeam_channel::{Receiver, unbounded};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
-use signal_hook::iterator;
+use signal_hook::{flag, iterator};
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::thread;
 
 /// Number that is added to the number of a signal to form the exit status, as in shells.
@@ -39,11 +39,6 @@ pub struct Signals {
 }
 
 impl SignalQueue {
-    /// Registers handlers of the signals that end the program from the keyboard or by `kill`.
-    pub fn of_end() -> io::Result<Self> {
-        Ok(Self(iterator::Signals::new([SIGINT, SIGTERM])?))
-    }
-
     /// Registers handlers of the signals that concern a program in raw mode. Must be called before
     /// the terminal enters raw mode, because the default handlers would end the program and leave
     /// the terminal in raw mode.
@@ -79,6 +74,21 @@ impl SignalQueue {
 }
 
 impl Signals {
+    /// Handles SIGINT and SIGTERM. The first of them is an event, so that the program can save its
+    /// results; a second one ends the program at once.
+    pub fn catch_end() -> io::Result<Self> {
+        // Handlers run in the order of registration. The first queues the signal, so that none is
+        // lost during the registration. The second ends the program if `armed` is set. Because the
+        // third sets `armed` after that, the first signal does not end the program.
+        let queue = SignalQueue(iterator::Signals::new([SIGINT, SIGTERM])?);
+        let armed = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            flag::register_conditional_shutdown(signal, SIGNALLED + signal, Arc::clone(&armed))?;
+            flag::register(signal, Arc::clone(&armed))?;
+        }
+        queue.handle(|_| ())
+    }
+
     /// Returns the exit status for the last terminating signal; `None` before the first one.
     pub fn caught(&self) -> Option<u8> {
         Some(self.status.load(Ordering::Acquire)).filter(|status| *status != 0)
