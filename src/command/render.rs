@@ -170,9 +170,9 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     // An error of writing the checkpoint is kept until the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
+    let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
-        let written = state.write(report, &provenance, display, depth, &output);
+        let written = state.write(report, &provenance, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
     });
     let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;

@@ -8,7 +8,7 @@
 //! within each region.
 
 use crate::disk::WriteError;
-use crate::film::{Bands, Depth, Display, Film, ImageData, ImageOutput, Noise, TileNoise};
+use crate::film::{Bands, Depth, Film, ImageData, ImageOutput, Noise, TileNoise};
 use crate::render::export::{Provenance, metadata};
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::render::session::{Report, State};
@@ -43,7 +43,6 @@ pub struct RegionRender<'a> {
     settings: Settings,
     pool: rayon::ThreadPool,
     provenance: Provenance,
-    display: Display,
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
     /// Number of rows of the picture in the finished regions.
@@ -89,7 +88,6 @@ impl<'a> RegionRender<'a> {
             settings: Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings },
             pool,
             provenance,
-            display: options.display,
             rows,
             finished_rows: 0,
             estimates: Vec::new(),
@@ -112,7 +110,7 @@ impl<'a> RegionRender<'a> {
     ) -> Result<(Report, StoppedBy), WriteError> {
         let state = self.state();
         let (mix, group_names) = (&state.mix.clone(), &state.group_names());
-        let (size, display) = (state.scene().film.size, self.display);
+        let (size, display) = (state.scene().film.size, state.display());
         output.write(&ImageData { size, mix, group_names, display, depth }, self)?;
         Ok((self.report.clone(), self.stopped_by))
     }
@@ -224,6 +222,6 @@ impl Bands for RegionRender<'_> {
     }
 
     fn metadata(&self) -> Vec<(String, String)> {
-        metadata(self.state(), &self.report, &self.provenance, &self.display)
+        metadata(self.state(), &self.report, &self.provenance)
     }
 }

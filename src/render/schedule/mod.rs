@@ -211,13 +211,6 @@ impl Schedule {
         self.noise
     }
 
-    /// Returns the latest estimate of each tile's RMSE as displayed, in 8-bit levels, in row order;
-    /// 0 before the first estimate.
-    pub fn tile_noise_codes(&self) -> Vec<f32> {
-        let codes = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().codes.sqrt() as f32);
-        self.tiles.iter().map(codes).collect()
-    }
-
     /// Returns the latest estimate of each tile's error, in row order; `None` before the first
     /// estimate.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {

@@ -2,22 +2,20 @@
 //! pieces of a fraction of a second, estimates the noise of the picture, and publishes snapshots of
 //! the render.
 
-use crate::film::{Film, IncrementalDownsample, TileNoise};
-use crate::render::checkpoint::{Checkpoint, EncodedCheckpoint};
-use crate::render::export::Provenance;
+use crate::film::{Film, IncrementalDownsample};
+use crate::render::checkpoint::Checkpoint;
 use crate::render::first_hit_buffer::FirstHitBuffer;
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::render::session::Shared;
 use crate::render::session::report::{QUALITIES, Report, State};
-use crate::render::session::snapshot::{Frame, Snapshot, View};
+use crate::render::session::snapshot::{Frame, Snapshot, View, tile_estimates};
 use crate::render::session::throughput::Throughput;
 use crate::render::wave::Wave;
 use crate::render::{Options, RenderState};
 use crate::scene::Scene;
 use crossbeam_channel::Sender;
-use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// Target durations in seconds of a piece of a wave (a set of jobs that run concurrently). The
@@ -154,19 +152,6 @@ impl ActiveRender {
         Ok(render)
     }
 
-    /// Encodes the render as a checkpoint. Returns `None` before the first picture.
-    pub fn checkpoint(
-        &self,
-        provenance: &Provenance,
-        context: &WorkContext,
-        state: State,
-    ) -> Option<EncodedCheckpoint> {
-        self.first_picture_after?;
-        let report = self.report(context, state);
-        let Self { state, schedule, .. } = self;
-        Some(EncodedCheckpoint::new(state, schedule, &report, provenance, &context.pool))
-    }
-
     /// Returns the seconds that the render has spent on tracing rays.
     pub fn seconds(&self) -> f64 {
         self.traced_for.as_secs_f64()
@@ -201,15 +186,8 @@ impl ActiveRender {
     /// Estimates the errors of all tiles again. If `cancel_wave` becomes `true` before the end,
     /// returns `false` and changes nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
-        let (film, estimator) = (&self.state.film, self.state.estimator());
-        let estimate =
-            |tile: usize| -> Option<TileNoise> { estimator.tile_so_far(film.tile(tile)?) };
-        let estimates: Option<Vec<_>> = pool.install(|| {
-            let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
-            tiles
-                .map(|tile| (!cancel_wave.load(Ordering::Relaxed)).then(|| estimate(tile)))
-                .collect()
-        });
+        let RenderState { film, .. } = &self.state;
+        let estimates = tile_estimates(film, self.state.estimator(), pool, cancel_wave);
         if let Some(estimates) = &estimates {
             self.schedule.set_estimates(estimates);
             self.estimates_stale = false;
@@ -240,7 +218,7 @@ impl ActiveRender {
                 return;
             }
             let report = coarse.clone();
-            context.put(frame.snapshot(film, Vec::new(), report, downsample, &context.pool));
+            context.put(frame.snapshot(film, &[], report, downsample, &context.pool));
         };
         let report = self.state.trace_first_pass(
             &wave,
@@ -324,12 +302,12 @@ impl ActiveRender {
         }
         self.update_first_hits(context, f64::INFINITY);
         let (frame, report) = (self.frame(context), self.report(context, state));
-        let noise = match report.noise {
-            Some(_) => self.schedule.tile_noise_codes(),
+        let estimates: Vec<_> = match report.noise {
+            Some(_) => self.schedule.tile_estimates().collect(),
             None => Vec::new(),
         };
-        let downsample = &mut self.downsample;
-        context.put(frame.snapshot(&self.state.film, noise, report, downsample, &context.pool));
+        let (film, downsample) = (&self.state.film, &mut self.downsample);
+        context.put(frame.snapshot(film, &estimates, report, downsample, &context.pool));
     }
 
     /// Returns the report on the progress of the render; `state` is the state of the session.

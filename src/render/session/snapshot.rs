@@ -1,13 +1,15 @@
 //! Snapshots: picture and progress of a render at one moment, published by the session.
 
 use crate::film::{
-    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail,
+    DirtyTile, Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe,
+    Thumbnail, TileNoise,
 };
 use crate::render::first_hit_buffer::FirstHitBuffer;
 use crate::render::relighting::Relighting;
 use crate::render::session::report::Report;
 use crate::scene::Scene;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Contents that a client requests of snapshots: the size of the picture, and the pixel to probe.
@@ -73,15 +75,35 @@ pub struct TileMaps {
 }
 
 impl TileMaps {
-    pub(super) fn of(film: &Film, noise_codes: Vec<f32>) -> Self {
+    fn of(film: &Film, estimates: &[Option<TileNoise>]) -> Self {
+        let levels =
+            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().codes.sqrt() as f32);
         let count = |tile: usize| {
             let [a, b] = film.counts(tile);
             a.saturating_add(b)
         };
         let columns = film.tile_columns();
-        let rows = film.tile_count() / columns;
-        Self { columns, rows, noise_codes, spp: (0..film.tile_count()).map(count).collect() }
+        Self {
+            columns,
+            rows: film.tile_count() / columns,
+            noise_codes: estimates.iter().map(levels).collect(),
+            spp: (0..film.tile_count()).map(count).collect(),
+        }
     }
+}
+
+/// Estimates the error of every tile on the threads of `pool`. The replicates of a tile may have
+/// different counts, as in a checkpoint. Returns `None` if `cancel` becomes `true` before the end.
+pub(super) fn tile_estimates(
+    film: &Film,
+    estimator: &Estimator,
+    pool: &rayon::ThreadPool,
+    cancel: &AtomicBool,
+) -> Option<Vec<Option<TileNoise>>> {
+    let estimate = |tile| film.tile(tile).and_then(|tile| estimator.tile_so_far(tile));
+    let unless_cancelled = |tile| (!cancel.load(Ordering::Relaxed)).then(|| estimate(tile));
+    let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
+    pool.install(|| tiles.map(unless_cancelled).collect())
 }
 
 /// Inputs of a snapshot besides the film: the contents that the client requests, light weights,
@@ -95,13 +117,14 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a snapshot of `film`. `noise_codes` has the RMSE of each tile in 8-bit levels.
+    /// Creates a snapshot of `film`. `estimates` has the error of each tile, or nothing before the
+    /// first estimate.
     /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
     /// so that only changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,
-        noise_codes: Vec<f32>,
+        estimates: &[Option<TileNoise>],
         report: Report,
         downsample: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
@@ -117,7 +140,7 @@ impl Frame {
             downsample.thumbnail()
         });
         let tiles = match self.view.raster {
-            Some(_) => Arc::new(TileMaps::of(film, noise_codes)),
+            Some(_) => Arc::new(TileMaps::of(film, estimates)),
             None => Arc::default(),
         };
         let probe = self

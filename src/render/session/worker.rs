@@ -2,12 +2,12 @@
 //! work.
 
 use crate::film::Display;
-use crate::render::export::Provenance;
 use crate::render::schedule::{Settings, Step, Stop};
 use crate::render::session::active_render::{ActiveRender, WorkContext};
+use crate::render::session::picture::{Picture, Source};
 use crate::render::session::report::{Report, State};
 use crate::render::session::snapshot::Snapshot;
-use crate::render::session::{CheckpointTask, Command, Task};
+use crate::render::session::{Command, Task};
 use crate::render::{Checkpoint, Options};
 use crate::scene::Scene;
 use crossbeam_channel::Receiver;
@@ -31,7 +31,6 @@ pub(super) struct Worker {
     /// checkpoint is waiting to be continued.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
-    checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
     /// Active render; `Ok(None)` if there is none. The error states why the newest scene cannot be
     /// rendered.
@@ -59,7 +58,6 @@ impl Worker {
             restart: false,
             resume: None,
             tasks: Vec::new(),
-            checkpoints: Vec::new(),
             paused: false,
             work: Ok(None),
             state: State::Idle,
@@ -124,7 +122,6 @@ impl Worker {
                 }
             }
             Command::Task(task) => self.tasks.push(task),
-            Command::Checkpoint(provenance, task) => self.checkpoints.push((provenance, task)),
             Command::Quit => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
@@ -171,22 +168,19 @@ impl Worker {
     }
 
     fn run_tasks(&mut self) {
-        for (provenance, task) in std::mem::take(&mut self.checkpoints) {
-            task(match &self.work {
-                Ok(Some(work)) => work.checkpoint(&provenance, &self.context, self.state.clone()),
-                _ => None,
-            });
-        }
-        if self.tasks.is_empty() {
+        let tasks = std::mem::take(&mut self.tasks);
+        if tasks.is_empty() {
             return;
         }
-        let tasks = std::mem::take(&mut self.tasks);
-        let film = match &self.work {
-            Ok(Some(work)) => Some((&work.state, work.report(&self.context, self.state.clone()))),
-            _ => None,
-        };
+        let work = self.work.as_ref().ok().and_then(Option::as_ref);
+        let film = work.map(|work| (work, work.report(&self.context, self.state.clone())));
         for task in tasks {
-            task(film.as_ref().map(|(state, report)| (*state, report)));
+            task(film.as_ref().map(|(work, report)| Picture {
+                film: &work.state.film,
+                mix: &work.state.mix,
+                report,
+                source: Source::Render(work, &self.context.pool),
+            }));
         }
     }
 
