@@ -4,7 +4,7 @@
 use crate::dashboard::message::{Effect, Message};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::run::effects::{Effects, Outcome};
+use crate::dashboard::run::effects::{EffectRunner, Outcome};
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
 use crate::dashboard::run::input::{self, Input};
@@ -26,7 +26,7 @@ pub const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 /// Dashboard on a terminal.
 pub struct Dashboard {
     pub model: Model,
-    pub effects: Box<dyn Effects>,
+    pub effects: EffectRunner,
     /// Receiver of the results of effects.
     pub done: Receiver<Message>,
     pub terminal_io: TerminalIo,
@@ -57,7 +57,7 @@ impl Dashboard {
     /// loss of the terminal ends the program, and `None` if the user quits.
     pub fn event_loop(&mut self) -> io::Result<Option<u8>> {
         let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
-        let wakeup = self.effects.wakeup().clone();
+        let wakeup = self.effects.session.wakeup().clone();
         let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();
@@ -208,7 +208,7 @@ impl Dashboard {
     }
 
     fn take_snapshot(&mut self) {
-        if let Some(snapshot) = self.effects.take_snapshot() {
+        if let Some(snapshot) = self.effects.session.take() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
             let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {

@@ -9,7 +9,6 @@ mod frames;
 mod input;
 mod job_control;
 mod latency;
-mod watch_runner;
 mod worker;
 mod writer;
 
@@ -23,7 +22,7 @@ use crate::terminal::{
     Environment, HUNG_UP, InputReader, Screen, SignalQueue, query_capabilities, size,
 };
 use crossbeam_channel::{Receiver, unbounded};
-use effects::{EffectRunner, Effects};
+use effects::EffectRunner;
 use event_loop::Dashboard;
 use frames::FramePipeline;
 use job_control::{ENDED_WITHIN, PATIENCE, ResizeDebounce, TerminalIo, handle_signals};
@@ -32,7 +31,6 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use watch_runner::WatchRunner;
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
@@ -118,7 +116,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     }
     let mut model = Model::new(path, &name, scene, settings.stop, threads);
     model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);
-    run_on_terminal(Box::new(effects), done, model, terminal, trace)
+    run_on_terminal(effects, done, model, terminal, trace)
 }
 
 /// Shows `films`, which other processes write, until the user quits, a terminating signal arrives
@@ -127,19 +125,19 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
     let (results, done) = unbounded();
-    let effects = WatchRunner::new(films, threads, results.clone())?;
+    let effects = EffectRunner::watching(films, threads, results.clone())?;
     // This waits for the first report, so that the first frame shows the table of films.
     if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
         let _ = results.send(report);
     }
-    run_on_terminal(Box::new(effects), done, model, terminal, None)
+    run_on_terminal(effects, done, model, terminal, None)
 }
 
 /// Runs a dashboard with the model `model`, whose effects are executed by `effects`. `done` receives
 /// the results of effects. The screen size and the colours in `model` are replaced by those of the
 /// terminal. `trace` is the path of the file for input latencies.
 fn run_on_terminal(
-    effects: Box<dyn Effects>,
+    effects: EffectRunner,
     done: Receiver<Message>,
     mut model: Model,
     terminal: TerminalSetup,

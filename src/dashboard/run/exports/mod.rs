@@ -45,6 +45,11 @@ pub struct Exporter {
 }
 
 impl Exporter {
+    /// Creates the writer of pictures of watched films.
+    pub fn of_films() -> Self {
+        Self { file: None, unreadable_path: None, sampler: SamplerKind::Sobol, adaptive: true }
+    }
+
     /// Writes `picture` to a file with the next free name.
     pub fn write(&self, picture: &Picture, format: Format) -> Result<Exported, String> {
         let header = picture.header(|scene| self.provenance(scene));
