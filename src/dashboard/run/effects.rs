@@ -238,7 +238,9 @@ impl EffectRunner {
             }
             // The session runs exports in the order of their requests. If its thread panics, it
             // drops the sender as at the end of an export.
-            exporting.iter().for_each(|last| drop(last.recv()));
+            if let Some(last) = exporting {
+                let _ = last.recv();
+            }
             drop(session);
         };
         let patience = deadline
