@@ -172,7 +172,7 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
 /// 212 spp noise 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
-    let noise = match exported.noise_codes {
+    let noise = match exported.noise_levels {
         Some(levels) => format!("{levels:.2} 8-bit levels"),
         None => "unknown".to_string(),
     };
@@ -202,7 +202,7 @@ mod tests {
             path: PathBuf::from("room.png"),
             size: [60, 40],
             spp: 4.0,
-            noise_codes: None,
+            noise_levels: None,
             scp: String::new(),
         };
         Ended {

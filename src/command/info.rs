@@ -98,8 +98,8 @@ fn target(plan: &Plan) -> String {
         "{} shards, {:.2} samples per pixel, target {} 8-bit levels of noise, expected {:.3}",
         settings.shards,
         plan.spp(),
-        settings.noise_codes,
-        plan.predicted_codes
+        settings.noise_levels,
+        plan.predicted_levels
     )
 }
 

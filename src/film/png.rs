@@ -131,7 +131,7 @@ fn encode_row(
         }
         Depth::Sixteen => bytes.extend(
             row.iter()
-                .flat_map(|rgb| picture.display.codes(*rgb))
+                .flat_map(|rgb| picture.display.levels(*rgb))
                 .flat_map(|value| quantised_16(value).to_be_bytes()),
         ),
     }

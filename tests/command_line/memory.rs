@@ -112,7 +112,7 @@ fn adaptive_regions_reach_the_noise_target() {
     let stats: serde_json::Value =
         serde_json::from_slice(&fs::read(desk.path("stats.json")).unwrap()).unwrap();
     assert_eq!(stats["stopped_by"], "noise");
-    assert!(stats["noise_codes"].as_f64().unwrap() <= 2.0, "{stats}");
+    assert!(stats["noise_levels"].as_f64().unwrap() <= 2.0, "{stats}");
     assert!(stats["spp_max"].as_u64() > stats["spp_min"].as_u64(), "{stats}");
     let info = desk.run(&["info", "a.png"]);
     assert!(info.out.contains("adaptive") && !info.out.contains("  \n"), "{}", info.out);

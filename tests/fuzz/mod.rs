@@ -265,7 +265,7 @@ fn session(spp: u32) -> Session {
         display: Display::default(),
     };
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let criterion = Criterion::Codes;
+    let criterion = Criterion::Levels;
     let settings = Settings { adaptive: true, criterion, rays_per_pixel: 0, stop };
     Session::new(1, options, settings).unwrap()
 }

@@ -67,7 +67,7 @@ pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session
         sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
         display: Display::default(),
     };
-    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    let settings = Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     Session::new(threads, options, settings).unwrap()
 }
 
@@ -188,7 +188,7 @@ pub fn follow(rendering: &mut RenderState, settings: Settings, pool: &ThreadPool
 
 /// Returns the settings of a schedule that minimises the error in 8-bit levels.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
-    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
+    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel, stop }
 }
 
 /// Returns the radiance of every pixel, row by row.

@@ -324,7 +324,8 @@ impl ActiveRender {
             first_picture_seconds: self.first_picture_after.map(|time| time.as_secs_f64()),
             noise: self.schedule.noise(),
             eta_seconds: self.schedule.eta_seconds(seconds),
-            quality_seconds: QUALITIES.map(|codes| self.schedule.seconds_to_noise(codes, seconds)),
+            quality_seconds: QUALITIES
+                .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),
             progress: self.schedule.progress(seconds),
             bad_samples: self.state.film.bad_samples().count,
             saturated_samples: self.state.film.saturated_samples(),

@@ -69,7 +69,7 @@ pub struct TileMaps {
     /// Number of rows of tiles of the film.
     pub rows: usize,
     /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
-    pub noise_codes: Vec<f32>,
+    pub noise_levels: Vec<f32>,
     /// Samples per pixel of each tile, over both replicates (halves of the samples).
     pub spp: Vec<u32>,
 }
@@ -77,7 +77,7 @@ pub struct TileMaps {
 impl TileMaps {
     fn of(film: &Film, estimates: &[Option<TileNoise>]) -> Self {
         let levels =
-            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().codes.sqrt() as f32);
+            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().levels.sqrt() as f32);
         let count = |tile: usize| {
             let [a, b] = film.counts(tile);
             a.saturating_add(b)
@@ -86,7 +86,7 @@ impl TileMaps {
         Self {
             columns,
             rows: film.tile_count() / columns,
-            noise_codes: estimates.iter().map(levels).collect(),
+            noise_levels: estimates.iter().map(levels).collect(),
             spp: (0..film.tile_count()).map(count).collect(),
         }
     }

@@ -34,7 +34,7 @@ pub struct WatchReport {
     pub progress: Option<f64>,
     /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
     /// plan.
-    pub target_codes: Option<f64>,
+    pub target_levels: Option<f64>,
     /// Width and height of the picture in pixels. `None` if they are unknown.
     pub size: Option<[u32; 2]>,
     /// Display transform of the picture.
@@ -200,7 +200,7 @@ impl WatchReport {
             shards,
             complete: films.complete_shards(),
             progress: films.progress(),
-            target_codes: settings.map(|plan| plan.noise_codes),
+            target_levels: settings.map(|plan| plan.noise_levels),
             size,
             display,
             source: source.to_string(),

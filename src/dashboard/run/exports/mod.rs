@@ -64,7 +64,7 @@ impl Exporter {
             path,
             size: [picture.film.width(), picture.film.height()],
             spp: picture.report.spp.mean,
-            noise_codes: picture.report.noise.map(|noise| noise.rmse_codes),
+            noise_levels: picture.report.noise.map(|noise| noise.rmse_levels),
         })
     }
 
