@@ -10,9 +10,9 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use support::{accelerated, all_shipped, parsed, sized};
-use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Picture size in pixels. Neither side is a multiple of a tile's side.
 const SIZE: [u32; 2] = [37, 35];

@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
-use zerkalo::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
-use zerkalo::lanes::{Double, SimdFloat};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::world::{AnyWorld, Options, Radiance, TracedPacket, World};
+use zerkalo_kernel::lanes::{Double, SimdFloat};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
+use zerkalo_world::{AnyWorld, Options, Radiance, TracedPacket, World};
 
 /// Side of the square picture in pixels.
 const SIDE: u32 = 16384;

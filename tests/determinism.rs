@@ -12,10 +12,10 @@ use report::report;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use support::{all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
-use zerkalo::film::Film;
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::Film;
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
 const SEED: u64 = 29;
@@ -220,13 +220,13 @@ fn reused_film_equals_a_new_film() {
     let (_, scene) = &scenes()[0];
     let mut other = scene.clone();
     other.camera.eye[0] += 0.5;
-    let options = zerkalo::render::Options {
-        world: zerkalo::world::Options::default(),
-        sampling: zerkalo::sampling::SampleSettings {
+    let options = zerkalo_render::Options {
+        world: zerkalo_world::Options::default(),
+        sampling: zerkalo_kernel::sampling::SampleSettings {
             seed: SEED,
-            kind: zerkalo::sampling::SamplerKind::Sobol,
+            kind: zerkalo_kernel::sampling::SamplerKind::Sobol,
         },
-        display: zerkalo::film::Display::default(),
+        display: zerkalo_render::film::Display::default(),
     };
     let mut rendering = RenderState::new(&other, &options, None);
     uniform(&mut rendering, 0, 8, &pool(2));

@@ -7,10 +7,10 @@ use normal::two_sided_z;
 use std::fs;
 use std::path::Path;
 use support::{parsed, picture, rendered};
-use zerkalo::camera::ViewAngle;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::ViewAngle;
+use zerkalo_world::Precision;
 
 /// Returns the mean of each channel over the picture, and the standard error of the mean. The error
 /// comes from the difference of the two replicates (halves of the samples); pixels are independent.

@@ -10,7 +10,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
-use zerkalo::film::{
+use zerkalo_render::film::{
     Depth, Display, Film, Header, ImageData, ImageOutput, InvalidSample, LightWeights, Replicates,
     TILE, Tile, TileHandle, Tone, WholeFilm, lattice_pixels, quantised_8, quantised_16,
 };

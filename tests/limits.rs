@@ -8,9 +8,9 @@ use crate::support;
 use common::Numbers;
 use std::fmt::Write;
 use support::{parsed, picture, rendered};
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::{self, AnyWorld, Precision};
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 

@@ -11,12 +11,12 @@ use crate::support::test_film::TestFilm;
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
 };
-use zerkalo::camera::Focus;
-use zerkalo::film::{Display, LightWeights, Replicates};
-use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::scene::{BelowHorizon, RayTypes, Scene, TransformOp};
-use zerkalo::value::Color;
-use zerkalo::world::{self, AnyWorld, Precision};
+use zerkalo_render::film::{Display, LightWeights, Replicates};
+use zerkalo_render::schedule::{Stop, StoppedBy};
+use zerkalo_scene::camera::Focus;
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{BelowHorizon, RayTypes, Scene, TransformOp};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 const SIZE: [u32; 2] = [48, 36];
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
@@ -331,10 +331,7 @@ fn horizon_folds_or_absorbs_rays() {
         assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
         assert_eq!(
             fold.trace,
-            zerkalo::scene::IntegratorSettings {
-                below_horizon: BelowHorizon::Fold,
-                ..absorb.trace
-            }
+            zerkalo_scene::IntegratorSettings { below_horizon: BelowHorizon::Fold, ..absorb.trace }
         );
         // Reflected rays above the surface are equal in both scenes. Those below it are mirrored up
         // in the scene `fold`, and lost in the scene `absorb`.

@@ -5,11 +5,11 @@ use crate::common;
 
 use common::Numbers;
 use std::sync::Arc;
-use zerkalo::asset::Assets;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::Mesh;
-use zerkalo::primitive::mesh::intersection;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::mesh::intersection;
+use zerkalo_scene::asset::Assets;
 
 /// Returns a closed mesh of a ball around the origin, read from OBJ. The triangles at the poles can
 /// be a thousand times as long as wide.

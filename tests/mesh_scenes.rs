@@ -9,12 +9,12 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use support::{picture, rendered};
-use zerkalo::asset::Assets;
-use zerkalo::film::Replicates;
-use zerkalo::primitive::{Form, MeshForm};
-use zerkalo::scene::edit::{Target, add_object, set};
-use zerkalo::scene::{Scene, SceneFile};
-use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
+use zerkalo_kernel::primitive::{Form, MeshForm};
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::asset::Assets;
+use zerkalo_scene::edit::{Target, add_object, set};
+use zerkalo_scene::{Scene, SceneFile};
+use zerkalo_world::{AnyWorld, FirstHit, Options, Precision};
 
 /// Returns a tube around a trefoil knot, made of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {

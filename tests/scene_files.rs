@@ -3,8 +3,8 @@
 mod format_manual;
 
 use std::path::{Path, PathBuf};
-use zerkalo::primitive::{ConvexPolyhedronForm, Form, SphereForm};
-use zerkalo::scene::{Document, Scene};
+use zerkalo_kernel::primitive::{ConvexPolyhedronForm, Form, SphereForm};
+use zerkalo_scene::{Document, Scene};
 
 fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)

@@ -15,10 +15,10 @@ use std::path::PathBuf;
 use support::{
     all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform, without_chance,
 };
-use zerkalo::film::Replicates;
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::{self, AnyWorld, Precision};
+use zerkalo_render::RenderState;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 /// Width and height in pixels of the compared pictures.
 const SIZE: [u32; 2] = [48, 32];

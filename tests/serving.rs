@@ -14,11 +14,11 @@ use std::sync::Arc;
 use support::{Pool, begin, picture, pool, uniform};
 use tables::{Key, keys, put, scene, table, value_at};
 use toml::{Table, Value};
-use zerkalo::film::Replicates;
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::value::ValueType;
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_scene::value::ValueType;
+use zerkalo_world::Precision;
 
 const SEED: u64 = 11;
 const SAMPLES: u32 = 2;

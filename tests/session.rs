@@ -5,13 +5,13 @@ use crate::support;
 use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zerkalo::disk::Existing;
-use zerkalo::render::Checkpoint;
-use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::Stop;
-use zerkalo::render::session::{Report, Session, State};
-use zerkalo::sampling::SamplerKind;
-use zerkalo::scene::Scene;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::Checkpoint;
+use zerkalo_render::export::Provenance;
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::{Report, Session, State};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::Existing;
 
 const SCENE: &str = r#"
 [film]

@@ -3,13 +3,13 @@
 
 use crate::support::test_film::TestFilm;
 use std::path::Path;
-use zerkalo::film::{Display, Film, Noise};
-use zerkalo::render::plan::{Plan, PlanSettings, ShardRender};
-use zerkalo::render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
-use zerkalo::render::{Options, RenderState, SyncRender};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::{Display, Film, Noise};
+use zerkalo_render::plan::{Plan, PlanSettings, ShardRender};
+use zerkalo_render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
+use zerkalo_render::{Options, RenderState, SyncRender};
+use zerkalo_scene::Scene;
+use zerkalo_world as world;
 
 const THREADS: usize = 2;
 

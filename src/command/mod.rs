@@ -22,10 +22,6 @@ mod watch;
 
 pub use cpu::require as require_cpu;
 
-use crate::scene::{Document, Scene};
-use crate::terminal::Signals;
-use crate::value::sanitized;
-use crate::world::{self, Precision, requires_double};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -36,6 +32,10 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{Document, Scene};
+use zerkalo_terminal::Signals;
+use zerkalo_world::{self as world, Precision, requires_double};
 
 /// Exit status for an invalid command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;

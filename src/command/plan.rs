@@ -4,17 +4,17 @@ use crate::command::args::PlanArgs;
 use crate::command::part_file;
 use crate::command::progress::style;
 use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
-use crate::disk::{self, check_writable};
-use crate::film::file::FilmReader;
-use crate::film::{Estimator, Noise};
-use crate::render::export::scene_hash;
-use crate::render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
-use crate::render::schedule::{Settings, Stop, USUAL_SLOPE};
-use crate::render::session::Report;
-use crate::render::{Options, SyncRender};
-use crate::sampling::SampleSettings;
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::scene_hash;
+use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::{Estimator, Noise};
+use zerkalo_render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
+use zerkalo_render::schedule::{Settings, Stop, USUAL_SLOPE};
+use zerkalo_render::session::Report;
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_scene::disk::{self, check_writable};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
 /// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the

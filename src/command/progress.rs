@@ -1,9 +1,9 @@
 //! Progress of a render on stderr: a bar if stderr is a terminal, otherwise lines for a log.
 
-use crate::render::session::Report;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
+use zerkalo_render::session::Report;
 
 /// Seconds of rendering before the first output of progress. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;

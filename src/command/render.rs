@@ -8,20 +8,20 @@ use crate::command::stats::Stats;
 use crate::command::{
     Failure, handle_signals, print_line, read_scene, shard, warn, warn_of_precision,
 };
-use crate::disk::{self, WriteError, check_writable};
-use crate::film::ImageOutput;
-use crate::process_memory::resident_memory;
-use crate::render::export::{Provenance, scene_hash};
-use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use crate::render::session::{Report, Session, State};
-use crate::render::{Checkpoint, Options, RegionRender};
-use crate::sampling::SampleSettings;
-use crate::scene::Scene;
-use crate::terminal::Signals;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::film::ImageOutput;
+use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo_render::session::{Report, Session, State};
+use zerkalo_render::{Checkpoint, Options, RegionRender};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::{self, WriteError, check_writable};
+use zerkalo_scene::process_memory::resident_memory;
+use zerkalo_terminal::Signals;
 
 /// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
 /// of an 8-bit file.

@@ -8,18 +8,18 @@ use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
 use crate::command::{Failure, handle_signals, print_line, read_scene, warn};
-use crate::film::Film;
-use crate::film::file::{FilmReader, ReadError};
-use crate::render::export::scene_hash;
-use crate::render::plan::{BASE, Part, PartShard, Plan, ShardRender};
-use crate::render::session::Report;
-use crate::render::{Options, RenderState};
-use crate::sampling::SampleSettings;
-use crate::scene::Document;
-use crate::terminal::Signals;
-use crate::world::{self, Precision};
 use std::path::Path;
 use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::scene_hash;
+use zerkalo_render::film::Film;
+use zerkalo_render::film::file::{FilmReader, ReadError};
+use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
+use zerkalo_render::session::Report;
+use zerkalo_render::{Options, RenderState};
+use zerkalo_scene::Document;
+use zerkalo_terminal::Signals;
+use zerkalo_world::{self as world, Precision};
 
 /// Time from the start of a shard's render to its first checkpoint. A shard is one process's part
 /// of a divided render. Each later interval is twice the previous one, up to [`LONGEST_INTERVAL`].

@@ -5,8 +5,8 @@ use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::text::wrapped_rows;
-use crate::render::session::QUALITIES;
 use ratatui::layout::Rect;
+use zerkalo_render::session::QUALITIES;
 
 /// Areas of an overlay. Areas that an overlay does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
 use crate::measure::reference_image::{Errors, Reference};
-use crate::render::SyncRender;
 use std::io;
+use zerkalo_render::SyncRender;
 
 /// Point of an error curve: the error of a render after some samples, against a reference picture.
 #[derive(Clone, Debug, PartialEq)]

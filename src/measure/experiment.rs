@@ -1,15 +1,15 @@
 //! Experiments: settings that trade speed for accuracy are varied one at a time.
 
-use crate::film::Display;
-use crate::material::Lobe;
-use crate::render::schedule::{Settings, Stop};
-use crate::render::{Options, SyncRender};
-use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Acceleration, RayTypes, Scene};
-use crate::world::{self, AnyWorld, Precision};
 use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Display;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_scene::material::Lobe;
+use zerkalo_scene::{Acceleration, RayTypes, Scene};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 /// Setting of the renderer that an experiment varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -290,7 +290,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use zerkalo_scene::built_in;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {

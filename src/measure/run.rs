@@ -5,11 +5,11 @@ use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
-use crate::render::SyncRender;
-use crate::scene::Scene;
 use std::io;
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_render::SyncRender;
+use zerkalo_scene::Scene;
 
 /// Progress of a measurement, which consists of timed renders.
 pub struct Progress<'a> {

@@ -10,11 +10,11 @@ use rayon::prelude::*;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use zerkalo::camera::ViewAngle;
-use zerkalo::film::Replicates;
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::ViewAngle;
+use zerkalo_world::Precision;
 
 /// Width and height of the compared pictures.
 pub const SIZE: [u32; 2] = [32, 24];

@@ -5,8 +5,8 @@ use crate::agreement::meshes::Triangles;
 use crate::agreement::paint::{Canvas, Spot};
 use crate::agreement::surfaces::{Piece, map, pieces};
 use glam::{DAffine3, DMat3, DVec3};
-use zerkalo::scene::Object;
-use zerkalo::shape::{CsgOperand, Shape};
+use zerkalo_scene::Object;
+use zerkalo_scene::shape::{CsgOperand, Shape};
 
 /// Simple shape: its pieces or triangles, and the transforms between its own coordinates and those
 /// of the scene.

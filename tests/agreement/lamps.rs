@@ -6,7 +6,7 @@ use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::light::{Light, LightUnit};
+use zerkalo_scene::light::{Light, LightUnit};
 
 /// Lamp: a light with a size.
 pub enum Lamp {

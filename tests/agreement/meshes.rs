@@ -3,8 +3,8 @@
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
-use zerkalo::primitive::{Form, MeshForm};
-use zerkalo::shape::{MeshDesc, ShapeDesc};
+use zerkalo_kernel::primitive::{Form, MeshForm};
+use zerkalo_scene::shape::{MeshDesc, ShapeDesc};
 
 /// Smallest cosine between the shading normal and the direction to the viewer. Normals at a smaller
 /// cosine are bent towards the viewer.

@@ -17,11 +17,11 @@ use crate::support;
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
 use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
-use zerkalo::camera::{Aperture, Focus};
-use zerkalo::light::Light;
-use zerkalo::material::Lobe;
-use zerkalo::sampling::SamplerKind;
-use zerkalo::scene::{BelowHorizon, Scale, Scene, TransformOp};
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_scene::camera::{Aperture, Focus};
+use zerkalo_scene::light::Light;
+use zerkalo_scene::material::Lobe;
+use zerkalo_scene::{BelowHorizon, Scale, Scene, TransformOp};
 
 /// Samples per pixel of the reference tracer.
 pub(crate) const REFERENCE_SAMPLES: u32 = 96;

@@ -10,10 +10,10 @@ use glam::{DMat3, DVec2, DVec3};
 use png::BitDepth;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
-use zerkalo::material::{
+use zerkalo_scene::material::{
     Axis, Bump, Mapping, Material, Placement, Texture, TextureFilter as Filter, Wrap,
 };
-use zerkalo::shape::Shape;
+use zerkalo_scene::shape::Shape;
 
 /// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;

@@ -5,8 +5,8 @@ use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
-use zerkalo::scene::BelowHorizon;
+use zerkalo_scene::BelowHorizon;
+use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Masking, Material};
 
 /// Roughness alpha of microfacets below which surfaces are treated as mirrors. Highlights are
 /// computed with at least this alpha.

@@ -3,8 +3,8 @@
 //! the program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use zerkalo::scene::TransformOp;
-use zerkalo::shape::Shape;
+use zerkalo_scene::TransformOp;
+use zerkalo_scene::shape::Shape;
 
 /// Simple surface, in the coordinates of the shape's description, before the object's transform.
 pub enum Piece {

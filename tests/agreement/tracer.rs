@@ -13,11 +13,11 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
-use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::light::{Falloff, Light, Spot};
-use zerkalo::material::Material;
-use zerkalo::scene::{Filter, RayTypes, Scene};
-use zerkalo::value::{Color, TomlValue};
+use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
+use zerkalo_scene::light::{Falloff, Light, Spot};
+use zerkalo_scene::material::Material;
+use zerkalo_scene::value::{Color, TomlValue};
+use zerkalo_scene::{Filter, RayTypes, Scene};
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use crate::agreement::reflection::{
 use crate::agreement::tracer::{Hit, Mutation, Tracer};
 use crate::common::Numbers;
 use glam::DVec3;
-use zerkalo::material::{Fresnel, Material};
-use zerkalo::scene::{BelowHorizon, RayTypes, Scene};
+use zerkalo_scene::material::{Fresnel, Material};
+use zerkalo_scene::{BelowHorizon, RayTypes, Scene};
 
 /// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;

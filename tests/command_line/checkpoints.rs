@@ -3,7 +3,7 @@
 use super::*;
 use crate::support::test_film::TestFilm;
 use std::time::Duration;
-use zerkalo::film::file::FilmReader;
+use zerkalo_render::film::file::FilmReader;
 
 /// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;

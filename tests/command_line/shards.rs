@@ -4,7 +4,7 @@
 use crate::command_line::Desk;
 use crate::support::test_film::TestFilm;
 use std::fs;
-use zerkalo::film::file::FilmReader;
+use zerkalo_render::film::file::FilmReader;
 
 /// Runs the program with `args`, which must succeed. Returns the program's output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {

@@ -5,12 +5,12 @@
 use crate::common::Numbers;
 use crate::common::shape_examples::EXAMPLES;
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::bvh::{Hit, Ray};
-use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
-use zerkalo::primitive::{Aggregate, Form, SurfacePoint};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
+use zerkalo_kernel::bvh::{Hit, Ray};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::primitive::{Aggregate, Form, SurfacePoint};
+use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo_scene::Scene;
+use zerkalo_world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);

@@ -3,7 +3,7 @@
 //! extremes` collects the output.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
-use zerkalo::lanes::SimdFloat;
+use zerkalo_kernel::lanes::SimdFloat;
 
 /// Prints `text` for a cell of the table of extremes: row `number`, and the column `single`,
 /// `double`, `both`, `auto`, `about` or `criterion`.

@@ -3,8 +3,8 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use toml::{Table, Value};
-use zerkalo::scene::{AssetResolver, FIELDS, Scene};
-use zerkalo::value::{Field, TomlValue, ValueType};
+use zerkalo_scene::value::{Field, TomlValue, ValueType};
+use zerkalo_scene::{AssetResolver, FIELDS, Scene};
 
 /// Key that a scene file may have.
 #[derive(Clone, Debug)]

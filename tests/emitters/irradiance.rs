@@ -4,7 +4,7 @@ use crate::emitters::forms;
 use crate::emitters::setup::{array, check, scene};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Allowed relative rounding errors in single and double precision. They arise because lights are
 /// lifted off surfaces and rays start above surfaces.
@@ -137,7 +137,7 @@ fn flat_lights_shine_from_one_side_only() {
                 format!("{shape}center = [0.0, 1.0, 0.0], normal = [0.0, {normal:?}, 0.0] }}");
             let scene = receiver(DVec3::Y, &light, "");
             let (mean, _) =
-                crate::emitters::setup::radiance::<zerkalo::lanes::Single>(&scene, 64, 1);
+                crate::emitters::setup::radiance::<zerkalo_kernel::lanes::Single>(&scene, 64, 1);
             assert_eq!(mean > 0.0, lit, "{light}");
         }
     }

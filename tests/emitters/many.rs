@@ -7,10 +7,10 @@ use crate::emitters::setup::{array, check, mean_and_error, radiance, samples, sc
 use crate::support::{begin, pool, settings, trace};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_kernel::lanes::{Double, Single};
+use zerkalo_render::schedule::{Step, Stop, StoppedBy};
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;

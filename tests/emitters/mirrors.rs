@@ -2,8 +2,8 @@
 
 use crate::emitters::setup::{check, radiance, scene};
 use std::f64::consts::TAU;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::scene::Scene;
+use zerkalo_kernel::lanes::{Double, Single};
+use zerkalo_scene::Scene;
 
 /// Creates the scene of a camera that looks down at a mirror with the keys `material`. A light with
 /// the keys `light` is the only light.

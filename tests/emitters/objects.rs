@@ -6,8 +6,8 @@ use crate::emitters::setup::{array, check, radiance, scene};
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 use std::fs;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::scene::Scene;
+use zerkalo_kernel::lanes::{Double, Single};
+use zerkalo_scene::Scene;
 
 /// Allowed relative rounding errors in single and double precision. They arise because sampled
 /// points are lifted off the emitter and rays start above the receiver.

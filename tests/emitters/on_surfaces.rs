@@ -6,7 +6,7 @@ use crate::emitters::objects::{MATT, ROUNDING, agree, mesh, object, receiver, re
 use crate::emitters::setup::{array, check, scene};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Centre of the lamps on ceilings, and their size.
 const LAMP: (DVec3, [f64; 2]) = (DVec3::new(0.2, 2.0, 0.1), [1.0, 0.7]);

@@ -1,11 +1,11 @@
 //! Scenes with one receiver and one light, and their radiance with its standard error.
 
 use crate::common::normal::two_sided_z;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo_scene::Scene;
+use zerkalo_world::{MAX_GROUPS, Path, Radiance, World};
 
 /// Returns three numbers as a TOML array.
 pub fn array(v: glam::DVec3) -> String {

@@ -10,11 +10,11 @@ use crate::common::report;
 use crate::support;
 use std::f64::consts::PI;
 use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
-use zerkalo::film::{Display, Estimator, Replicates, TILE};
-use zerkalo::render::RenderState;
-use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Estimator, Replicates, TILE};
+use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo_scene::{Filter, Scene};
+use zerkalo_world::Precision;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;

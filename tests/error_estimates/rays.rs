@@ -4,8 +4,8 @@
 use crate::error_estimates::scenes::{KINDS, Sample, scene};
 use crate::error_estimates::survey::{LIMIT_SPP, Reference, run, target_of};
 use crate::support::{begin, pool, trace, wave};
-use zerkalo::render::schedule::Stop;
-use zerkalo::world::Precision;
+use zerkalo_render::schedule::Stop;
+use zerkalo_world::Precision;
 
 /// Number of rays at which the survey of rays ends an adaptive picture, unless the picture has less
 /// than 64 samples per pixel.

@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::error_estimates::coverage::Balls;
 use crate::support::{parsed, shipped, sized};
 use std::fmt::Write;
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Names of the kinds of generated scenes.
 pub const KINDS: [&str; 10] = [

@@ -9,10 +9,10 @@ use crate::error_estimates::coverage::Balls;
 use crate::error_estimates::rays::{Point, ray_ratio};
 use crate::error_estimates::scenes::{Sample, balls_text, scene};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::render::schedule::{Schedule, Step, Stop, StoppedBy};
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_render::schedule::{Schedule, Step, Stop, StoppedBy};
+use zerkalo_world::Precision;
 
 /// Number of samples per pixel at which the survey ends a picture that has not reached its noise
 /// target.

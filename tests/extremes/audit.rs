@@ -151,13 +151,13 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "Fresnel at every reflectance",
         "in [0, 1], F(1) = F0 within 1e-7",
         "fresnel",
-        "src/material/fresnel.rs",
+        "crates/scene/src/material/fresnel.rs",
     ),
     (
         "total reflection around the critical angle",
         "R + T = 1 within 1e-12, no NaN",
         "total_reflection",
-        "src/material/refraction.rs",
+        "crates/scene/src/material/refraction.rs",
     ),
     (
         "10,000 images between two mirrors",

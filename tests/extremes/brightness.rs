@@ -3,10 +3,10 @@
 use crate::common::report::report;
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
 use std::fs;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 

@@ -4,9 +4,9 @@ use crate::common::Numbers;
 use crate::common::rays::to_dvec3;
 use crate::common::report::{precision, report};
 use glam::DVec3;
-use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
-use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
-use zerkalo::scene::Scene;
+use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Single, Vec3};
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
@@ -137,7 +137,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
             normals[2 % L::WIDTH] = [0.0, 0.0, -1.0 - e];
             normals[3 % L::WIDTH] = [0.0, -0.0, 1.0];
         }
-        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Float::from_f64));
+        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo_kernel::lanes::Float::from_f64));
         let frame = Frame::around(n);
         for i in 0..L::WIDTH {
             let [t, b, n] = [frame.t, frame.b, frame.n].map(|v| to_dvec3(v, i));

@@ -8,12 +8,12 @@ use crate::common::rays::{Line, bounding_sphere, closest, every_kind};
 use crate::common::report::{LEFT_TO_DOUBLE, report};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{
     Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, HalfSpace,
     ParallelogramForm, PlaneForm, SphereForm,
 };
-use zerkalo::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
+use zerkalo_scene::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
 
 /// Returns the area of one face of a polyhedron. The corners on the face are sorted around their
 /// mean.

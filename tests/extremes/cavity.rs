@@ -4,9 +4,9 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, closest};
 use crate::extremes::compound::{block, difference, geometry};
 use glam::DVec3;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{Form, SphereForm};
-use zerkalo::shape::{Cylinder, ShapeDesc};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{Form, SphereForm};
+use zerkalo_scene::shape::{Cylinder, ShapeDesc};
 
 fn ball(radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::ZERO, radius })

@@ -6,8 +6,8 @@ use crate::common::report::report;
 use crate::extremes::compound::{block, difference, geometry, union};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::world::Precision;
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_world::Precision;
 
 /// Returns `x` moved by about `units` rounding errors. `epsilon` is the relative rounding error of
 /// the precision.

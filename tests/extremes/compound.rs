@@ -4,12 +4,12 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, LineHit, blocked, closest};
 use crate::common::report::report;
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{
     Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, CsgSolid, CsgTree as Tree, EllipsoidForm,
     Form, PlaneForm, SphereForm,
 };
-use zerkalo::shape::{Cuboid, ShapeDesc};
+use zerkalo_scene::shape::{Cuboid, ShapeDesc};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::new(x, y, z), radius })

@@ -8,9 +8,9 @@ use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Width of the gap in scenes that are compared with the same scene without a gap.
 const GAP: f64 = 1e-4;

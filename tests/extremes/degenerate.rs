@@ -4,11 +4,11 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
 use crate::common::report::{precision, report};
 use glam::DVec3;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{
     Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, SphereForm,
 };
-use zerkalo::shape::{Cuboid, ShapeDesc};
+use zerkalo_scene::shape::{Cuboid, ShapeDesc};
 
 /// Returns `true` if `form` is a convex solid. Compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {

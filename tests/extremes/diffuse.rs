@@ -2,9 +2,9 @@
 
 use crate::support::{picture, rendered};
 use std::f64::consts::PI;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 const SAMPLES: u32 = 64;
 

@@ -5,9 +5,9 @@ use crate::support::test_film::TestFilm;
 use crate::support::{parsed, rendered};
 use std::collections::BTreeSet;
 use toml::Value;
-use zerkalo::scene::{FIELDS, Scene};
-use zerkalo::value::{Field, ValueType};
-use zerkalo::world::Precision;
+use zerkalo_scene::value::{Field, ValueType};
+use zerkalo_scene::{FIELDS, Scene};
+use zerkalo_world::Precision;
 
 /// Scene that sets every key whose value is a direction.
 const TEXT: &str = "
@@ -89,7 +89,7 @@ fn length_of_directions_does_not_change_the_picture() {
     // Other factors change the last digits, which an 8-bit picture does not show.
     let green_values = |scene: &Scene| {
         let rendering = rendered(scene, 1, Precision::Single, 4);
-        let picture = crate::support::picture(&rendering, zerkalo::film::Replicates::Both);
+        let picture = crate::support::picture(&rendering, zerkalo_render::film::Replicates::Both);
         picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
     };
     let expected = green_values(&base);

@@ -4,11 +4,11 @@
 use crate::support::test_film::TestFilm;
 use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
 use std::f64::consts::PI;
-use zerkalo::camera::{Aperture, Focus};
-use zerkalo::film::Replicates;
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::camera::{Aperture, Focus};
+use zerkalo_scene::{Filter, Scene};
+use zerkalo_world::Precision;
 
 /// Largest allowed deviation of a pixel from a closed form, in standard errors. The comparisons of
 /// this file, some 4,000 pixels, give a false alarm in 1 of 1,000 runs.

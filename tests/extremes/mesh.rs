@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::sync::Arc;
-use zerkalo::asset::Assets;
-use zerkalo::lanes::{Double, Mask, SimdFloat, Single};
-use zerkalo::primitive::Mesh;
-use zerkalo::primitive::{Aggregate, Form, MeshForm};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options};
+use zerkalo_kernel::lanes::{Double, Mask, SimdFloat, Single};
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
+use zerkalo_scene::Scene;
+use zerkalo_scene::asset::Assets;
+use zerkalo_world::{AnyWorld, Options};
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if

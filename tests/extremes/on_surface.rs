@@ -5,8 +5,8 @@ use crate::common::rays::{Line, Traced};
 use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Ceilings that contain the point lamp at (0, 3, 0). The number determines which points above the
 /// ceiling, at y = 4, the lamp lights: those farther from the y axis than this distance. It is 0 for

@@ -6,10 +6,10 @@
 use crate::common::report::report;
 use crate::support::{all_shipped, begin, parsed, picture, pool, shipped, sized, uniform};
 use std::collections::BTreeMap;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_scene::Scene;
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 const SIZE: [u32; 2] = [24, 18];
 /// Picture size in pixels for scenes of a [`Family`].

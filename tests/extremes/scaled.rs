@@ -3,10 +3,10 @@
 
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::light::Falloff;
-use zerkalo::scene::{Scale, Scene, TransformOp};
-use zerkalo::world::Precision;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_scene::light::Falloff;
+use zerkalo_scene::{Scale, Scene, TransformOp};
+use zerkalo_world::Precision;
 
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;

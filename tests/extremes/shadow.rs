@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, scene};
 use crate::common::report::report;
 use glam::{DMat3, DVec3};
-use zerkalo::world::Precision;
+use zerkalo_world::Precision;
 
 /// Convex shapes for the test of self-shadowing.
 #[derive(Clone, Copy, Debug)]

@@ -2,12 +2,12 @@
 //! scenes made for this test.
 
 use crate::support::{begin_with, pool, shipped, sized, uniform};
-use zerkalo::camera::Aperture;
-use zerkalo::film::Display;
 use zerkalo::measure::{Reference, Slope};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Display;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::Aperture;
+use zerkalo_world::Precision;
 
 const SIZE: [u32; 2] = [24, 16];
 /// Smallest number of samples per pixel of the pictures whose errors are fitted, in both replicates

@@ -5,10 +5,10 @@ use crate::common::rays::{Line, Traced, closest, scene};
 use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
-use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form, SphereForm};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::{Aggregate, Form, SphereForm};
+use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]

@@ -4,9 +4,9 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, LineHit, closest};
 use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::shape::{Cone, Cylinder, ShapeDesc, TaperedCylinder, UnitFrustum};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{Aggregate, Form};
+use zerkalo_scene::shape::{Cone, Cylinder, ShapeDesc, TaperedCylinder, UnitFrustum};
 
 fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)

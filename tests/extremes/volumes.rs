@@ -6,9 +6,9 @@ use crate::common::report::report;
 use crate::extremes::compound::{ball, block, chords, difference, intersection, lines, union};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
-use zerkalo::lanes::Double;
-use zerkalo::primitive::{Form, PlaneForm};
-use zerkalo::shape::{Cylinder, ShapeDesc};
+use zerkalo_kernel::lanes::Double;
+use zerkalo_kernel::primitive::{Form, PlaneForm};
+use zerkalo_scene::shape::{Cylinder, ShapeDesc};
 
 /// Returns the volume of `form`, which is in the cube from -`half` to `half`, and the standard
 /// error of this volume. They are computed from the chords of parallel lines, one in each cell of a
@@ -99,7 +99,7 @@ fn extreme_09_volumes() {
         (
             "truncated pyramid",
             difference(vec![
-                zerkalo::shape::Pyramid {
+                zerkalo_scene::shape::Pyramid {
                     corner: [-0.6, -0.5, 0.6],
                     side: 1.2,
                     apex_height: 1.5,

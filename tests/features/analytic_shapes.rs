@@ -3,8 +3,8 @@
 
 use crate::agreement::surfaces::map;
 use glam::{DAffine3, DVec3};
-use zerkalo::scene::{Object, TransformOp};
-use zerkalo::shape::{CsgOperand, Shape};
+use zerkalo_scene::shape::{CsgOperand, Shape};
+use zerkalo_scene::{Object, TransformOp};
 
 /// Implicit function: negative inside, zero on the surface, positive outside.
 pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;

@@ -6,8 +6,8 @@ use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, row};
 use crate::support::shipped;
 use glam::DVec3;
-use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
 
 fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))

@@ -5,8 +5,8 @@ use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
 use crate::support::{parsed, shipped};
-use zerkalo::light::{Environment, Falloff, Light, LightUnit, Point};
-use zerkalo::scene::{RayTypes, Scene};
+use zerkalo_scene::light::{Environment, Falloff, Light, LightUnit, Point};
+use zerkalo_scene::{RayTypes, Scene};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
 /// `mutations`, changed versions of the scene, must disagree.

@@ -4,8 +4,8 @@ use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
 use crate::support::test_film::TestFilm;
 use crate::support::{rendered, shipped, sized};
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {

@@ -5,9 +5,9 @@ use crate::features::row::Verdict;
 use crate::support::sized;
 use glam::DVec3;
 use rayon::prelude::*;
-use zerkalo::camera::{Camera, ViewAngle};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::{Camera, ViewAngle};
+use zerkalo_world::{AnyWorld, FirstHit, Options, Precision};
 
 /// Width and height in pixels of the compared pictures.
 pub const RASTER: [u32; 2] = [48, 36];

@@ -3,9 +3,9 @@
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{material, row};
 use crate::support::shipped;
-use zerkalo::light::SphereLight;
-use zerkalo::material::Lobe;
-use zerkalo::value::Color;
+use zerkalo_scene::light::SphereLight;
+use zerkalo_scene::material::Lobe;
+use zerkalo_scene::value::Color;
 
 #[test]
 fn d6_rough_transmission() {

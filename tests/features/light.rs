@@ -6,11 +6,11 @@ use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::features::row::{Verdict, ensure, material, object, row};
 use crate::support::{parsed, shipped, sized};
 use glam::DVec3;
-use zerkalo::camera::ViewAngle;
-use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
-use zerkalo::scene::{RayTypes, Scene};
-use zerkalo::value::Color;
+use zerkalo_scene::camera::ViewAngle;
+use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
+use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Masking, Metal};
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{RayTypes, Scene};
 
 /// Checks that the picture of `file` agrees exactly with the reference tracer. The picture of each
 /// of `mutations`, changed versions of the scene, must disagree.
@@ -56,7 +56,7 @@ fn floor_is_lit(original: &Scene, tested: &Scene) -> Verdict {
         .objects
         .iter()
         .filter_map(|o| match &o.shape {
-            zerkalo::shape::Shape::Sphere(s) => Some((DVec3::from(s.center), s.radius)),
+            zerkalo_scene::shape::Shape::Sphere(s) => Some((DVec3::from(s.center), s.radius)),
             _ => None,
         })
         .collect();

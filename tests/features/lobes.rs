@@ -6,11 +6,11 @@ use crate::features::row::{Verdict, ensure, material, number, object, row, shape
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::film::Replicates;
-use zerkalo::material::Lobe;
-use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
-use zerkalo::shape::Shape;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::material::Lobe;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::{Filter, Scale, Scene, TransformOp};
+use zerkalo_world::Precision;
 
 /// Returns `scene` with the mirror as its only reflecting object. The mirror's material has no
 /// ambient and no diffuse part.
@@ -153,7 +153,7 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
         let ray = pixel_ray(&original.camera, FINE, centers(FINE)[i]);
         let on_mirror = ray.origin + ray.direction * ((-1.0 - ray.origin.z) / ray.direction.z);
         let mirrored = ray.direction * DVec3::new(1.0, 1.0, -1.0);
-        let spot = |o: &zerkalo::scene::Object| match &o.shape {
+        let spot = |o: &zerkalo_scene::Object| match &o.shape {
             Shape::Sphere(s) => {
                 let to_center = DVec3::from(s.center) - on_mirror;
                 let color = DVec3::from(original.materials[&o.material].color.0);

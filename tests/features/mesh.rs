@@ -6,7 +6,7 @@ use crate::features::row::{object, row, shape};
 use crate::support::{parsed, shipped};
 use glam::DVec3;
 use std::fs;
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Returns the triangles of a polygon: a fan around its first corner.
 fn fan(corners: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> {

@@ -5,12 +5,12 @@ use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
-use zerkalo::film::Replicates;
-use zerkalo::material::Fresnel;
-use zerkalo::scene::{Filter, RayTypes, Scene};
-use zerkalo::shape::Shape;
-use zerkalo::value::Color;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::material::Fresnel;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{Filter, RayTypes, Scene};
+use zerkalo_world::Precision;
 
 #[test]
 fn b1_tracing_depth() {
@@ -67,7 +67,7 @@ fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, dept
 
 /// Checks that the mean radiance of each band of six rows is that of the full ray tree.
 fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
-    let pane = |o: &zerkalo::scene::Object| {
+    let pane = |o: &zerkalo_scene::Object| {
         let Shape::Rectangle(r) = &o.shape else { panic!("not a pane") };
         let m = &original.materials[&o.material];
         Pane {

@@ -8,9 +8,9 @@ use crate::features::first_hits::RASTER;
 use crate::features::row::Verdict;
 use crate::support::{picture, rendered, sized};
 use glam::DVec3;
-use zerkalo::film::Replicates;
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::{Filter, Scene};
+use zerkalo_world::Precision;
 
 /// Samples per pixel of each replicate (half of the samples) in the picture of a mutation.
 const MUTATION_SAMPLES: u32 = SAMPLES / 2;

@@ -9,19 +9,19 @@ use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zerkalo::disk::Existing;
-use zerkalo::film::file::FilmReader;
-use zerkalo::film::{Display, Film, Replicates, TILE};
-use zerkalo::material::Material;
-use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Checkpoint, Options, SyncRender};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::edit::{self, Edit, EditError, Target};
-use zerkalo::scene::{History, Scene};
-use zerkalo::shape::Shape;
-use zerkalo::world::{self, Precision};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::export::Provenance;
+use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::{Display, Film, Replicates, TILE};
+use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo_render::session::{Session, State};
+use zerkalo_render::{Checkpoint, Options, SyncRender};
+use zerkalo_scene::disk::Existing;
+use zerkalo_scene::edit::{self, Edit, EditError, Target};
+use zerkalo_scene::material::Material;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::{History, Scene};
+use zerkalo_world::{self as world, Precision};
 
 fn options() -> Options {
     Options {
@@ -290,7 +290,7 @@ fn left_to_right(scene: &Scene) -> f64 {
     scene.camera.eye = [ball.center[0], 9.0, ball.center[2]];
     scene.camera.target = Some([ball.center[0], 0.0, ball.center[2]]);
     scene.camera.up = [0.0, 0.0, -1.0];
-    scene.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(14.0);
+    scene.camera.view_angle = zerkalo_scene::camera::ViewAngle::Vertical(14.0);
     scene.objects.retain(|o| ["floor", "ball"].contains(&o.name.as_str()));
     let floor = number(&scene, "floor") as u32;
     let (hits, pixels) =

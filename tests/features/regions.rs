@@ -3,13 +3,13 @@
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, follow, pool, settings, shipped, sized};
 use std::sync::Arc;
-use zerkalo::film::{Bands, Display, Film, Replicates};
-use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::Stop;
-use zerkalo::render::{Options, RegionRender};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::{self, Precision};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::export::Provenance;
+use zerkalo_render::film::{Bands, Display, Film, Replicates};
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::{Options, RegionRender};
+use zerkalo_scene::{Filter, Scene};
+use zerkalo_world::{self as world, Precision};
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;

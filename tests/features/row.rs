@@ -2,9 +2,9 @@
 //! mutation of it.
 
 use crate::support::{parsed, shipped};
-use zerkalo::material::Material;
-use zerkalo::scene::{Object, Scene};
-use zerkalo::shape::Shape;
+use zerkalo_scene::material::Material;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::{Object, Scene};
 
 /// Result of a check: success, or a description of the failure.
 pub type Verdict = Result<(), String>;

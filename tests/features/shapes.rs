@@ -3,8 +3,8 @@
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{object, row, shape};
 use crate::support::shipped;
-use zerkalo::scene::Scene;
-use zerkalo::shape::{Difference, Intersection, Shape, Union};
+use zerkalo_scene::Scene;
+use zerkalo_scene::shape::{Difference, Intersection, Shape, Union};
 
 /// Checks that first hits in `file` agree with the formulas of the shapes, and that they disagree
 /// after each mutation. A mutation consists of its name, the name of an object, and the text of the
@@ -237,7 +237,7 @@ fn as_difference(scene: &mut Scene) {
 /// Replaces the set operation of every compound by that of `combine`.
 fn replace_operation(
     scene: &mut Scene,
-    combine: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape,
+    combine: impl Fn(Vec<zerkalo_scene::shape::CsgOperand>) -> Shape,
 ) {
     for object in &mut scene.objects {
         let operands = match &object.shape {

@@ -3,16 +3,18 @@
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::test_film::TestFilm;
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
-use zerkalo::disk::Existing;
-use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use zerkalo::film::{Display, Film, LightWeights};
-use zerkalo::render::plan::{
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::file::{
+    FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
+};
+use zerkalo_render::film::{Display, Film, LightWeights};
+use zerkalo_render::plan::{
     Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,
 };
-use zerkalo::render::schedule::Stop;
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::schedule::Stop;
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::Existing;
+use zerkalo_world::Precision;
 
 use std::fs;
 use std::path::Path;

@@ -7,10 +7,10 @@ use crate::features::row::{Verdict, ensure, number, row};
 use crate::support::{shipped, sized};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
-use zerkalo::material::{TextureFilter, Wrap};
-use zerkalo::scene::edit::{self, Target};
-use zerkalo::scene::{RayTypes, Scene};
-use zerkalo::shape::Shape;
+use zerkalo_scene::edit::{self, Target};
+use zerkalo_scene::material::{TextureFilter, Wrap};
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::{RayTypes, Scene};
 
 /// Returns the image `name` of the folder `scenes/textures`.
 fn image(name: &str) -> Pixels {
@@ -103,7 +103,7 @@ fn b13_image_texture() {
             ("no image", &|s| s.materials.get_mut("picture").unwrap().texture = None),
             ("one colour", &|s| {
                 let picture = s.materials.get_mut("picture").unwrap();
-                (picture.texture, picture.color) = (None, zerkalo::value::Color([0.5; 3]));
+                (picture.texture, picture.color) = (None, zerkalo_scene::value::Color([0.5; 3]));
             }),
             ("another mapping", &|s| set(s, "picture", "texture.image.mapping", "planar")),
             ("another mapping of the ball", &|s| {

@@ -3,10 +3,10 @@
 
 use crate::support::png_file::PngImage;
 use png::{BitDepth, ColorType};
-use zerkalo::film::Display;
-use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
-use zerkalo::sampling::SamplerKind;
-use zerkalo::value::fnv1a64;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::film::Display;
+use zerkalo_render::plan::{Plan, PlanSettings, PlannedTile};
+use zerkalo_scene::value::fnv1a64;
 
 /// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {

@@ -9,17 +9,17 @@ use mutate::Random;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
-use zerkalo::asset::Assets;
-use zerkalo::disk::Existing;
-use zerkalo::film::Display;
-use zerkalo::film::file::{FilmFileHeader, FilmReader};
-use zerkalo::render::export::Provenance;
-use zerkalo::render::plan::Plan;
-use zerkalo::render::schedule::{Criterion, Settings, Stop};
-use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Checkpoint, Options, SampleInputs};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::export::Provenance;
+use zerkalo_render::film::Display;
+use zerkalo_render::film::file::{FilmFileHeader, FilmReader};
+use zerkalo_render::plan::Plan;
+use zerkalo_render::schedule::{Criterion, Settings, Stop};
+use zerkalo_render::session::{Session, State};
+use zerkalo_render::{Checkpoint, Options, SampleInputs};
+use zerkalo_scene::Scene;
+use zerkalo_scene::asset::Assets;
+use zerkalo_scene::disk::Existing;
 
 /// Number of mutations that are read for each format; `ZERKALO_CASES` sets another one.
 static CASES: LazyLock<u64> = LazyLock::new(|| {
@@ -260,7 +260,7 @@ fn checkpoints() -> Vec<Vec<u8>> {
 
 fn session(spp: u32) -> Session {
     let options = Options {
-        world: zerkalo::world::Options::default(),
+        world: zerkalo_world::Options::default(),
         sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
         display: Display::default(),
     };

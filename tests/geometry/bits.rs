@@ -3,9 +3,9 @@
 use crate::common::Numbers;
 use crate::common::rays::{Line, packets, surface};
 pub use crate::common::rays::{any_line, forms};
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::{Aggregate, Form};
 
 fn lane_of<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     v: Vec3<L>,

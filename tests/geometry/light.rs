@@ -4,7 +4,7 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, scene};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::world::Precision;
+use zerkalo_world::Precision;
 
 fn ground(extra: &str, light: DVec3) -> String {
     let [x, y, z] = light.to_array();

@@ -4,9 +4,9 @@
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, closest, scene};
 use glam::DVec3;
-use zerkalo::lanes::Double;
-use zerkalo::primitive::Aggregate;
-use zerkalo::world::Precision;
+use zerkalo_kernel::lanes::Double;
+use zerkalo_kernel::primitive::Aggregate;
+use zerkalo_world::Precision;
 
 const OBJECTS: &str = r#"
 [camera]

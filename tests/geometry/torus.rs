@@ -9,8 +9,8 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, blocked, closest};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_kernel::primitive::{
     Aggregate, BoundingVolume, CsgSolid, CsgTree, Form, PlaneForm, SphereForm, TorusForm,
 };
 

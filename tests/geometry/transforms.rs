@@ -4,8 +4,8 @@
 use crate::common::Numbers;
 use crate::common::rays::{Line, bounding_sphere, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use zerkalo::lanes::Double;
-use zerkalo::primitive::Aggregate;
+use zerkalo_kernel::lanes::Double;
+use zerkalo_kernel::primitive::Aggregate;
 
 fn random_map(numbers: &mut Numbers) -> DAffine3 {
     let mut factor = || {

@@ -5,8 +5,8 @@ use crate::common::Numbers;
 use crate::common::rays::{Line, packets};
 use crate::geometry::bits::{any_line, forms};
 use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
-use zerkalo::primitive::{AccelerationStructure, Aggregate, Form, SphereForm};
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single};
+use zerkalo_kernel::primitive::{AccelerationStructure, Aggregate, Form, SphereForm};
 
 /// Returns `count` random primitives of every kind, crowded in a cube of half-width 10. In half of
 /// the cases they are on a lattice, where many faces are coplanar.

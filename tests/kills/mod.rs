@@ -20,9 +20,9 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use zerkalo::film::read_exr;
-use zerkalo::scene::Recovery;
-use zerkalo::terminal::{ENTER, LEAVE};
+use zerkalo_render::film::read_exr;
+use zerkalo_scene::Recovery;
+use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
 const RUNS: usize = 100;

@@ -7,8 +7,8 @@ use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::update::update;
-use zerkalo::render::schedule::Stop;
-use zerkalo::scene::Document;
+use zerkalo_render::schedule::Stop;
+use zerkalo_scene::Document;
 
 /// Text of a scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.

@@ -4,13 +4,13 @@ use crate::support;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::render::schedule::{Schedule, Step, Stop};
-use zerkalo::scene::Scene;
-use zerkalo::terminal::cells::{Colors, Oklab, PictureCells, Raster};
-use zerkalo::terminal::diff::TargetFrame;
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_render::schedule::{Schedule, Step, Stop};
+use zerkalo_scene::Scene;
+use zerkalo_terminal::cells::{Colors, Oklab, PictureCells, Raster};
+use zerkalo_terminal::diff::TargetFrame;
+use zerkalo_world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
 /// Area of the picture on the screen: all rows except the last one, which shows text.

@@ -9,12 +9,12 @@ use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
-use zerkalo::film::{Display, LinearImage, Tone};
-use zerkalo::lanes::{SimdFloat, Single};
-use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::render::session::{Session, Snapshot, State, View};
-use zerkalo::scene::Scene;
-use zerkalo::value::Color;
+use zerkalo_kernel::lanes::{SimdFloat, Single};
+use zerkalo_render::film::{Display, LinearImage, Tone};
+use zerkalo_render::schedule::{Stop, StoppedBy};
+use zerkalo_render::session::{Session, Snapshot, State, View};
+use zerkalo_scene::Scene;
+use zerkalo_scene::value::Color;
 
 const SCENE: &str = r#"
 [film]

@@ -2,10 +2,10 @@
 
 use super::{finish, scene, spp};
 use crate::support;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::render::session::Session;
-use zerkalo::value::Color;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_render::session::Session;
+use zerkalo_scene::value::Color;
 
 /// Returns the picture of a session in 8-bit levels, not rounded, and the estimated noise of this
 /// picture.

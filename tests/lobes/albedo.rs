@@ -2,8 +2,8 @@
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::material::{Lobe, Masking};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_scene::material::{Lobe, Masking};
 
 const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
 

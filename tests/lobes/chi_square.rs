@@ -5,8 +5,8 @@ use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
 use crate::lobes::stats::chi_square_p;
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};
+use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Single, Vec3};
+use zerkalo_scene::material::{Bsdf, Lobe, Material, ReflectionLobe};
 
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];

@@ -4,9 +4,9 @@ use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
 use crate::lobes::stats::slope;
 use std::f64::consts::{FRAC_PI_2, PI};
-use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
-use zerkalo::sampling::warp;
+use zerkalo_kernel::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
+use zerkalo_kernel::sampling::warp;
+use zerkalo_scene::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 
 /// Returns the fraction of a uniform cone of half-angle `theta` in a half-space whose boundary
 /// contains the apex. `delta` is the angle of the axis to the boundary; if it is positive, the axis

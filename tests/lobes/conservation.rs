@@ -4,13 +4,13 @@
 use crate::lobes::properties::{BsdfProperties, Energy, ReflectionModel, transmission_properties};
 use crate::lobes::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use zerkalo::lanes::{Double, Frame, SimdFloat, Vec3};
-use zerkalo::material::{
+use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Vec3};
+use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo_scene::material::{
     Bsdf, FIELDS, Fresnel, Highlight, Interface, Lobe, Masking, Material, ReflectionLobe,
 };
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::value::{Color, TomlValue, ValueType};
-use zerkalo::world::World;
+use zerkalo_scene::value::{Color, TomlValue, ValueType};
+use zerkalo_world::World;
 
 /// Checks that the words that the scene format accepts and the lists of enum variants have the same
 /// order, so that these tests cover every word.

@@ -1,6 +1,6 @@
 //! Physical properties that the tests demand of each reflection model.
 
-use zerkalo::material::{Fresnel, Highlight, Lobe};
+use zerkalo_scene::material::{Fresnel, Highlight, Lobe};
 
 /// Energy balance of a reflection model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,8 @@
 
 use crate::lobes::setup::*;
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
+use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_scene::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 
 fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
     every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror)

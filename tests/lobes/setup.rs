@@ -1,11 +1,11 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Float, SimdFloat, Vec3};
-use zerkalo::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
-use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
+use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
+use zerkalo_scene::Scene;
+use zerkalo_scene::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
+use zerkalo_world::{MAX_GROUPS, Path, Radiance, World};
 
 pub type Vector = [f64; 3];
 
@@ -57,7 +57,7 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
         ambient: 0.0,
         diffuse: 0.0,
         specular: 1.0,
-        highlight: zerkalo::material::Highlight::CookTorrance,
+        highlight: zerkalo_scene::material::Highlight::CookTorrance,
         reflection: 1.0,
         roughness,
         lobe,
@@ -141,7 +141,7 @@ pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Materi
         alpha: Some(alpha),
         transmission: 1.0,
         ior,
-        fresnel: Some(zerkalo::material::Fresnel::Dielectric),
+        fresnel: Some(zerkalo_scene::material::Fresnel::Dielectric),
         ..reflector(lobe, masking, alpha * 8f64.sqrt())
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::common::report::report;
 use crate::lobes::setup::*;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::material::{Interface, Lobe};
-use zerkalo::primitive::Aggregate;
-use zerkalo::scene::Scene;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::Aggregate;
+use zerkalo_scene::Scene;
+use zerkalo_scene::material::{Interface, Lobe};
 
 fn mean(samples: &[Vector]) -> Vector {
     let all: Vec<_> = samples.iter().map(|s| (1.0 / samples.len() as f64, *s)).collect();

@@ -3,10 +3,10 @@
 use crate::common::report::report;
 use crate::lobes::properties::{Energy, ReflectionModel};
 use crate::lobes::setup::*;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::material::{Lobe, Masking};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use zerkalo_scene::Scene;
+use zerkalo_scene::material::{Lobe, Masking};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 /// Checks that every sample of a ball in a white furnace is exactly rho, for every
 /// energy-conserving lobe. At the silhouette, lobe directions are partly below the surface and

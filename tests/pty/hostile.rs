@@ -1,7 +1,7 @@
 //! Hostile scene, whose names contain control sequences.
 
 use super::*;
-use zerkalo::scene::BUILT_IN;
+use zerkalo_scene::BUILT_IN;
 
 /// Text with sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse the
 /// text direction.

@@ -1,7 +1,7 @@
 //! Limits of the dashboard's memory and number of threads.
 
 use super::*;
-use zerkalo::scene::BUILT_IN;
+use zerkalo_scene::BUILT_IN;
 
 /// Checks the refusal of a film of 4.4 GB under a limit of 1.5 GB of address space.
 #[test]

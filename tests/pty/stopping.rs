@@ -4,8 +4,8 @@ use super::life::signal;
 use super::*;
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
-use zerkalo::scene::BUILT_IN;
-use zerkalo::terminal::{ENTER, LEAVE};
+use zerkalo_scene::BUILT_IN;
+use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Starts a shell with job control and a plain prompt in the test terminal.
 fn shell(fixture: &Fixture) -> Terminal {

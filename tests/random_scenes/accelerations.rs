@@ -4,9 +4,9 @@
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::test_film::TestFilm;
 use crate::support::{accelerated, picture};
-use zerkalo::film::Replicates;
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_world::Precision;
 
 /// Number of samples per pixel in each of the two replicates (halves of the samples). It is not a
 /// multiple of the packet width.

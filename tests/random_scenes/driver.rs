@@ -9,7 +9,7 @@ use std::fs;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Result of the comparison of a scene's pictures.
 pub enum Verdict {

@@ -7,8 +7,8 @@ use crate::random_scenes::precisions::{levels, paired};
 use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::words::log;
 use glam::DVec3;
-use zerkalo::scene::{Filter, Object, RayTypes, Scale, Scene, TransformOp};
-use zerkalo::world::Precision;
+use zerkalo_scene::{Filter, Object, RayTypes, Scale, Scene, TransformOp};
+use zerkalo_world::Precision;
 
 /// Typical relative change of an object's size. The change of each object is 0.2 to 5 times this
 /// value.

@@ -4,8 +4,8 @@ use crate::common::Numbers;
 use crate::random_scenes::objects::{Finish, Stock, combined, named, object, resolved};
 use crate::random_scenes::words::{chance, log, pick};
 use glam::DVec3;
-use zerkalo::scene::{Object, Scale, TransformOp};
-use zerkalo::shape::Shape;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::{Object, Scale, TransformOp};
 
 /// Kind of arrangement of the objects of a random scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,11 +7,11 @@ use glam::DVec3;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use toml::{Table, Value};
-use zerkalo::asset::Assets;
-use zerkalo::material::{self, Material};
-use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
-use zerkalo::shape::{CsgOperand, KINDS, Shape};
-use zerkalo::value::{Color, Field, TomlValue, ValueType};
+use zerkalo_scene::asset::Assets;
+use zerkalo_scene::material::{self, Material};
+use zerkalo_scene::shape::{CsgOperand, KINDS, Shape};
+use zerkalo_scene::value::{Color, Field, TomlValue, ValueType};
+use zerkalo_scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 
 /// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[

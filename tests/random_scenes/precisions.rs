@@ -4,9 +4,9 @@ use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::gaps::shows_coincident_opaque;
 use crate::random_scenes::statistics::{Worst, blocks, mean_and_error, mean_of};
 use crate::support::{picture, rendered};
-use zerkalo::film::{Display, Replicates};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_scene::{Filter, Scene};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 const SEEDS: u64 = 8;
 /// Number of samples per pixel in each of the two replicates (halves of the samples).

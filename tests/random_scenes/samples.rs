@@ -9,11 +9,11 @@ use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
 use std::ops::Range;
-use zerkalo::film::{Display, Replicates, TILE};
-use zerkalo::render::RenderState;
-use zerkalo::render::schedule::{Step, Stop};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::RenderState;
+use zerkalo_render::film::{Display, Replicates, TILE};
+use zerkalo_render::schedule::{Step, Stop};
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Number of seeds of the first comparison of a scene, which a second one may follow.
 const SEEDS: u64 = 8;

@@ -8,13 +8,15 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::{Table, Value};
-use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
-use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
-use zerkalo::scene::{
+use zerkalo_kernel::primitive::{
+    ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm,
+};
+use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
+use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
+use zerkalo_scene::value::{Color, Description, Field, TomlValue};
+use zerkalo_scene::{
     Acceleration, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
 };
-use zerkalo::value::{Color, Description, Field, TomlValue};
 
 /// Random scene, with its text.
 pub struct Random {
@@ -98,7 +100,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         ..Scene::default()
     };
     if chance(numbers, 1, 4) {
-        scene.film.filter = zerkalo::scene::Filter::Point;
+        scene.film.filter = zerkalo_scene::Filter::Point;
     }
     if chance(numbers, 1, 8) {
         scene.film.rays_per_pixel = 8;

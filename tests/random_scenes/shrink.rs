@@ -4,7 +4,7 @@
 use crate::common::NAME;
 use std::time::{Duration, Instant};
 use toml::{Table, Value};
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Step of a path in a TOML document: a key, or an index in a list.
 #[derive(Clone)]

@@ -5,9 +5,9 @@ use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::scene::seeds_of;
 use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
-use zerkalo::film::{Display, Replicates};
-use zerkalo::scene::Scene;
-use zerkalo::world::{self, AnyWorld, Precision};
+use zerkalo_render::film::{Display, Replicates};
+use zerkalo_scene::Scene;
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 

@@ -4,10 +4,10 @@
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::test_film::TestFilm;
 use crate::support::{begin, pool, settings, trace};
-use zerkalo::film::Noise;
-use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Noise;
+use zerkalo_render::schedule::{Step, Stop, StoppedBy};
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;

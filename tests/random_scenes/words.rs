@@ -4,7 +4,7 @@
 use crate::common::Numbers;
 use glam::DVec3;
 use toml::{Table, Value};
-use zerkalo::value::{DefaultValue, Field, NumberRange, ValueType};
+use zerkalo_scene::value::{DefaultValue, Field, NumberRange, ValueType};
 
 /// Function that returns the value of a key. If it returns `None`, the key gets a random value that
 /// the format table allows.

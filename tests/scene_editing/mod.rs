@@ -9,11 +9,11 @@ mod random;
 
 use layouts::LAYOUTS;
 use proptest::prelude::*;
-use zerkalo::camera::ViewAngle;
-use zerkalo::scene::edit::{Target, rename, store_view};
-use zerkalo::scene::{Document, Object, Scale, Scene, TransformOp};
-use zerkalo::shape::{Plane, Shape, Sphere};
-use zerkalo::value::Color;
+use zerkalo_scene::camera::ViewAngle;
+use zerkalo_scene::edit::{Target, rename, store_view};
+use zerkalo_scene::shape::{Plane, Shape, Sphere};
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{Document, Object, Scale, Scene, TransformOp};
 
 fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use proptest::prelude::*;
-use zerkalo::camera::{Camera, ViewAngle};
+use zerkalo_scene::camera::{Camera, ViewAngle};
 
 /// Returns the camera of the mirror room.
 fn aimed() -> Camera {

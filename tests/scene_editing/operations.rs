@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use zerkalo::scene::edit::{self, Edit, EditError, Target, Widget};
-use zerkalo::scene::{BUILT_IN, Document, History, Scene};
+use zerkalo_scene::edit::{self, Edit, EditError, Target, Widget};
+use zerkalo_scene::{BUILT_IN, Document, History, Scene};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 

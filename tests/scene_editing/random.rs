@@ -1,15 +1,15 @@
 //! Random valid scenes and random edits.
 
 use proptest::prelude::*;
-use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::light::{Directional, Falloff, Light, Point};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Material, Metal};
-use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
-use zerkalo::shape::{
+use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
+use zerkalo_scene::light::{Directional, Falloff, Light, Point};
+use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Material, Metal};
+use zerkalo_scene::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, Plane,
     Prism, Pyramid, Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitFrustum,
 };
-use zerkalo::value::Color;
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
 
 fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![

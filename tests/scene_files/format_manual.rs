@@ -2,9 +2,9 @@
 
 use crate::common::shape_examples::EXAMPLES;
 use std::fmt::Write as _;
-use zerkalo::scene::FIELDS;
-use zerkalo::shape::{KINDS, TransformOp};
-use zerkalo::value::{DefaultValue, Field, ValueType};
+use zerkalo_scene::FIELDS;
+use zerkalo_scene::shape::{KINDS, TransformOp};
+use zerkalo_scene::value::{DefaultValue, Field, ValueType};
 
 const INTRODUCTION: &str = "\
 # Scene files

@@ -3,18 +3,18 @@
 use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
-use zerkalo::camera::{Camera, Focus as LensFocus};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::COMMANDS;
-use zerkalo::film::Tone;
-use zerkalo::light::Light;
-use zerkalo::material::{Lobe, Material};
-use zerkalo::scene::Scene;
-use zerkalo::scene::edit::Target;
-use zerkalo::shape::Shape;
+use zerkalo_render::film::Tone;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::{Camera, Focus as LensFocus};
+use zerkalo_scene::edit::Target;
+use zerkalo_scene::light::Light;
+use zerkalo_scene::material::{Lobe, Material};
+use zerkalo_scene::shape::Shape;
 
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);

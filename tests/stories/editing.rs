@@ -5,8 +5,8 @@ use std::time::Duration;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::scene::edit::Target;
-use zerkalo::shape::Shape;
+use zerkalo_scene::edit::Target;
+use zerkalo_scene::shape::Shape;
 
 const BALL: Target = Target::Object(1);
 

@@ -7,8 +7,8 @@ use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::scene::BUILT_IN;
-use zerkalo::terminal::event::{Button, Code, Key, MouseKind};
+use zerkalo_scene::BUILT_IN;
+use zerkalo_terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
 /// Label of the command that quits the program.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::scene::Scene;
+use zerkalo_scene::Scene;
 
 /// Returns the autosave requests since the last call. Each is a scene to be saved, or `None` if the
 /// recovery file is to be removed.

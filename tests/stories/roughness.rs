@@ -4,10 +4,10 @@
 use crate::stories::simulated_dashboard::Desk;
 use crate::support::test_film::TestFilm;
 use crate::support::{pool, rendered, sized};
-use zerkalo::render::{FirstHitBuffer, RenderState};
-use zerkalo::scene::{BUILT_IN, Scene};
-use zerkalo::value::Color;
-use zerkalo::world::{FirstHit, Precision};
+use zerkalo_render::{FirstHitBuffer, RenderState};
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{BUILT_IN, Scene};
+use zerkalo_world::{FirstHit, Precision};
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;

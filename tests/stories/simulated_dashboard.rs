@@ -11,11 +11,11 @@ use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::dashboard::update::update;
-use zerkalo::film::{Film, Header, LightWeights, LinearImage};
-use zerkalo::render::schedule::Stop;
-use zerkalo::scene::edit::Target;
-use zerkalo::scene::{Document, SaveError, Scene};
-use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
+use zerkalo_render::film::{Film, Header, LightWeights, LinearImage};
+use zerkalo_render::schedule::Stop;
+use zerkalo_scene::edit::Target;
+use zerkalo_scene::{Document, SaveError, Scene};
+use zerkalo_terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
 /// Path of the scene file.
 pub const FILE: &str = "room.toml";

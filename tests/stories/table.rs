@@ -4,7 +4,7 @@ use crate::stories::watch;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::terminal::event::Key;
+use zerkalo_terminal::event::Key;
 
 #[test]
 fn every_key_runs_one_command_per_context() {

@@ -7,10 +7,10 @@ use zerkalo::dashboard::hints::{HelpLine, help};
 use zerkalo::dashboard::key_context::KeyContext;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Message};
 use zerkalo::dashboard::update::commands::COMMANDS;
-use zerkalo::film::Display;
-use zerkalo::render::session::{WatchReport, WatchedShards, WatchedState};
-use zerkalo::scene::BUILT_IN;
-use zerkalo::terminal::event::{Button, Mouse, MouseKind};
+use zerkalo_render::film::Display;
+use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
+use zerkalo_scene::BUILT_IN;
+use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 fn shard(number: usize, state: WatchedState) -> WatchedShards {
     WatchedShards {

@@ -11,14 +11,14 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
-use zerkalo::film::{Display, Film, LightWeights, Replicates, TILE, Tile};
-use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
-use zerkalo::render::session::Session;
-use zerkalo::render::wave::{Job, Wave, WaveReport};
-use zerkalo::render::{Options, RenderState};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Acceleration, Filter, Scene};
-use zerkalo::world::{self, Precision};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::{Display, Film, LightWeights, Replicates, TILE, Tile};
+use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
+use zerkalo_render::session::Session;
+use zerkalo_render::wave::{Job, Wave, WaveReport};
+use zerkalo_render::{Options, RenderState};
+use zerkalo_scene::{Acceleration, Filter, Scene};
+use zerkalo_world::{self as world, Precision};
 
 /// Returns the scene `name` of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {

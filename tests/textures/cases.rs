@@ -10,9 +10,9 @@ use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;
 use std::fmt::Write;
 use tempfile::TempDir;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::Scene;
+use zerkalo_world::Precision;
 
 /// Folder of scenes, with two images of random pixels.
 pub struct Desk {

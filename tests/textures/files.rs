@@ -6,7 +6,7 @@ use png::{BitDepth, ColorType};
 use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
-use zerkalo::asset::Assets;
+use zerkalo_scene::asset::Assets;
 
 /// Returns a pseudo-random number from 0 to 1 for a pair of integers.
 fn hashed(x: i64, y: i64) -> f64 {

@@ -7,12 +7,12 @@ use png::{BitDepth, ColorType};
 use std::fs;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use zerkalo::asset::{Assets, LoadProgress};
-use zerkalo::film::Replicates;
-use zerkalo::material::Fresnel;
-use zerkalo::scene::edit::{Target, Widget, rows, set, step, toggle};
-use zerkalo::scene::{Document, Scene, SceneFile};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use zerkalo_render::film::Replicates;
+use zerkalo_scene::asset::{Assets, LoadProgress};
+use zerkalo_scene::edit::{Target, Widget, rows, set, step, toggle};
+use zerkalo_scene::material::Fresnel;
+use zerkalo_scene::{Document, Scene, SceneFile};
+use zerkalo_world::{AnyWorld, Options, Precision};
 
 fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
@@ -26,7 +26,7 @@ fn bump_without_height_changes_no_bit() {
     let with_height = |factor: f64| {
         let mut scene = bumpy.clone();
         for material in scene.materials.values_mut() {
-            if let Some(zerkalo::material::Bump::Image(image)) = &mut material.bump {
+            if let Some(zerkalo_scene::material::Bump::Image(image)) = &mut material.bump {
                 image.height *= factor;
             }
         }

@@ -9,8 +9,8 @@ use crate::textures::direct::{Lay, Solid};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
-use zerkalo::film::Replicates;
-use zerkalo::world::Precision;
+use zerkalo_render::film::Replicates;
+use zerkalo_world::Precision;
 
 #[test]
 fn every_mapping_of_an_image() {

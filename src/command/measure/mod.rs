@@ -7,13 +7,13 @@ mod table;
 use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
 use crate::command::{Failure, handle_signals, print_line, read_scene_and_warn};
-use crate::disk::{self, check_writable};
-use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
-use crate::world::{self, AnyWorld};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
+use zerkalo_render::film::{self, Display};
+use zerkalo_scene::disk::{self, check_writable};
+use zerkalo_world::{self as world, AnyWorld};
 
 /// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];

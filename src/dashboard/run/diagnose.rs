@@ -1,14 +1,14 @@
 //! Diagnostics of the terminal and its connection, without visible output.
 
 use crate::dashboard::run::job_control::handle_signals;
-use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
-use crate::terminal::{
-    Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, SignalQueue, Tty,
-    cell_px, cursor_request, query_capabilities, size,
-};
 use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
+use zerkalo_terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
+use zerkalo_terminal::{
+    Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, SignalQueue, Tty,
+    cell_px, cursor_request, query_capabilities, size,
+};
 
 /// Timeout for a reply to a request that the terminal may not support.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -5,17 +5,17 @@ use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport, ima
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
-use crate::film::LinearImage;
-use crate::render::Options;
-use crate::render::plan::WatchedFilms;
-use crate::render::schedule::Settings;
-use crate::render::session::Session;
-use crate::scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_render::Options;
+use zerkalo_render::film::LinearImage;
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::session::Session;
+use zerkalo_scene::{Scene, SceneFile};
 
 /// Niceness of tracing threads with low priority: the largest value of Linux. Threads of normal
 /// priority get nearly all the time of a processor that they share with such a thread.

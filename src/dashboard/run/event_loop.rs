@@ -11,13 +11,13 @@ use crate::dashboard::run::input::{self, Input};
 use crate::dashboard::run::job_control::{ResizeDebounce, TerminalIo, stop_group};
 use crate::dashboard::run::latency::LatencyRecorder;
 use crate::dashboard::update::update;
-use crate::render::session::{Snapshot, State};
-use crate::terminal::flow::LinkStatus;
-use crate::terminal::{Event, HUNG_UP, Reply, TimedEvent};
 use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::{Event, HUNG_UP, Reply, TimedEvent};
 
 /// Shortest interval between two updates of the displayed connection status, and between two
 /// updates of the displayed upload progress.

@@ -2,13 +2,13 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::event_loop::Dashboard;
-use crate::terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use std::io;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
+use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
 
 /// Grace period after a terminating signal. If the dashboard has not ended by then, the thread that
 /// handles signals restores the terminal and ends the program.

@@ -14,13 +14,6 @@ mod writer;
 
 use crate::dashboard::message::{Exported, Message};
 use crate::dashboard::model::Model;
-use crate::render::plan::WatchedFilms;
-use crate::render::schedule::{Settings, Stop};
-use crate::render::{Checkpoint, Options};
-use crate::scene::{SceneErrors, SceneFile};
-use crate::terminal::{
-    Environment, HUNG_UP, InputReader, Screen, SignalQueue, query_capabilities, size,
-};
 use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
 use event_loop::Dashboard;
@@ -31,6 +24,13 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::{
+    Environment, HUNG_UP, InputReader, Screen, SignalQueue, query_capabilities, size,
+};
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};

@@ -7,12 +7,12 @@ use crate::dashboard::panel_lines::{FieldLine, PanelLine};
 use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
-use crate::film::Display;
-use crate::scene::edit::{Property, Widget};
-use crate::value::{number, round_significant};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
+use zerkalo_render::film::Display;
+use zerkalo_scene::edit::{Property, Widget};
+use zerkalo_scene::value::{number, round_significant};
 
 /// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
 /// the property under the cursor.

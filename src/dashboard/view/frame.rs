@@ -7,8 +7,8 @@ use crate::dashboard::text::{columns, cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
-use crate::film::Tone;
 use ratatui::style::Modifier;
+use zerkalo_render::film::Tone;
 
 /// Draws the border of the picture's panel with file name, mode, channel, exposure, tone curve and
 /// legend. Draws nothing in full screen.

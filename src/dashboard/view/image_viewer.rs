@@ -4,10 +4,10 @@ use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::paint;
-use crate::terminal::cells::PictureCells;
-use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
+use zerkalo_terminal::cells::PictureCells;
+use zerkalo_terminal::image::{Protocol, ViewerImage};
 
 /// Draws the viewed image in half blocks (characters that show two pixels per cell) and returns
 /// these cells. If the terminal supports an image protocol, the uploaded image later replaces the

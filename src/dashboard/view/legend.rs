@@ -3,9 +3,9 @@
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
-use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 use ratatui::layout::Rect;
 use ratatui::style::Style;
+use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 
 /// Width of the legend's colour bar in columns.
 const BAR: usize = 12;

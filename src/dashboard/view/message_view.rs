@@ -5,11 +5,11 @@ use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
-use crate::render::session::State;
-use crate::scene::Diagnostic;
-use crate::value::sanitized;
 use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
+use zerkalo_render::session::State;
+use zerkalo_scene::Diagnostic;
+use zerkalo_scene::value::sanitized;
 
 /// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {

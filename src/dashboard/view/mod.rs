@@ -24,7 +24,6 @@ use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::text;
-use crate::terminal::cells::{Colors, PictureCells};
 use painter::Painter;
 use picture::PictureView;
 pub use picture::is_settled;
@@ -32,6 +31,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::style::Style;
 use theme::Theme;
+use zerkalo_terminal::cells::{Colors, PictureCells};
 
 /// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]

@@ -7,8 +7,8 @@ use crate::dashboard::panel_lines::{OutlineEntry, OutlineLine, outline};
 use crate::dashboard::text::columns;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, VisibleLine};
-use crate::scene::edit::Target;
-use crate::terminal::cells::object_color;
+use zerkalo_scene::edit::Target;
+use zerkalo_terminal::cells::object_color;
 
 /// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {

@@ -10,9 +10,9 @@ use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
-use crate::render::session::QUALITIES;
 use ratatui::layout::Position;
 use ratatui::style::Style;
+use zerkalo_render::session::QUALITIES;
 
 /// Draws the open overlay. Returns the position of the text cursor, or `None` if the cursor is
 /// hidden.

@@ -2,12 +2,12 @@
 
 use crate::dashboard::text::{columns, cut, wrapped};
 use crate::dashboard::view::theme::Theme;
-use crate::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::widgets::{Block, Clear, Widget};
 use std::borrow::Cow;
+use zerkalo_scene::value::sanitized;
 
 /// Buffer of cells, and the theme in which it is drawn.
 pub struct Painter<'a> {
@@ -174,7 +174,7 @@ fn safe(text: &str) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terminal::cells::Colors;
+    use zerkalo_terminal::cells::Colors;
 
     #[test]
     fn text_is_clipped_to_its_area() {

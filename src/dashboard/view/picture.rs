@@ -5,16 +5,16 @@ use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
-use crate::film::{Display, LinearImage, TILE};
-use crate::render::session::{Snapshot, State};
-use crate::terminal::cells::{
-    NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
-};
-use crate::world::FirstHit;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::sync::Arc;
+use zerkalo_render::film::{Display, LinearImage, TILE};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_terminal::cells::{
+    NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
+};
+use zerkalo_world::FirstHit;
 
 /// Converter of the dashboard's model to rasters: images whose pixels are half cells of the
 /// terminal. It caches the pinned picture (an earlier picture that the user has stored for

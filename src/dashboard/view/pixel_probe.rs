@@ -4,10 +4,10 @@ use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Painter;
-use crate::film::quantised_8;
-use crate::scene::edit::Target;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
+use zerkalo_render::film::quantised_8;
+use zerkalo_scene::edit::Target;
 
 /// Width in columns of the box with the values of the probed pixel, with its border.
 const WIDTH: u16 = 36;

@@ -7,12 +7,12 @@ use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
-use crate::render::schedule::StoppedBy;
-use crate::render::session::{Report, State};
-use crate::terminal::Multiplexer;
-use crate::terminal::flow::PacingMode;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
+use zerkalo_render::schedule::StoppedBy;
+use zerkalo_render::session::{Report, State};
+use zerkalo_terminal::Multiplexer;
+use zerkalo_terminal::flow::PacingMode;
 
 /// Part of the status line, such as the noise or the sample count. A part is shown or omitted as a
 /// whole.

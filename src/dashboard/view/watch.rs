@@ -7,11 +7,11 @@ use crate::dashboard::text::wrapped;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
-use crate::render::session::{WatchReport, WatchedShards, WatchedState};
-use crate::value::sanitized;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
+use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
+use zerkalo_scene::value::sanitized;
 
 /// Width, in terminal columns, of the table column with the time since each file was written.
 const AGE: usize = 7;

@@ -4,11 +4,11 @@
 use crate::dashboard::message::Message;
 use crate::dashboard::run::files::autosave::Autosave;
 use crate::dashboard::run::files::{Job, SharedFile};
-use crate::scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_scene::{Scene, SceneFile};
 
 pub enum AutosaveJob {
     /// Schedule an autosave of this scene. `None` cancels it and removes the recovery file.

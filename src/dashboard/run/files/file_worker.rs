@@ -2,12 +2,12 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::files::{AutosaveJob, SharedFile};
-use crate::disk::FileStamp;
-use crate::scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks of the scene file for changes by other programs.
 pub const CHECK_INTERVAL: Duration = Duration::from_secs(1);

@@ -8,8 +8,6 @@ mod shared_file;
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::worker::Worker;
-use crate::disk::FileStamp;
-use crate::scene::{Recovery, Scene, SceneFile};
 use autosave::Autosave;
 pub use autosave_worker::AutosaveJob;
 use autosave_worker::AutosaveWorker;
@@ -22,6 +20,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::{Recovery, Scene, SceneFile};
 
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
@@ -183,10 +183,10 @@ fn keep_elsewhere(
 mod tests {
     use super::file_worker::CHECK_INTERVAL;
     use super::*;
-    use crate::scene::starter;
-    use crate::scene::{SaveError, SceneErrors};
     use crossbeam_channel::Receiver;
     use std::fs;
+    use zerkalo_scene::starter;
+    use zerkalo_scene::{SaveError, SceneErrors};
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
     /// it.

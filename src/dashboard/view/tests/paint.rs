@@ -5,16 +5,16 @@
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
-use crate::film::Display;
-use crate::render::Options;
-use crate::render::schedule::{Criterion, Settings, Stop};
-use crate::render::session::{Session, Snapshot, State, View};
-use crate::sampling::{SampleSettings, SamplerKind};
-use crate::terminal::diff::Encoder;
-use crate::world;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::Options;
+use zerkalo_render::film::Display;
+use zerkalo_render::schedule::{Criterion, Settings, Stop};
+use zerkalo_render::session::{Session, Snapshot, State, View};
+use zerkalo_terminal::diff::Encoder;
+use zerkalo_world as world;
 
 fn rendered(model: &Model, spp: u32) -> Snapshot {
     let options = Options {

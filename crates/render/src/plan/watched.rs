@@ -1,0 +1,466 @@
+//! Watched films: film files that other processes write, and the sum of their films. A file is read
+//! again when it is replaced.
+//!
+//! After a change all films are added again, which takes the memory of one film, whatever the number
+//! of files.
+
+use crate::checkpoint::seconds_of;
+use crate::film::Film;
+use crate::film::file::{FilmFileHeader, FilmReader};
+use crate::memory_budget;
+use crate::plan::merge::without_plan;
+use crate::plan::merge_inputs::{MergeInput, Plans, join};
+use crate::plan::part::{Part, PartShard, ranges};
+use crate::plan::{BASE, Plan, is_plan_file};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::value::{sort_by_number, total_order};
+
+/// Time since its last replacement after which an unfinished film file counts as late. `zerkalo
+/// render` replaces its files every minute.
+const LATE: Duration = Duration::from_secs(180);
+
+/// Film files that other processes write, and the sum of their films.
+#[derive(Debug, Default)]
+pub struct WatchedFilms {
+    files: Vec<WatchedFile>,
+    plans: Plans,
+    /// Plan file that the user named, as an input without shards. `None` if the user named film
+    /// files.
+    named: Option<MergeInput>,
+    /// Plan that all film files share. `None` before the first file, and for a checkpoint of a
+    /// render without a plan.
+    plan: Option<Arc<Plan>>,
+    /// Header and film of the file that would hold the sum of all films. `None` if no file can be
+    /// read.
+    sum: Option<(FilmFileHeader, Film)>,
+}
+
+/// Film file that another process may replace at any time.
+#[derive(Debug)]
+struct WatchedFile {
+    path: PathBuf,
+    /// Shard that the plan file names for this path. `None` if the user named film files.
+    shard: Option<u32>,
+    /// Stamp of the file when it was last read. `None` for a missing file.
+    stamp: Option<FileStamp>,
+    contents: Contents,
+    /// Number of samples, over all pixels, that the file contributes to the sum.
+    samples: u64,
+    /// Number of samples of the file's shards when they are complete. `None` before the file is
+    /// added, and without a plan.
+    total: Option<u64>,
+}
+
+#[derive(Debug)]
+enum Contents {
+    Missing,
+    /// Unusable file, with the reason.
+    Refused(String),
+    Part(MergeInput),
+    /// Checkpoint of a render without a plan, with its seconds of rendering.
+    Checkpoint(f64),
+}
+
+/// State of a watched film file, or of shards that no file holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WatchedState {
+    /// The file holds all samples of its shards.
+    Complete,
+    /// The file is unfinished, and was replaced in the last three minutes.
+    Running,
+    /// The file is unfinished, and has not been replaced for three minutes.
+    Late,
+    /// No file holds these shards.
+    Missing,
+    /// The file cannot be used, for the given reason.
+    Refused(String),
+}
+
+/// Row in the list of watched files: a film file, or shards that no file holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WatchedShards {
+    /// Numbers of the shards, such as `3` or `5-7`; empty if they are unknown.
+    pub shards: String,
+    /// Path of the film file. `None` for shards that no file holds.
+    pub path: Option<PathBuf>,
+    /// State of the file.
+    pub state: WatchedState,
+    /// Number of samples in the file, over all pixels and both replicates.
+    pub samples: u64,
+    /// Value of `samples` for a complete file; `None` if it is unknown.
+    pub total: Option<u64>,
+    /// Time since the last modification of the file. `None` if there is no file.
+    pub age: Option<Duration>,
+}
+
+impl WatchedFilms {
+    /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
+    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on.
+    ///
+    /// # Errors
+    /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
+    pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
+        let mut films = Self::default();
+        for path in paths {
+            if is_plan_file(path) {
+                films.name_plan(path)?;
+            } else {
+                films.files.push(WatchedFile::new(path.clone(), None));
+            }
+        }
+        let changed = films.read_changed();
+        if let Some(reason) = films.accept(&changed) {
+            return Err(reason);
+        }
+        films.add();
+        Ok(films)
+    }
+
+    /// Reads the headers of the film files at `paths`, which belong to one plan.
+    ///
+    /// # Errors
+    /// Fails if a file cannot be read or has no plan, or if the films of two files cannot be added.
+    pub(super) fn parts(paths: &[PathBuf]) -> Result<Self, String> {
+        let files = paths.iter().map(|path| WatchedFile::new(path.clone(), None)).collect();
+        let mut films = Self { files, ..Self::default() };
+        films.read_changed();
+        films.files.iter().try_for_each(|file| match &file.contents {
+            Contents::Part(_) => Ok(()),
+            Contents::Refused(reason) => Err(reason.clone()),
+            Contents::Missing => Contents::read(&file.path, &mut Plans::default()).map(drop),
+            Contents::Checkpoint(_) => Err(without_plan(&file.path)),
+        })?;
+        films.try_join().map(|()| films)
+    }
+
+    fn name_plan(&mut self, path: &Path) -> Result<(), String> {
+        let plan = Plan::read(path).map_err(|error| error.to_string())?;
+        // The base of a plan that continues an earlier one is the merged film of the earlier plan,
+        // whose name does not follow from that of the plan.
+        let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        self.files.extend((first..=plan.settings.shards).map(|shard| {
+            WatchedFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
+        }));
+        let input = self.plans.input(path, Part { plan, shards: Vec::new(), rays: 0 });
+        match self.named.replace(input) {
+            None => Ok(()),
+            Some(other) => {
+                let [one, two] = [other.path.display(), path.display()];
+                Err(format!("{one} and {two} are two plans; name one of them"))
+            }
+        }
+    }
+
+    /// Reads the film files that were replaced since the last call. Returns `true` if there were
+    /// any.
+    pub fn poll(&mut self) -> bool {
+        let changed = self.read_changed();
+        if !changed.is_empty() {
+            self.accept(&changed);
+            self.add();
+        }
+        !changed.is_empty()
+    }
+
+    /// Returns the sum of all films. Returns `None` if no file can be read.
+    pub fn film(&self) -> Option<&Film> {
+        self.sum.as_ref().map(|(_, film)| film)
+    }
+
+    /// Returns the header of a film file for the sum of all films, with the plan and the list of
+    /// shards. Returns `None` if no file can be read.
+    pub fn header(&self) -> Option<&FilmFileHeader> {
+        self.sum.as_ref().map(|(header, _)| header)
+    }
+
+    pub(super) fn into_sum(self) -> Option<(FilmFileHeader, Film)> {
+        self.sum
+    }
+
+    /// Returns the plan that all files share. Returns `None` before the first file, and for a
+    /// checkpoint of a render without a plan.
+    pub fn plan(&self) -> Option<&Plan> {
+        self.plan.as_deref()
+    }
+
+    /// Returns the number of rays of all samples in the films.
+    pub fn rays(&self) -> u64 {
+        self.inputs().map(|input| input.rays).sum()
+    }
+
+    /// Returns the seconds of rendering. For a checkpoint they are those of its render. For the
+    /// files of a plan they are the time from the earliest to the latest modification of a file.
+    pub fn seconds(&self) -> f64 {
+        if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
+            return seconds;
+        }
+        let times = || self.files.iter().filter_map(|file| Some(file.stamp?.modified));
+        let between = times().max().zip(times().min());
+        let between = between.and_then(|(last, first)| last.duration_since(first).ok());
+        between.unwrap_or_default().as_secs_f64()
+    }
+
+    /// Returns the share of the plan's samples that the films hold, 0..=1. Returns `None` without a
+    /// plan or a film.
+    pub fn progress(&self) -> Option<f64> {
+        let (film, plan) = (self.film()?, self.plan()?);
+        let pixels = (film.width() * film.height()) as f64;
+        Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
+    }
+
+    /// Returns `[number of complete shards, number of all shards]`; the base counts as a shard.
+    /// Returns `None` without a plan.
+    pub fn complete_shards(&self) -> Option<[usize; 2]> {
+        let all = self.plan.as_ref()?.settings.shards as usize + 1;
+        Some([self.shards_held().filter(|shard| shard.complete).count(), all])
+    }
+
+    /// Returns the state at the time `now` of all files, and of the shards without a file. The most
+    /// urgent states are first: refused, missing, late, running, complete. Late files are in
+    /// ascending order of the share of their samples that is traced; so are running files.
+    pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
+        let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
+        // Missing shards of a plan file that the user named have rows already.
+        if let Some(plan) = self.plan.as_ref().filter(|_| self.named.is_none()) {
+            let mut held: Vec<u32> = self.shards_held().map(|shard| shard.number).collect();
+            held.sort_unstable();
+            let absent = plan.absent(&held);
+            if !absent.is_empty() {
+                let (path, state) = (None, WatchedState::Missing);
+                let shards = ranges(&absent);
+                rows.push(WatchedShards {
+                    shards,
+                    path,
+                    state,
+                    samples: 0,
+                    total: None,
+                    age: None,
+                });
+            }
+        }
+        let share = |row: &WatchedShards| match (&row.state, row.total) {
+            (WatchedState::Late | WatchedState::Running, Some(total)) if total > 0 => {
+                row.samples as f64 / total as f64
+            }
+            _ => 0.0,
+        };
+        sort_by_number(&mut rows, |row| total_order(share(row)));
+        sort_by_number(&mut rows, |row| match row.state {
+            WatchedState::Refused(_) => 0,
+            WatchedState::Missing => 1,
+            WatchedState::Late => 2,
+            WatchedState::Running => 3,
+            WatchedState::Complete => 4,
+        });
+        rows
+    }
+
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &MergeInput> {
+        self.files.iter().filter_map(WatchedFile::input)
+    }
+
+    fn shards_held(&self) -> impl Iterator<Item = &PartShard> {
+        self.inputs().flat_map(|input| &input.shards)
+    }
+
+    /// Reads the headers of the film files whose stamps have changed. Returns the indices of these
+    /// files.
+    fn read_changed(&mut self) -> Vec<usize> {
+        let mut changed = Vec::new();
+        for (i, file) in self.files.iter_mut().enumerate() {
+            // The stamp is taken before the file is read. If the file is replaced in the meantime,
+            // the stamps differ at the next call, and the file is read again.
+            let stamp = FileStamp::of(&file.path);
+            if stamp != file.stamp {
+                let contents = match stamp {
+                    Some(_) => Contents::read(&file.path, &mut self.plans),
+                    None => Ok(Contents::Missing),
+                };
+                let contents = contents.unwrap_or_else(Contents::Refused);
+                let path = std::mem::take(&mut file.path);
+                *file = WatchedFile { stamp, contents, ..WatchedFile::new(path, file.shard) };
+                changed.push(i);
+            }
+        }
+        changed
+    }
+
+    /// Refuses those of the `changed` files whose films cannot be added to the films of the
+    /// unchanged files and of the accepted files before them. Returns the first reason, or `None`
+    /// if all films can be added.
+    fn accept(&mut self, changed: &[usize]) -> Option<String> {
+        let reason = self.try_join().err()?;
+        let new: Vec<Contents> = changed
+            .iter()
+            .map(|i| std::mem::replace(&mut self.files[*i].contents, Contents::Missing))
+            .collect();
+        for (i, contents) in changed.iter().zip(new) {
+            self.files[*i].contents = contents;
+            if let Err(reason) = self.try_join() {
+                self.files[*i].contents = Contents::Refused(reason);
+            }
+        }
+        Some(reason)
+    }
+
+    /// Checks that the films of all usable files can be added, and stores their common plan.
+    fn try_join(&mut self) -> Result<(), String> {
+        let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
+        let mut inputs: Vec<&mut MergeInput> = self.named.iter_mut().collect();
+        for file in &mut self.files {
+            match &mut file.contents {
+                Contents::Part(input) => inputs.push(input),
+                Contents::Checkpoint(_) if !is_alone => return Err(without_plan(&file.path)),
+                Contents::Checkpoint(_) | Contents::Missing | Contents::Refused(_) => {}
+            }
+        }
+        if !inputs.is_empty() {
+            self.plan = Some(join(&mut inputs)?);
+        }
+        Ok(())
+    }
+
+    /// Computes the sum of all usable films. A file whose film cannot be added is refused.
+    fn add(&mut self) {
+        while let Err((i, reason)) = self.try_add() {
+            self.files[i].contents = Contents::Refused(reason);
+        }
+    }
+
+    /// Computes the sum of all usable films.
+    ///
+    /// # Errors
+    /// Returns the index of the file that cannot be added, and the reason.
+    pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
+        self.sum = None;
+        let mut order: Vec<(u32, usize)> = Vec::new();
+        for (i, file) in self.files.iter().enumerate() {
+            order.extend(file.first_shard().map(|shard| (shard, i)));
+        }
+        order.sort_unstable();
+        let Some((_, first)) = order.first() else { return Ok(()) };
+        let mut header = self.open_film(*first)?.header().clone();
+        let mut film = empty(&header).map_err(|reason| (*first, reason))?;
+        for (_, i) in order {
+            self.add_file(i, &mut film)?;
+        }
+        if let Some(part) = self.part() {
+            part.record(&mut header);
+        }
+        self.sum = Some((header, film));
+        Ok(())
+    }
+
+    /// Adds the film of the file with the index `i` to `film`.
+    ///
+    /// # Errors
+    /// Returns `i` and the reason why the film cannot be added.
+    fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
+        let before = film.samples();
+        self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
+        let file = &mut self.files[i];
+        file.samples = film.samples() - before;
+        if let (Contents::Part(input), None) = (&file.contents, file.total) {
+            let samples = |shard: &PartShard| input.plan.samples(shard.number);
+            file.total = Some(input.shards.iter().map(samples).sum());
+        }
+        let (samples, expected) = (file.samples, file.total.unwrap_or(file.samples));
+        if samples > expected || file.is_complete() && samples != expected {
+            let path = file.path.display();
+            let what = format!("its {samples} samples are not the {expected} of its shards");
+            return Err((i, format!("cannot use {path}: {what}; trace it again")));
+        }
+        Ok(())
+    }
+
+    fn open_film(&self, i: usize) -> Result<FilmReader<BufReader<File>>, (usize, String)> {
+        FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
+    }
+
+    /// Returns the plan that all files share, with all shards in the files. Returns `None` without a
+    /// shard.
+    pub(super) fn part(&self) -> Option<Part> {
+        let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
+        shards.sort_unstable();
+        let plan = self.plan.as_ref().filter(|_| !shards.is_empty())?;
+        Some(Part { plan: Plan::clone(plan), shards, rays: self.rays() })
+    }
+}
+
+/// Creates an empty film with the size, scales, seed and precision of `header`.
+///
+/// # Errors
+/// Fails if there is not enough memory.
+fn empty(header: &FilmFileHeader) -> Result<Film, String> {
+    let film = &header.film;
+    let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
+    memory_budget::check(size, groups, 0)?;
+    Film::try_new(film.clone()).map_err(|_| memory_budget::refused(size, groups))
+}
+
+impl Contents {
+    fn read(path: &Path, plans: &mut Plans) -> Result<Self, String> {
+        let reader = FilmReader::open(path).map_err(|error| error.to_string())?;
+        Ok(match Part::of_header(path, reader.header())? {
+            Some(part) => Self::Part(plans.input(path, part)),
+            None => Self::Checkpoint(seconds_of(reader.header())),
+        })
+    }
+}
+
+impl WatchedFile {
+    fn new(path: PathBuf, shard: Option<u32>) -> Self {
+        let contents = Contents::Missing;
+        Self { path, shard, stamp: None, contents, samples: 0, total: None }
+    }
+
+    fn input(&self) -> Option<&MergeInput> {
+        match &self.contents {
+            Contents::Part(input) => Some(input),
+            Contents::Missing | Contents::Refused(_) | Contents::Checkpoint(_) => None,
+        }
+    }
+
+    /// Returns the number of the first shard, [`BASE`] for a checkpoint, by which usable files are
+    /// ordered. Returns `None` for a file that is missing or refused.
+    fn first_shard(&self) -> Option<u32> {
+        match &self.contents {
+            Contents::Part(input) => Some(input.shards[0].number),
+            Contents::Checkpoint(_) => Some(BASE),
+            Contents::Missing | Contents::Refused(_) => None,
+        }
+    }
+
+    fn is_complete(&self) -> bool {
+        self.input().is_some_and(|input| input.shards.iter().all(|shard| shard.complete))
+    }
+
+    fn row(&self, now: SystemTime) -> WatchedShards {
+        // The clocks of two machines may differ: a modification in the future has the age 0.
+        let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
+        let age = self.stamp.map(age);
+        let shards = match self.input() {
+            Some(input) => {
+                ranges(&input.shards.iter().map(|shard| shard.number).collect::<Vec<_>>())
+            }
+            None => self.shard.map_or(String::new(), |shard| shard.to_string()),
+        };
+        let state = match &self.contents {
+            Contents::Missing => WatchedState::Missing,
+            Contents::Refused(reason) => WatchedState::Refused(reason.clone()),
+            Contents::Part(_) if self.is_complete() => WatchedState::Complete,
+            Contents::Part(_) | Contents::Checkpoint(_) => match age {
+                Some(age) if age >= LATE => WatchedState::Late,
+                _ => WatchedState::Running,
+            },
+        };
+        let path = Some(self.path.clone());
+        WatchedShards { shards, path, state, samples: self.samples, total: self.total, age }
+    }
+}
