@@ -207,7 +207,7 @@ fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
 fn extreme_tests() -> Vec<(String, String)> {
     let root = Path::new(env!("ZERKALO_ROOT"));
     let mut paths = Vec::new();
-    for folder in ["src", "tests"] {
+    for folder in ["src", "crates", "tests"] {
         rust_files(&root.join(folder), &mut paths);
     }
     let mut found = Vec::new();

@@ -43,7 +43,7 @@ impl Form {
 }
 
 /// Number of normals that approximate the circle of normals at the tip of a cone.
-pub(crate) const AROUND_TIP: u32 = 64;
+pub const AROUND_TIP: u32 = 64;
 
 impl CanonicalShape for ConicalFrustumForm {
     fn transformed(self, map: &DAffine3) -> Form {

@@ -20,7 +20,7 @@ pub enum CsgTree {
 impl CsgTree {
     /// Returns the tree with all part indices increased by `by`, for use as an operand of a larger
     /// compound.
-    pub(crate) fn shifted(self, by: usize) -> Self {
+    pub fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
             Self::Part(i) => Self::Part(i + by),

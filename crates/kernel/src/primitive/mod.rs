@@ -30,7 +30,7 @@ pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, Light
 pub use canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, box_distance,
 };
-pub use conical_frustum::ConicalFrustumForm;
+pub use conical_frustum::{AROUND_TIP, ConicalFrustumForm};
 pub use convex_polyhedron::ConvexPolyhedronForm;
 pub use csg_tree::{CsgSolid, CsgTree};
 pub use ellipsoid::EllipsoidForm;

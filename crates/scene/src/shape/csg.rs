@@ -15,7 +15,7 @@ use glam::DVec3;
 use toml::de::DeValue;
 use toml::{Spanned, Value};
 use zerkalo_kernel::primitive::Form;
-use zerkalo_kernel::primitive::csg_tree::{CsgSolid, CsgTree};
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
