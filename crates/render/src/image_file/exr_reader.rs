@@ -29,7 +29,7 @@ pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
 }
 
 /// Reads the channels `R G B` of an OpenEXR file, and the channels `A.R ..` and `B.R ..` of the two
-/// replicates (halves of the samples) if they exist.
+/// replicates if they exist.
 ///
 /// # Errors
 /// Fails if the file cannot be read, is too large, or lacks `R G B`.

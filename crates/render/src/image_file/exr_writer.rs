@@ -48,13 +48,13 @@ pub(super) fn encode(
 /// Source of the values of one channel, such as `A.R`, of the OpenEXR file.
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance summed over all light groups. The fields are the replicates (halves of the samples)
-    /// whose samples are averaged, and the colour channel (0 red, 1 green, 2 blue).
+    /// Radiance summed over all light groups. The fields are the replicates whose samples are
+    /// averaged, and the colour channel (0 red, 1 green, 2 blue).
     Mixed(Replicates, usize),
     /// Radiance of one light group alone. The fields are the group's index and the colour channel
     /// (0 red, 1 green, 2 blue).
     Group(usize, usize),
-    /// Number of samples of a pixel, summed over both replicates (halves of the samples).
+    /// Number of samples of a pixel, summed over both replicates.
     Count,
 }
 

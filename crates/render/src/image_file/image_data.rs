@@ -10,8 +10,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 pub struct ImageData<'a> {
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
-    /// Weight of each light group (lights with sums of their own in the film): colour times
-    /// intensity.
+    /// Weight of each light group: colour times intensity.
     pub mix: &'a LightWeights,
     /// Name of each light group, for file formats with layers of channels (OpenEXR).
     pub group_names: &'a [String],

@@ -26,7 +26,7 @@ fn unpadded((key, value): (String, String)) -> (String, String) {
     (key, value.trim_end_matches(' ').to_string())
 }
 
-/// Metadata of a picture file (PNG, OpenEXR) or film file (`.zk`).
+/// Metadata of a picture file (PNG, OpenEXR) or film file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
     /// Name of the file's format: `PNG`, `OpenEXR` or `film`.

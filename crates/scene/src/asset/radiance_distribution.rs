@@ -1,6 +1,6 @@
 //! Sampling distribution of directions, in proportion to the luminance of an equirectangular image.
 //!
-//! The density per solid angle is constant inside of each pixel. One random number selects a row, a
+//! The density per solid angle is constant inside each pixel. One random number selects a row, a
 //! second one selects a column of this row. Both are mapped by inverse cumulative distributions, so
 //! that stratified numbers give stratified directions (Pharr, Jakob, Humphreys, *Physically Based
 //! Rendering*, 4th ed., A.5.6).

@@ -1,5 +1,5 @@
-//! Reader of film files (`.zk`). It compares every length with the length of the file before it
-//! allocates memory.
+//! Reader of film files. It compares every length with the length of the file before it allocates
+//! memory.
 
 use crate::film::display::Display;
 use crate::film::file::encode::CHECKSUM_BYTES;
@@ -23,7 +23,7 @@ use zerkalo_scene::value::truncated;
 /// tile without samples.
 const RECORD_BYTES: u64 = 8;
 
-/// Error that makes a film file (`.zk`) unusable.
+/// Error that makes a film file unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadError {
     /// Path of the film file.
@@ -50,13 +50,13 @@ impl ReadError {
     }
 }
 
-/// Returns `true` if the file at `path` begins with the magic bytes of film files (`.zk`).
+/// Returns `true` if the file at `path` begins with the magic bytes of film files.
 pub fn is_film_file(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-/// Reader of a film file (`.zk`). It has already read everything before the tiles.
+/// Reader of a film file. It has already read everything before the tiles.
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,

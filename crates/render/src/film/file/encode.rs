@@ -1,4 +1,4 @@
-//! Writer of film files (`.zk`).
+//! Writer of film files.
 
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,

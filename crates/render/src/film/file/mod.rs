@@ -1,4 +1,4 @@
-//! Film files (`.zk`): a film with all its integer sums, and what is needed to continue its render.
+//! Film files: a film with all its integer sums, and what is needed to continue its render.
 //!
 //! All numbers are little-endian. A file consists of
 //!
@@ -17,8 +17,8 @@
 //!
 //! A text has its length in bytes (u32) before it. A tile record consists of
 //!
-//! - the numbers of samples per pixel in the replicates A and B, the two halves of the samples (u32
-//!   each). If both are 0, the record ends here;
+//! - the numbers of samples per pixel in the replicates A and B (u32 each). If both are 0, the
+//!   record ends here;
 //! - the number of samples above the largest value that the film can store (u64);
 //! - the number of invalid samples (u64);
 //! - the number of invalid samples whose positions are stored (u8), and for each of them its index

@@ -1,4 +1,4 @@
-//! Encoding of tiles in film files (`.zk`).
+//! Encoding of tiles in film files.
 
 use crate::film::TILE;
 use crate::film::file::decode::Fields;

@@ -279,7 +279,7 @@ impl<'a> Part<'a> {
 
     /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
     /// (such as a vector of three) and components of the type `kind`, and that all elements are
-    /// inside of their buffer.
+    /// inside their buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -328,7 +328,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside of the accessor's
+/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside the accessor's
 /// buffer.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
