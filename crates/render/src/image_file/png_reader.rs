@@ -1,4 +1,4 @@
-//! PNG reader, for the display of finished pictures in the dashboard.
+//! PNG reader, for the dashboard's display of finished pictures.
 
 use image::codecs::png::PngDecoder;
 use image::{DynamicImage, ImageDecoder, Limits, RgbImage};
@@ -6,14 +6,10 @@ use std::io::BufReader;
 use std::path::Path;
 use zerkalo_scene::disk::open_regular;
 
-/// Largest number of pixels of a PNG file that is read: 8192 x 8192. Larger files are refused,
-/// because the whole picture is read into memory.
+/// Largest number of pixels of a file that is read: 8192 x 8192.
 const MAX_PIXELS: u64 = 1 << 26;
 
 /// Reads a PNG file as 8-bit sRGB. Transparency is ignored.
-///
-/// # Errors
-/// Fails if the file cannot be read or is too large.
 pub fn read_png(path: &Path) -> Result<RgbImage, String> {
     let file = open_regular(path).map_err(|error| error.to_string())?;
     let decoder = PngDecoder::with_limits(BufReader::new(file), Limits::default());

@@ -22,10 +22,9 @@ pub const MAX_SIDE: u32 = 32_768;
 /// of memory after decoding, and at most 1.1 GB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
-/// pixels per byte of uncompressed data, times the factor of at most 1032 by which deflate
-/// compresses this data. A JPEG has at most 64 pixels per bit, which is 512 per byte. A Radiance
-/// file in the old encoding has at most 65536 pixels per 8 bytes, which is 8192 per byte.
+/// Largest number of pixels per byte of an image file, that of PNG: eight pixels per byte of
+/// uncompressed data, times 1032, the largest ratio of deflate. A JPEG has at most 512, a Radiance
+/// file in the old encoding 8192.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// Format of an image file.
@@ -38,7 +37,7 @@ pub(super) enum ImageFormat {
 }
 
 impl ImageFormat {
-    /// Determines the format by the first bytes of a file. Returns `None` for all other formats.
+    /// Determines the format by the first bytes of a file.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         let formats: [(&[u8], Self); 4] = [
             (b"\x89PNG\r\n\x1a\n", Self::Png),
@@ -50,15 +49,14 @@ impl ImageFormat {
     }
 }
 
-/// Pixels of a texture image with 8 or 16 bits per channel, as in the file. A grey pixel is one
-/// number, a coloured pixel three.
+/// Levels with the bit depth of the file, one of a grey pixel, three of a coloured one.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
     Words(Vec<u16>),
 }
 
-/// Texture image, decoded in the bit depth of its file: 1 to 6 bytes per pixel.
+/// Texture image: 1 to 6 bytes per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     size: [u32; 2],
@@ -66,8 +64,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns a table of linear light from 0 to 1, indexed by sRGB level from 0 (black) to `last`
-/// (white).
+/// Returns the linear light, 0..=1, of the sRGB levels from 0 to `last` (white).
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -77,7 +74,7 @@ static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
-    /// Adds the size and the pixels of the image to `hash`.
+    /// Adds size and pixels to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
         hash.update(&[self.channels as u8]);
@@ -87,10 +84,7 @@ impl Image {
         }
     }
 
-    /// Decodes an image file in memory. The format is determined by the first bytes of the file.
-    ///
-    /// # Errors
-    /// Fails if the file is not a valid image.
+    /// Decodes an image file.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         match ImageFormat::of(&source.bytes) {
             Some(ImageFormat::Png) => decode_png(source),
@@ -101,8 +95,7 @@ impl Image {
         }
     }
 
-    /// Returns `image` upright and without alpha. Its orientation is in `exif`, the EXIF data of the
-    /// file.
+    /// Returns `image` upright, by the EXIF data of its file, and without alpha.
     fn upright(mut image: DynamicImage, exif: Option<&[u8]>) -> Self {
         if let Some(orientation) = exif.and_then(Orientation::from_exif_chunk) {
             image.apply_orientation(orientation);
@@ -131,11 +124,11 @@ impl Image {
         }
     }
 
-    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y`, counted from the
-    /// top. The numbers of the file are interpreted as sRGB levels.
+    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y` from the top. Levels
+    /// are sRGB.
     ///
     /// # Panics
-    /// Panics if the image has no such pixel.
+    /// Panics outside the image.
     pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
         let index = self.index(x, y);
         let channel = |c: usize| match &self.texels {
@@ -145,12 +138,11 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, that the image has as a height map at the pixel in column `x` and
-    /// row `y`, counted from the top. The numbers of the file are interpreted without sRGB
-    /// decoding. The height of a coloured pixel is the mean of its channels.
+    /// Returns the height, 0..=1, of a pixel of a height map. Levels are linear; the height of a
+    /// coloured pixel is their mean.
     ///
     /// # Panics
-    /// Panics if the image has no such pixel.
+    /// Panics outside the image.
     pub fn height(&self, x: u32, y: u32) -> f32 {
         let index = self.index(x, y);
         let level = |i: usize| match &self.texels {
@@ -166,9 +158,7 @@ impl Image {
     }
 }
 
-/// Checks the size of an image of `width` x `height` pixels in the file `source`. Neither side may
-/// exceed `max_side`. The number of pixels must be from 1 to `max_pixels`. It must also be at most
-/// [`PIXELS_PER_BYTE`] times the length of the file in bytes.
+/// Checks the declared size of an image against the limits and the length of the file.
 pub(super) fn check_size(
     source: &FileContents,
     [width, height]: [u32; 2],
@@ -188,14 +178,12 @@ pub(super) fn check_size(
     Ok(())
 }
 
-/// Returns the phrase that states the valid sizes of an image.
 fn size_limits(max_side: u32, max_pixels: u64) -> String {
     format!("at most {max_side} a side and {max_pixels} altogether")
 }
 
 const EXPECTED: &str = "a PNG or JPEG image";
 
-/// Creates the error that the image file `source` has a known format, but is invalid.
 fn decode_error(source: &FileContents, format: &str, error: impl Display) -> AssetError {
     source.fault(format!("the {format} image cannot be read: {error}"), EXPECTED)
 }

@@ -19,9 +19,6 @@ use std::borrow::Cow;
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Parses a glTF or GLB file.
-///
-/// # Errors
-/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
