@@ -1,9 +1,7 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it
-//! separately, but interleaved; each tests eight boxes or triangles at a time. A triangle is tested
-//! by the same operations in both cases. Both therefore find the same triangle at the same
-//! distance.
+//! The rays of a coherent packet traverse the BVH together, those of other packets separately. A
+//! triangle is tested by the same operations in both cases, so that both find the same one.
 
 use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
@@ -30,24 +28,22 @@ const MAX_COHERENT_SPREAD: f64 = 0.04;
 /// Closest hit of each ray with the triangles of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance of the hit in units of the ray direction's length. It is the distance limit of the
-    /// search if the ray hits no triangle within this limit.
+    /// Distance of the hit; the distance limit of the search without a hit.
     pub t: L,
-    /// Id of the triangle that is hit; undefined without a hit.
+    /// Id of the triangle; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays, each with the coordinate frame of the watertight triangle test. They are the rays of a
-/// packet, or one ray repeated in every lane.
+/// Rays of a packet, or one ray repeated in every lane, with the frame of the watertight triangle
+/// test.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns the ray packet for box tests of the mesh's BVH. The boxes are enlarged by the rounding
-/// errors of the triangle tests. A ray whose distance from an edge is within rounding errors is
-/// therefore tested against the triangles at this edge.
+/// Returns the packet for tests of boxes that are enlarged by the rounding errors of the triangle
+/// tests.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
@@ -62,8 +58,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Returns four vectors for each lane: the origin of its ray, and the three axes of the
-    /// coordinate frame around the ray's direction.
+    /// Returns the origin and the three frame axes of each ray.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -74,17 +69,15 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// Returns rays that are equal in all lanes. `one` has the origin and the three frame axes of
-    /// the ray.
+    /// Repeats one ray, an element of [`ShearedRay::each`], in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Returns two values: the distance at which each ray hits the triangle with these corners, and
-    /// the lanes that hit it. Hits have a positive distance, and may be on either side of the
-    /// triangle.
+    /// Returns the distance at which each ray hits either side of the triangle with these corners,
+    /// and the lanes that hit it.
     ///
     /// The corners are projected along the ray onto the plane through the ray's origin
     /// perpendicular to the ray. A corner has the same projection in all triangles that share it.
@@ -95,21 +88,20 @@ impl<L: SimdFloat> ShearedRay<L> {
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
-        // The products are rounded separately, without fused multiply-add. Rounding preserves the
-        // order of two products, so that their difference never has the wrong sign.
+        // The products are rounded separately, without fused multiply-add, so that the difference
+        // never has the wrong sign.
         let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
         let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        // An edge-on triangle is projected to a line without area. Its t is 0 / 0, which counts as
-        // no hit.
+        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
         let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of consecutive triangles of a BVH leaf, one triangle per lane. The index
-    /// of the first triangle in the leaf is `part` times the number of lanes.
+    /// Returns the corners of consecutive triangles of a leaf, one per lane. The first one has the
+    /// index `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -119,8 +111,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, the traversal of a ray ends when any triangle on
-/// the ray is found; it need not be the closest one.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, it ends when any triangle on the ray is found.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
