@@ -45,8 +45,7 @@ impl Form {
 pub const AROUND_TIP: u32 = 64;
 
 impl ConicalFrustumForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_unit: *map * self.scene_from_unit, ..self }
     }
 }
@@ -158,7 +157,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
 /// Conical frustum compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
-    /// Position in the scene of the middle of the frustum's axis.
+    /// Middle of the axis in the scene.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
     /// Slope k, from -1 (a cone) to 0 (a cylinder).
@@ -177,7 +176,6 @@ pub struct ConicalFrustum<S> {
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// Compiles a conical frustum.
     pub fn new(form: &ConicalFrustumForm) -> Self {
         let ConicalFrustumForm { scene_from_unit: m, top_radius } = form;
         let inverse = m.matrix3.inverse();
@@ -197,9 +195,9 @@ impl<S: Float> ConicalFrustum<S> {
 
 /// Segment of a ray's line inside a frustum.
 struct Chord<L: SimdFloat> {
-    /// Point of the line closest to the middle of the frustum's axis, in canonical space.
+    /// Point of the line closest to the middle of the axis, in canonical space.
     point: Vec3<L>,
-    /// Direction of the line, of unit length in canonical space.
+    /// Unit direction in canonical space.
     direction: Vec3<L>,
     /// Distance in the scene from the ray's origin to `point`.
     start: L,
@@ -207,7 +205,6 @@ struct Chord<L: SimdFloat> {
     scale: L,
     /// Distance in canonical space from `point` to the chord's entry.
     enter: L,
-    /// Distance in canonical space from `point` to the chord's exit.
     leave: L,
     /// Lanes whose ray enters through the lateral surface, not through base or cap.
     enters_side: L::Mask,
@@ -222,10 +219,8 @@ impl<L: SimdFloat> Chord<L> {
     }
 }
 
-/// Returns the chord of each ray's line in the frustum; `None` if no line hits it.
-///
-/// Distances are counted from the line's point closest to the solid's middle, so that a distant
-/// origin costs no precision.
+/// Returns the chord of each ray's line; `None` if no line hits the frustum. Distances are counted
+/// from the line's point closest to the middle, so that a distant origin costs no precision.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let half = L::from_f64(0.5);
@@ -233,8 +228,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
     let d = d * scale;
-    // The first step along the direction leads from `f` to the point closest to the middle. The
-    // second step removes the rounding error of the first.
+    // The second step removes the rounding error of the first step along the direction.
     let back = -f.dot(d);
     let p = d.mul_add(back, f);
     let again = -p.dot(d);

@@ -19,8 +19,7 @@ pub struct EllipsoidForm {
 }
 
 impl EllipsoidForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_unit: *map * self.scene_from_unit }
     }
 }
@@ -135,7 +134,6 @@ pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Ve
 }
 
 impl<S: Float> Ellipsoid<S> {
-    /// Compiles an ellipsoid.
     pub fn new(form: &EllipsoidForm) -> Self {
         let DAffine3 { matrix3, translation } = form.scene_from_unit;
         Self {

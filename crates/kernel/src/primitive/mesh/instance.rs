@@ -32,8 +32,7 @@ pub struct MeshForm {
 }
 
 impl MeshForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(in crate::primitive) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }
     }
 }
@@ -234,8 +233,8 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns the values of a vertex attribute, `N` numbers each, at the three vertices of the
-    /// triangle `triangle_tag`. Each lane has its own triangle.
+    /// Returns a vertex attribute of `N` numbers at the three vertices of the triangle
+    /// `triangle_tag`.
     #[inline(always)]
     fn attribute<const N: usize, L: SimdFloat<Scalar = S>>(
         &self,
@@ -315,8 +314,8 @@ impl<S: Float> Meshes<S> {
         Self { meshes: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
-    /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
-    /// the numbers in `range` are tested. The id of a mesh is `base` plus its number.
+    /// Replaces `hit` in the lanes whose ray hits a mesh with a number in `range` nearer than `hit`.
+    /// The id of a mesh is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -382,8 +381,7 @@ impl<S: Float> Meshes<S> {
     ) -> SurfacePoint<L> {
         let instance = &self.meshes[number];
         let triangle = instance.triangle(triangle_tag);
-        // The normal is divided by its largest component. Otherwise the square of its length would
-        // overflow for large triangles and underflow for small ones.
+        // Divided by its largest component, the squared length neither overflows nor underflows.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
@@ -418,8 +416,7 @@ impl<S: Float> Meshes<S> {
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates at `point` in the triangle `triangle_tag`; `None` if the mesh
-    /// file has none.
+    /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
@@ -441,7 +438,7 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the colour of the triangle `triangle_tag`; `None` if the mesh file has no colours.
+    /// See [`Aggregate::color`](crate::primitive::Aggregate::color).
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(
         &self,

@@ -79,12 +79,11 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// Returns the distance at which each ray hits either side of the triangle with these corners,
     /// and the lanes that hit it.
     ///
-    /// The corners are projected along the ray onto the plane through the ray's origin
-    /// perpendicular to the ray. A corner has the same projection in all triangles that share it.
-    /// The area that an edge spans with the ray's origin is computed with the exact sign, or as 0.
-    /// Hence no ray passes between two triangles that share an edge or a corner (after Woop,
-    /// Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal frame for
-    /// the shear).
+    /// The corners are projected along the ray. A corner has the same projection in all triangles
+    /// that share it, and the area that an edge spans with the ray's origin is computed with the
+    /// exact sign, or as 0. Hence no ray passes between two triangles that share an edge or a corner
+    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
+    /// orthonormal frame for the shear).
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
@@ -247,9 +246,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns the closest triangle of the mesh that each ray hits within the distance `limit`. Of
-/// triangles at equal distances it is the one with the lowest number. Directions must have unit
-/// length. Lanes with a limit of 0 or less are inactive.
+/// Returns the closest triangle that each ray hits within the distance `limit`; at equal distances
+/// the one with the lowest number. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)
@@ -261,8 +259,8 @@ pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// Returns the result of [`closest`], for tests and benches. The rays traverse the mesh's BVH as a
-/// packet if `all` is `true`, otherwise separately.
+/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet if
+/// `all` is `true`, otherwise separately.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,
