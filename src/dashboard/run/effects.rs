@@ -100,7 +100,7 @@ impl EffectRunner {
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
-            file: files.shared.clone(),
+            file: Some(files.shared.clone()),
             unreadable_path,
             sampler: options.sampling.kind,
             adaptive: settings.adaptive,
@@ -120,9 +120,9 @@ impl EffectRunner {
 
     fn export(&mut self, format: Format) {
         let (exporter, results) = (self.exporter.clone(), self.results.clone());
-        self.session.submit(move |film| {
-            let written = match film {
-                Some((rendering, report)) => exporter.write(rendering, report, format),
+        self.session.submit(move |picture| {
+            let written = match picture {
+                Some(picture) => exporter.write(&picture, format),
                 None => Err("there is no picture to write".to_string()),
             };
             let _ = results.send(Message::Exported(written));
@@ -170,10 +170,10 @@ impl Effects for EffectRunner {
             }
             Effect::Pin => {
                 let results = self.results.clone();
-                self.session.submit(move |film| {
-                    if let Some((rendering, report)) = film {
-                        let picture = LinearImage::of_film(&rendering.film, &rendering.mix);
-                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
+                self.session.submit(move |picture| {
+                    if let Some(picture) = picture {
+                        let pinned = Arc::new(LinearImage::of_film(picture.film, picture.mix));
+                        let _ = results.send(Message::Pinned(pinned, picture.report.spp.mean));
                     }
                 });
             }

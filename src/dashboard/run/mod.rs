@@ -512,4 +512,4 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 /// Default stop criterion: a noise of half an 8-bit level, which is half a quantisation step of an
 /// 8-bit image file.
 pub const DEFAULT_STOP: Stop =
-    Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };
+    Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };

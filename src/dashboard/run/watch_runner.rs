@@ -1,24 +1,23 @@
 //! Execution of effects in `zerkalo watch`. The picture can be displayed and exported, but there is
 //! no scene to edit or render.
 
-use crate::dashboard::message::{Effect, Exported, Format, Message};
+use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
-use crate::dashboard::run::export_paths::numbered;
-use crate::dashboard::run::exporter::{exported, stem};
+use crate::dashboard::run::exporter::Exporter;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-use zerkalo_render::film::file::FilmFileHeader;
-use zerkalo_render::film::{Depth, Film, ImageOutput, LinearImage};
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::film::LinearImage;
 use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::session::{Report, Snapshot, WatchSession};
+use zerkalo_render::session::{Session, Snapshot};
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
-    session: WatchSession,
+    session: Session,
     /// Receiver that is disconnected as soon as the last requested export has ended; `None` before
     /// the first export.
     exported: Option<Receiver<()>>,
@@ -30,7 +29,7 @@ impl WatchRunner {
     /// are the results of effects.
     pub fn new(films: WatchedFilms, threads: usize, results: Sender<Message>) -> io::Result<Self> {
         let reports = results.clone();
-        let session = WatchSession::new(films, threads, move |report| {
+        let session = Session::watch(films, threads, move |report| {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
@@ -41,32 +40,21 @@ impl WatchRunner {
         let results = self.results.clone();
         let (exporting, exported) = bounded(0);
         self.exported = Some(exported);
+        let exporter = Exporter {
+            file: None,
+            unreadable_path: None,
+            sampler: SamplerKind::Sobol,
+            adaptive: true,
+        };
         self.session.submit(move |picture| {
             let _exporting = exporting;
             let written = match picture {
-                Some((film, header, report)) => write(film, header, report, format),
+                Some(picture) => exporter.write(&picture, format),
                 None => Err("there is no picture to write".to_string()),
             };
             let _ = results.send(Message::Exported(written));
         });
     }
-}
-
-/// Writes the picture of `film` to an image file with an unused name. The name begins with that of
-/// the scene file.
-fn write(
-    film: &Film,
-    header: &FilmFileHeader,
-    report: &Report,
-    format: Format,
-) -> Result<Exported, String> {
-    let stem = stem(None, header.source().unwrap_or_default());
-    let create = |path: &Path| {
-        let output = ImageOutput::from_path(path)?.create_new();
-        header.write_picture(film, Depth::Eight, &output)
-    };
-    let path = numbered(&stem, format.extension(), create)?;
-    Ok(exported(path, film, report))
 }
 
 impl Effects for WatchRunner {
@@ -85,9 +73,9 @@ impl Effects for WatchRunner {
             Effect::Pin => {
                 let results = self.results.clone();
                 self.session.submit(move |picture| {
-                    if let Some((film, header, report)) = picture {
-                        let picture = LinearImage::of_film(film, &header.weights);
-                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
+                    if let Some(picture) = picture {
+                        let pinned = Arc::new(LinearImage::of_film(picture.film, picture.mix));
+                        let _ = results.send(Message::Pinned(pinned, picture.report.spp.mean));
                     }
                 });
             }

@@ -84,9 +84,9 @@ impl UpdateContext<'_> {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
             Some(Overlay::NoiseTargets { cursor }) => {
-                let noise_codes = Some(QUALITIES[*cursor]);
+                let noise_levels = Some(QUALITIES[*cursor]);
                 self.model.overlay = None;
-                self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
+                self.set_stop(Stop { noise_levels, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::CommandPalette(palette)) => {
                 if let Some(found) = palette.found.get(palette.cursor) {

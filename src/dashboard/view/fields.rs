@@ -105,7 +105,8 @@ impl Fields<'_> {
         if let Some(editor) = self.state.editor.as_ref().filter(|_| chosen) {
             return typed(editor, &mut to, theme);
         }
-        let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().codes_8(color)));
+        let swatch =
+            field.swatch.and_then(|color| theme.swatch(Display::default().levels_8(color)));
         if let Some(style) = swatch {
             to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
         }

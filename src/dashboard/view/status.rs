@@ -79,7 +79,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(4, vec![plain(number(speed)), dim(" Ms/s")]));
     }
     if let Some(noise) = report.noise {
-        parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
+        parts.push(part(2, noise_part(model, report, noise.rmse_levels, theme)));
     }
     match model.stop.seconds {
         _ if watching => {}
@@ -162,12 +162,12 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the picture's noise `codes` in 8-bit levels, the noise target, and the estimated time
+/// Formats the picture's noise `levels` in 8-bit levels, the noise target, and the estimated time
 /// until the target is reached, such as `noise 0.84 → 0.5 levels in 3–5 s`.
-fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
+fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
-    let mut text = vec![dim("noise "), (number(codes), theme.text())];
-    match model.stop.noise_codes.filter(|target| *target < codes) {
+    let mut text = vec![dim("noise "), (number(levels), theme.text())];
+    match model.stop.noise_levels.filter(|target| *target < levels) {
         Some(target) => {
             text.push((format!(" → {target}"), theme.good()));
             text.push(dim(" levels"));
