@@ -44,8 +44,9 @@ impl<L: SimdFloat> SlabPacket<L> {
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
         let a = (low - self.above).component_mul(self.inverse);
         let b = (high - self.below).component_mul(self.inverse);
-        let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
-        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * far_scale();
+        let near = a.min(b).max_element().max(L::zero());
+        let far = a.max(b);
+        let far = far.x.min(far.y).min(far.z) * far_scale();
         near.le(far) & near.le(limit)
     }
 }
@@ -114,11 +115,10 @@ impl<S: Float> PacketBounds<S> {
         let far = sides(self.far) - Vec3::splat(self.far_origin);
         let (mut first, mut last) = (near.component_mul(low), far.component_mul(low));
         if !ONE {
-            let (a, b) = (near.component_mul(high), far.component_mul(high));
-            first = Vec3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
-            last = Vec3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
+            first = first.min(near.component_mul(high));
+            last = last.max(far.component_mul(high));
         }
-        let first = first.x.max(first.y).max(first.z).max(L::zero());
+        let first = first.max_element().max(L::zero());
         let last = last.x.min(last.y).min(last.z) * far_scale();
         (first, first.le(last) & first.le(limit))
     }

@@ -96,6 +96,16 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
+    /// Coordinate-wise minimum.
+    #[inline(always)]
+    pub fn min(self, o: Self) -> Self {
+        Self::new(self.x.min(o.x), self.y.min(o.y), self.z.min(o.z))
+    }
+    /// Coordinate-wise maximum.
+    #[inline(always)]
+    pub fn max(self, o: Self) -> Self {
+        Self::new(self.x.max(o.x), self.y.max(o.y), self.z.max(o.z))
+    }
     /// Largest coordinate.
     #[inline(always)]
     pub fn max_element(self) -> L {

@@ -6,11 +6,11 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
-    normals_of_solid, segment_distance,
+    normals_of_solid, rows, segment_distance,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rows, times, transposed_times};
+use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
@@ -55,12 +55,7 @@ impl CanonicalShape for ConicalFrustumForm {
         // The first two columns of the matrix map the unit disc to the base. The lengths of their
         // rows are the half-widths of the base's bounding box.
         let m = &self.scene_from_unit;
-        let rows = m.matrix3.transpose();
-        let half = DVec3::new(
-            rows.x_axis.truncate().length(),
-            rows.y_axis.truncate().length(),
-            rows.z_axis.truncate().length(),
-        );
+        let half = DVec3::from(rows(&m.matrix3).map(|row| row.truncate().length()));
         let (base, cap) = (m.translation, m.translation + m.matrix3.z_axis);
         let narrow = half * self.top_radius;
         bounds_of_points(&[base - half, base + half, cap - narrow, cap + narrow])
@@ -73,9 +68,8 @@ impl CanonicalShape for ConicalFrustumForm {
     fn thickness(&self) -> f64 {
         // Smallest distance in the scene between opposite faces of the box around the canonical
         // solid, 2 by 2 by 1.
-        let rows = self.scene_from_unit.matrix3.inverse().transpose();
-        let across = rows.x_axis.length().max(rows.y_axis.length());
-        (2.0 / across).min(rows.z_axis.length().recip())
+        let [x, y, z] = rows(&self.scene_from_unit.matrix3.inverse()).map(DVec3::length);
+        (2.0 / x.max(y)).min(z.recip())
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
@@ -183,7 +177,7 @@ impl<S: Float> ConicalFrustum<S> {
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
         Self {
             center: center.to_array().map(S::from_f64),
-            unit_from_scene: rows(inverse),
+            unit_from_scene: rounded_rows(inverse),
             slope: S::from_f64(top_radius - 1.0),
             mid_radius: S::from_f64(0.5 * (1.0 + top_radius)),
             cap_normal: up.normalize().to_array().map(S::from_f64),

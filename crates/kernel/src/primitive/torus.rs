@@ -17,12 +17,12 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid, similarity,
-    sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
+    rows, similarity, sphere_around_box,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rows, times, transposed_times};
+use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
@@ -61,10 +61,8 @@ impl CanonicalShape for TorusForm {
         // The torus is the Minkowski sum of its ring and of a ball with the radius of the tube. So
         // is its box.
         let m = &self.scene_from_torus;
-        let rows = m.matrix3.transpose();
-        let half = [rows.x_axis, rows.y_axis, rows.z_axis]
-            .map(|row| self.ring * row.x.hypot(row.z) + self.tube * row.length());
-        let half = DVec3::from(half);
+        let half = |row: DVec3| self.ring * row.x.hypot(row.z) + self.tube * row.length();
+        let half = DVec3::from(rows(&m.matrix3).map(half));
         Some((m.translation - half, m.translation + half))
     }
 
@@ -87,8 +85,7 @@ impl CanonicalShape for TorusForm {
     /// Returns the smallest distance between opposite faces of the parallelepiped that is the image
     /// of a cube around a ball with the radius of the tube.
     fn thickness(&self) -> f64 {
-        let rows = self.scene_from_torus.matrix3.inverse().transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let rows = rows(&self.scene_from_torus.matrix3.inverse());
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
@@ -102,8 +99,7 @@ impl CanonicalShape for TorusForm {
         if let Some(scale) = similarity(&self.scene_from_torus.matrix3) {
             return Some(distance * scale);
         }
-        let columns = inverse.matrix3.to_cols_array();
-        let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+        let shrinks = frobenius_norm(&inverse.matrix3).recip();
         Some(box_distance(self.bounds()?, point).max(distance * shrinks))
     }
 
@@ -144,8 +140,8 @@ impl<S: Float> Torus<S> {
         let DAffine3 { matrix3, translation } = form.scene_from_unit();
         Self {
             center: translation.to_array().map(S::from_f64),
-            unit_from_scene: rows(matrix3.inverse()),
-            scene_from_unit: rows(matrix3),
+            unit_from_scene: rounded_rows(matrix3.inverse()),
+            scene_from_unit: rounded_rows(matrix3),
             tube: S::from_f64(form.tube / form.ring),
             inverse_ring: S::from_f64(form.ring.recip()),
             reach: S::from_f64(form.max_coordinate()),

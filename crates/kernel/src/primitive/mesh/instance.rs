@@ -6,7 +6,8 @@ use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, rows,
+    segment_distance,
 };
 use crate::primitive::compiled::{SurfacePoint, UvGradients};
 use crate::primitive::form::Form;
@@ -40,8 +41,7 @@ impl MeshForm {
 impl CanonicalShape for MeshForm {
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_mesh;
-        let rows = m.matrix3.transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let rows = rows(&m.matrix3);
         let high = rows.map(|row| self.mesh.support(row));
         let low = rows.map(|row| -self.mesh.support(-row));
         Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
@@ -143,8 +143,7 @@ fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f6
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
     // Lower bound of the ratio of a length in the scene to the same length in mesh space.
-    let columns = inverse.matrix3.to_cols_array();
-    let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+    let shrinks = frobenius_norm(&inverse.matrix3).recip();
     let to_scene = |corner: DVec3| scene_from_mesh.transform_point3(corner);
     mesh.least(
         |bounds| box_distance(bounds, inside) * shrinks,

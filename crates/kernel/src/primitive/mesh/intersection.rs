@@ -138,16 +138,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
                 // Bounding boxes of the triangles, one per lane. A triangle is tested only if the
                 // packet may enter its box.
-                let low = Vec3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
-                let high = Vec3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
-                let sides = [
-                    low.x.min(c.x),
-                    low.y.min(c.y),
-                    low.z.min(c.z),
-                    high.x.max(c.x),
-                    high.y.max(c.y),
-                    high.z.max(c.z),
-                ];
+                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+                let sides = [low.x, low.y, low.z, high.x, high.y, high.z];
                 let bits = match &bounds {
                     Some(bounds) => {
                         bounds.enters::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
