@@ -263,3 +263,19 @@ impl Shape {
         named
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::EXAMPLES;
+
+    #[test]
+    fn shapes_that_fit_into_compounds_are_solids() {
+        for (key, _) in EXAMPLES {
+            let shape = Shape::fitted_to(key, DVec3::ZERO, DVec3::ONE).unwrap();
+            let form = shape.form();
+            let is_solid = matches!(form, Form::Csg(_)) || form.into_solid().is_some();
+            assert_eq!(unfit_reason(&shape).is_none(), is_solid, "{key}");
+        }
+    }
+}
