@@ -32,77 +32,62 @@ use zerkalo_kernel::sampling::SamplerKind;
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
 
-/// Number that stands for the base in lists of shards. The base is the set of samples that a plan
-/// started from, such as those of a pilot render. Shards have the numbers from 1.
+/// Number of the base, the samples that a plan started from. Shards have the numbers from 1.
 pub const BASE: u32 = 0;
 
-/// Settings of a render that is divided among shards: the inputs of its samples, and its noise
-/// target.
+/// Inputs of a plan's samples, and its noise target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSettings {
     /// Path of the scene file as the user gave it.
     pub source: String,
-    /// Hash of the text of the scene and of the files that it names.
+    /// Value of [`scene_hash`](crate::export::scene_hash).
     pub scene_hash: String,
-    /// Width and height of the picture in pixels.
     pub size: [u32; 2],
-    /// Random seed of all samples of the planned render.
     pub seed: u64,
-    /// Kind of the random numbers: Sobol points or independent numbers.
     pub sampler: SamplerKind,
-    /// Floating-point precision of the render, `single` or `double`.
+    /// Floating-point precision, `single` or `double`.
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Largest number of samples per pixel in tiles in which a path makes a random choice, over the
-    /// whole render; 0 for no limit.
+    /// Value of [`Settings::rays_per_pixel`].
     pub rays_per_pixel: u32,
-    /// Noise target: RMSE of the displayed picture in 8-bit levels.
+    /// Noise target in 8-bit levels.
     pub noise_levels: f64,
-    /// Number of shards into which the render is divided, 1 to [`MAX_SHARDS`]. Each is for one
-    /// process. They are numbered from 1.
+    /// Number of shards, 1 to [`MAX_SHARDS`].
     pub shards: u32,
-    /// Checksum of the earlier plan that this plan continues: it starts from the film that was
-    /// merged from the shards of the earlier plan. `None` if this plan starts from a pilot, a short
-    /// render whose noise determines the samples of each tile.
+    /// Checksum of the earlier plan whose merged film is the base. `None` if the base is a pilot.
     pub base_plan: Option<u64>,
 }
 
-/// Plan of a render that is divided among shards: the number of samples of each tile, fixed in
-/// advance.
+/// Plan of a render: the number of samples of each tile, fixed in advance, to be divided among
+/// shards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Settings of the planned render: the inputs of its samples, and its noise target.
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_levels: f64,
-    /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles in which no path makes a
-    /// random choice, then of the other tiles (see [`PlannedTile::glossy`]).
+    /// Slopes of the error in tiles that are not glossy, and in glossy tiles.
     pub slopes: [f64; 2],
-    /// Sample counts of the picture's tiles, in row order.
+    /// Tiles in row order.
     pub tiles: Vec<PlannedTile>,
 }
 
 /// Sample counts of one tile in a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedTile {
-    /// Base of the tile: samples per pixel that it had before the plan in each replicate, from a
-    /// pilot render or an earlier plan.
+    /// Samples per pixel and replicate in the base.
     pub base: u32,
-    /// Samples per pixel in each replicate of the merged film of all shards. They include `base`,
-    /// the samples that the plan started from.
+    /// Samples per pixel and replicate in the merged film, including `base`.
     pub end: u32,
-    /// Expected number of rays per sample in this tile.
     pub rays_per_sample: f32,
     /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
 }
 
 impl Plan {
-    /// Creates the plan of a render that continues from the samples of `schedule` and ends at the
-    /// noise target of `schedule`. `usual_slopes` are assumed exponents of the error (see
-    /// [`Plan::slopes`]), used where the schedule has not measured any. Returns `None` if the
-    /// schedule has no noise target, or no estimate of the noise.
+    /// Creates the plan that continues from the samples of `schedule` to its noise target.
+    /// `usual_slopes` are used where the schedule has not measured any. Returns `None` without a
+    /// noise target or an estimate.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
@@ -124,20 +109,18 @@ impl Plan {
         })
     }
 
-    /// Returns the expected number of rays of all samples that the shard with the number `shard`
-    /// traces.
+    /// Returns the expected number of rays of a shard.
     pub fn rays(&self, shard: u32) -> f64 {
         self.rays_of(self.ranges(shard).into_iter())
     }
 
-    /// Returns the expected number of rays of the whole merged picture: those of the base and of
-    /// all shards.
+    /// Returns the expected number of rays of base and all shards.
     pub fn all_rays(&self) -> f64 {
         self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
     }
 
-    /// Returns the expected number of rays for the samples with the indices `ranges` in both
-    /// replicates. `ranges` has a range of indices for each tile.
+    /// Returns the expected number of rays of the sample indices `ranges` of the tiles, in both
+    /// replicates.
     fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
         let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
             let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
@@ -146,8 +129,7 @@ impl Plan {
         ranges.enumerate().map(rays).sum()
     }
 
-    /// Returns the number of samples that the shard with the number `shard` traces, over all pixels
-    /// and both replicates.
+    /// Returns the number of samples of a shard, over all pixels and both replicates.
     pub fn samples(&self, shard: u32) -> u64 {
         let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
             2 * range.len() as u64 * pixels_of(self.settings.size, tile)
@@ -155,7 +137,7 @@ impl Plan {
         self.ranges(shard).into_iter().enumerate().map(samples).sum()
     }
 
-    /// Returns the mean number of samples per pixel in the merged picture, over both replicates.
+    /// Returns the mean samples per pixel in the merged picture, over both replicates.
     pub fn spp(&self) -> f64 {
         let size = self.settings.size;
         let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
@@ -164,9 +146,8 @@ impl Plan {
         samples as f64 / (width * height) as f64
     }
 
-    /// Compares the sample counts of `film` with those that the plan assigns to the shards with the
-    /// numbers `shards`, which may include [`BASE`]. Returns the number of the first tile whose
-    /// counts differ; `None` if all counts agree.
+    /// Returns the first tile in which the sample counts of `film` are not those of `shards`, which
+    /// may include [`BASE`].
     pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
         let mut expected = vec![0u32; self.tiles.len()];
         for shard in shards {
@@ -177,9 +158,8 @@ impl Plan {
         (0..self.tiles.len()).find(|tile| film.counts(*tile) != [expected[*tile]; 2])
     }
 
-    /// Returns the schedule that continues `film`, which holds all samples of this plan.
-    /// `estimator` estimates the error of each tile. Returns `None` if `estimator` has no estimate
-    /// for a tile.
+    /// Returns the schedule that continues `film`, which holds all samples of this plan. Returns
+    /// `None` if `estimator` has no estimate for a tile.
     pub fn schedule(
         &self,
         film: &Film,
@@ -200,8 +180,7 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns a phrase for messages about two plans that differ: the first line that is not the
-    /// same in the texts of `self` and `other`. The phrase quotes the line of each text.
+    /// Quotes the first line that is not the same in the texts of two plans.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);
@@ -209,12 +188,11 @@ impl Plan {
     }
 }
 
-/// Returns the number of tiles of a picture of the given size.
 fn tiles_of([width, height]: [u32; 2]) -> usize {
     width.div_ceil(TILE as u32) as usize * height.div_ceil(TILE as u32) as usize
 }
 
-/// Returns the number of pixels of tile number `tile` that are inside a picture of the given size.
+/// Returns the number of pixels of a tile that are inside a picture of the given size.
 fn pixels_of(size: [u32; 2], tile: usize) -> u64 {
     let [width, height] = size.map(|n| n as usize);
     let columns = width.div_ceil(TILE);
