@@ -8,7 +8,6 @@ mod doctor;
 mod edit;
 mod info;
 mod load_progress;
-mod malloc_arenas;
 mod measure;
 mod merge;
 mod new;
@@ -23,7 +22,6 @@ mod stats;
 mod watch;
 
 pub use cpu::require as require_cpu;
-pub use malloc_arenas::limit as limit_arenas;
 
 use args::{Cli, Command};
 use clap::error::ErrorKind;

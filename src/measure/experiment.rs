@@ -96,12 +96,6 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let text = match text {
-            "level" => "ray-types",
-            "depth" => "max-depth",
-            "min-weight" => "min-throughput",
-            current => current,
-        };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
         found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
@@ -262,7 +256,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::built_in;
+    use zerkalo_scene::Scene;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
@@ -274,7 +268,8 @@ mod tests {
             seed: 0,
             display: Display::default(),
         };
-        let all = plan.variants(&Arc::new(built_in()));
+        let text = include_str!("../../scenes/mirror-room.toml");
+        let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
         assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }

@@ -292,7 +292,7 @@ mod tests {
     use super::*;
     use crate::film::Header;
     use crate::film::testing::TestFilm;
-    use zerkalo_kernel::lanes::{Float, Single, Vec3};
+    use zerkalo_kernel::lanes::{Float, Single};
     use zerkalo_kernel::sampling::SamplerKind;
 
     /// Checks that invalid samples are counted and stored as black, and that samples above the
@@ -323,7 +323,7 @@ mod tests {
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
             let mut rejected = RejectedSamples::new(0);
-            let mut radiance = Radiance { groups: [Vec3::<Single>::zero(); MAX_GROUPS] };
+            let mut radiance = Radiance::<Single>::black();
             radiance.groups[0].x =
                 Single::from_fn(|i| Float::from_f64(if i == 3 { value } else { 0.5 }));
             radiance.groups[1].y = Single::from_f64(0.25);

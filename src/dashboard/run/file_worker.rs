@@ -8,12 +8,12 @@ use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
+use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks of the scene file for changes by other programs.
@@ -72,10 +72,10 @@ impl Files {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // The stamp of a file is its modification time and length. A readable file gets no stamp
-        // yet, so that the first check compares its contents. An unreadable file gets one, so that
-        // its errors, which have been reported, are not reported again.
-        let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
+        // A readable file gets no stamp yet, so that the first check compares its contents. An
+        // unreadable file gets one, so that its errors, which have been reported, are not reported
+        // again.
+        let seen = path.as_deref().filter(|_| file.is_none()).and_then(FileStamp::of);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
         let shared = SharedFile::new(autosave.recovery.elsewhere());
@@ -193,23 +193,13 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-/// Stamp of a file: its modification time and length. A new stamp shows that the file may have
-/// changed. `None` if the file has no metadata.
-type FileStamp = Option<(SystemTime, u64)>;
-
-fn stamp(path: &Path) -> FileStamp {
-    let metadata = fs::metadata(path).ok()?;
-    Some((metadata.modified().ok()?, metadata.len()))
-}
-
 struct FileWorker {
     /// Path of the scene file; `None` for a scene without file.
     path: Option<PathBuf>,
     /// Scene file as last read or written; `None` if it has never been readable.
     file: Option<SceneFile>,
-    /// Stamp (modification time, length) of the scene file when it was last read, written or
-    /// checked.
-    seen: FileStamp,
+    /// Stamp of the scene file when it was last read, written or checked.
+    seen: Option<FileStamp>,
     /// Folder for the program's state according to the XDG specification; `None` if the user has no
     /// such folder.
     state: Option<PathBuf>,
@@ -257,7 +247,7 @@ impl FileWorker {
     /// check.
     fn changed(&mut self) -> bool {
         let Some(path) = &self.path else { return false };
-        let now = stamp(path);
+        let now = FileStamp::of(path);
         if self.seen == now {
             return false;
         }
@@ -283,7 +273,7 @@ impl FileWorker {
             None => file.save(scene, overwrite)?,
         }
         let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
-        self.seen = stamp(&path);
+        self.seen = FileStamp::of(&path);
         let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
         self.shared.set_elsewhere(recovery.elsewhere());
         self.shared.put(file);
@@ -293,9 +283,9 @@ impl FileWorker {
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // The stamp (modification time and length) is taken before the file is read, so that a
-        // write during the read counts as a change.
-        self.seen = self.path.as_deref().and_then(stamp);
+        // The stamp is taken before the file is read, so that a write during the read counts as a
+        // change.
+        self.seen = self.path.as_deref().and_then(FileStamp::of);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {
                 let file = self.file.insert(file);
@@ -314,7 +304,8 @@ impl FileWorker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::starter;
+    use crate::dashboard::testing::STARTER;
+    use std::fs;
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
     /// it.
@@ -337,9 +328,9 @@ mod tests {
     fn external_change_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        fs::write(&path, starter()).unwrap();
+        fs::write(&path, STARTER).unwrap();
         let (files, inbox) = opened(&path);
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
@@ -349,7 +340,7 @@ mod tests {
         assert!(quiet.is_err(), "{quiet:?}");
         // A rename replaces the file at once, so the worker never reads an incomplete file.
         let other = folder.path().join("b.toml");
-        fs::write(&other, format!("{}\n# more\n", starter())).unwrap();
+        fs::write(&other, format!("{}\n# more\n", STARTER)).unwrap();
         fs::rename(&other, &path).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL);
@@ -372,7 +363,7 @@ mod tests {
         files.save(Arc::default(), None, true);
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Err(_))));
         assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
-        fs::write(&path, starter()).unwrap();
+        fs::write(&path, STARTER).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
@@ -383,8 +374,8 @@ mod tests {
     fn edits_are_autosaved_at_end_unless_saved() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        fs::write(&path, starter()).unwrap();
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        fs::write(&path, STARTER).unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         let scene = Arc::new(scene);
         let hidden = folder.path().join(".a.toml.unsaved");
@@ -405,7 +396,7 @@ mod tests {
         assert!(!hidden.exists());
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (mut files, _inbox) = opened(&path);
-        files.autosave(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
+        files.autosave(Some(Arc::new(Scene::parse(STARTER, "a").unwrap())));
         files.flush(PATIENCE);
         assert!(hidden.exists());
         files.autosave(None);
@@ -418,20 +409,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new.toml");
         let (results, _inbox) = unbounded();
-        let untitled = SceneFile::untitled(starter().to_string(), "starter").unwrap();
+        let untitled = SceneFile::untitled(STARTER.to_string(), "starter").unwrap();
         let files = Files::new(Ok(untitled), None, results).unwrap();
-        let scene = Scene::parse(starter(), "starter").unwrap();
+        let scene = Scene::parse(STARTER, "starter").unwrap();
         files.save(Arc::new(scene), Some(path.clone()), false);
         drop(files);
-        assert_eq!(fs::read_to_string(&path).unwrap(), starter());
+        assert_eq!(fs::read_to_string(&path).unwrap(), STARTER);
     }
 
     /// Writes a scene file to `folder`. Returns two values: its path, and a scene that differs from
     /// the one in the file.
     fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
         let path = folder.join("a.toml");
-        fs::write(&path, starter()).unwrap();
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        fs::write(&path, STARTER).unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         (path, Arc::new(scene))
     }

@@ -1,23 +1,24 @@
-//! Stamp of a file, by which a replaced or changed file is recognised.
+//! Stamps, by which changes of files are noticed.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Properties of a file that change when it is written or replaced.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Properties of a file that change when the file is written or replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FileStamp {
-    /// Time of the last modification.
+    /// Time of the last write.
     pub modified: SystemTime,
-    length: u64,
+    bytes: u64,
     inode: u64,
 }
 
 impl FileStamp {
-    /// Returns the stamp of the file at `path`, or `None` if there is no such file.
+    /// Returns the stamp of the file at `path`; `None` if its metadata cannot be read.
     pub fn of(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
-        let inode = std::os::unix::fs::MetadataExt::ino(&metadata);
-        Some(Self { modified: metadata.modified().ok()?, length: metadata.len(), inode })
+        let modified = metadata.modified().ok()?;
+        Some(Self { modified, bytes: metadata.len(), inode: metadata.ino() })
     }
 }
