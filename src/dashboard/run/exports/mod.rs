@@ -1,11 +1,16 @@
 //! Exports of image files: the current picture, or a separate render at a size of the user's
 //! choice.
 
+pub mod image_upload;
+pub mod image_viewer;
+pub mod paths;
+mod shrink;
+
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::export_paths::{numbered, scp};
-use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
 use crossbeam_channel::{Sender, bounded};
+use paths::{numbered, scp};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -40,6 +45,11 @@ pub struct Exporter {
 }
 
 impl Exporter {
+    /// Creates the writer of pictures of watched films.
+    pub fn of_films() -> Self {
+        Self { file: None, unreadable_path: None, sampler: SamplerKind::Sobol, adaptive: true }
+    }
+
     /// Writes `picture` to a file with the next free name.
     pub fn write(&self, picture: &Picture, format: Format) -> Result<Exported, String> {
         let header = picture.header(|scene| self.provenance(scene));
