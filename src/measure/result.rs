@@ -97,7 +97,13 @@ const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median of `values`, NaN without any.
 pub fn median(values: &[f64]) -> f64 {
-    quantile(values, 0.5)
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => sorted[n / 2 - 1] + 0.5 * (sorted[n / 2] - sorted[n / 2 - 1]),
+    }
 }
 
 /// Returns the relative spread of the median of `values`. The median of another measurement on the
@@ -118,15 +124,6 @@ pub fn spread(values: &[f64]) -> f64 {
     let share = if values.len() < 5 { 1.0 } else { 0.5 };
     let left_out = (0.5 * (n - CERTAINTY * n.sqrt())).max(0.0) as usize;
     share * (sorted[values.len() - 1 - left_out] - sorted[left_out]) / middle
-}
-
-fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let position = q * last as f64;
-    let (low, part) = (position as usize, position.fract());
-    sorted[low] + part * (sorted[(low + 1).min(last)] - sorted[low])
 }
 
 impl Measured {

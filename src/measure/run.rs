@@ -145,8 +145,9 @@ pub fn measure(
 /// Returns the extrapolated time to `levels` 8-bit levels. Returns `None` if it cannot be
 /// extrapolated.
 fn extrapolate(render: &SyncRender, levels: f64) -> Option<Expected> {
-    let (seconds_low, seconds_high) = render.seconds_to_noise(levels)?;
-    Some(Expected { levels, seconds_low, seconds_high })
+    let (low, high) = render.schedule.seconds_to_noise(levels, render.seconds)?;
+    let seconds = render.seconds;
+    Some(Expected { levels, seconds_low: seconds + low, seconds_high: seconds + high })
 }
 
 /// Returns the noise in 8-bit levels at which settings are compared: the smallest level that the

@@ -140,25 +140,11 @@ pub struct Checkpoint {
 /// Render that was restored from a checkpoint.
 pub(super) struct Resumed {
     pub state: RenderState,
-    schedule: Vec<u8>,
-    path: PathBuf,
+    pub schedule: Schedule,
     /// Seconds of rendering until the checkpoint, over all runs of the program.
     pub seconds: f64,
     /// `true` if light weights or display transform differ from those of the checkpoint.
     pub is_relit: bool,
-}
-
-impl Resumed {
-    /// Restores the schedule with new settings. Fails if its state does not belong to the film.
-    pub fn schedule(&self, settings: Settings) -> Result<Schedule, ReadError> {
-        let film = &self.state.film;
-        let counts: Vec<_> = (0..film.tile_count()).map(|tile| film.counts(tile)).collect();
-        let mut schedule = self.state.schedule(settings);
-        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| {
-            let what = "the state of its schedule does not belong to its samples";
-            ReadError::new(&self.path, what, "copy it again, or use an older one")
-        })
-    }
 }
 
 impl Checkpoint {
@@ -187,6 +173,7 @@ impl Checkpoint {
         self,
         scene: &Arc<Scene>,
         options: &Options,
+        settings: Settings,
     ) -> Result<Resumed, ReadError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
@@ -219,15 +206,15 @@ impl Checkpoint {
         }
         let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
         let seconds = seconds_of(&self.header);
-        let mut chunks = self.header.chunks;
+        let encoded = self.header.chunks.get(&SCHEDULE).map_or(&[][..], Vec::as_slice);
+        let counts: Vec<_> = (0..self.film.tile_count()).map(|i| self.film.counts(i)).collect();
+        let mut schedule = state.schedule(settings);
+        schedule.restore(encoded, &counts).ok_or_else(|| {
+            let what = "the state of its schedule does not belong to its samples";
+            self.error(what, "copy it again, or use an older one")
+        })?;
         state.film = self.film;
-        Ok(Resumed {
-            state,
-            schedule: chunks.remove(&SCHEDULE).unwrap_or_default(),
-            path: self.path,
-            seconds,
-            is_relit,
-        })
+        Ok(Resumed { state, schedule, seconds, is_relit })
     }
 
     /// Checks size, seed, sampler and program version.

@@ -120,19 +120,20 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces the entries about samples and noise by those of `report`.
-pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
+/// Replaces samples, noise and display transform in the metadata of a film file by those of `report`
+/// and of `header`.
+pub fn update_metadata(header: &mut FilmFileHeader, report: &Report) {
     for (key, value) in film_entries(report) {
-        metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));
+        header
+            .metadata
+            .iter_mut()
+            .filter(|(k, _)| k == key)
+            .for_each(|(_, v)| v.clone_from(&value));
     }
-}
-
-/// Replaces the display transform in the metadata.
-pub fn update_display(metadata: &mut [(String, String)], display: &Display) {
-    for (_, settings) in metadata.iter_mut().filter(|(key, _)| key == SETTINGS) {
+    for (_, settings) in header.metadata.iter_mut().filter(|(key, _)| key == SETTINGS) {
         if let Some(end) = settings.find(DISPLAY) {
             settings.truncate(end);
-            *settings += &display_text(display);
+            *settings += &display_text(&header.display);
         }
     }
 }

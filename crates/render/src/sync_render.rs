@@ -58,11 +58,4 @@ impl SyncRender {
     pub fn noise_levels(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_levels)
     }
-
-    /// Returns a lower and an upper estimate of the total seconds until the RMSE falls to `levels`
-    /// 8-bit levels. Returns `None` before the first estimate.
-    pub fn seconds_to_noise(&self, levels: f64) -> Option<(f64, f64)> {
-        let (low, high) = self.schedule.seconds_to_noise(levels, self.seconds)?;
-        Some((self.seconds + low, self.seconds + high))
-    }
 }

@@ -26,7 +26,8 @@ pub use shard_render::ShardRender;
 pub use watched::{WatchedFilms, WatchedShards, WatchedState};
 
 use crate::film::{Display, Estimator, Film, TILE};
-use crate::schedule::{Schedule, Settings, TilePrediction, TileSamples};
+pub use crate::schedule::PlannedTile;
+use crate::schedule::{Prediction, Schedule, Settings, TileSamples};
 use zerkalo_kernel::sampling::SamplerKind;
 
 /// Largest number of shards of a plan.
@@ -72,18 +73,6 @@ pub struct Plan {
     pub tiles: Vec<PlannedTile>,
 }
 
-/// Sample counts of one tile in a plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlannedTile {
-    /// Samples per pixel and replicate in the base.
-    pub base: u32,
-    /// Samples per pixel and replicate in the merged film, including `base`.
-    pub end: u32,
-    pub rays_per_sample: f32,
-    /// `true` if a path in the tile has made a random choice.
-    pub glossy: bool,
-}
-
 impl Plan {
     /// Creates the plan that continues from the samples of `schedule` to its noise target.
     /// `usual_slopes` are used where the schedule has not measured any. Returns `None` without a
@@ -93,57 +82,42 @@ impl Plan {
         usual_slopes: [f64; 2],
         settings: PlanSettings,
     ) -> Option<Self> {
-        let prediction = schedule.predict(usual_slopes)?;
-        let tile = |tile: &TilePrediction| PlannedTile {
-            base: tile.done,
-            end: tile.count,
-            // Two decimals suffice for an expected cost.
-            rays_per_sample: (tile.rays_per_sample * 100.0).round() as f32 / 100.0,
-            glossy: tile.glossy,
-        };
-        Some(Self {
-            settings,
-            predicted_levels: prediction.rmse,
-            slopes: prediction.slopes,
-            tiles: prediction.tiles.iter().map(tile).collect(),
-        })
+        let Prediction { tiles, rmse, slopes } = schedule.predict(usual_slopes)?;
+        Some(Self { settings, predicted_levels: rmse, slopes, tiles })
     }
 
     /// Returns the expected number of rays of a shard.
     pub fn rays(&self, shard: u32) -> f64 {
-        self.rays_of(self.ranges(shard).into_iter())
+        self.rays_of(self.ranges(shard).iter().map(|range| range.len() as u32))
     }
 
     /// Returns the expected number of rays of base and all shards.
     pub fn all_rays(&self) -> f64 {
-        self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
+        self.rays_of(self.tiles.iter().map(|tile| tile.end))
     }
 
-    /// Returns the expected number of rays of the sample indices `ranges` of the tiles, in both
-    /// replicates.
-    fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
-        let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
-            let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
-            samples * f64::from(self.tiles[tile].rays_per_sample)
-        };
-        ranges.enumerate().map(rays).sum()
+    /// Returns the expected number of rays of `counts` samples per pixel and replicate in the tiles.
+    fn rays_of(&self, counts: impl Iterator<Item = u32>) -> f64 {
+        let samples = self.samples_of(counts);
+        samples.zip(&self.tiles).map(|(n, t)| n as f64 * f64::from(t.rays_per_sample)).sum()
     }
 
     /// Returns the number of samples of a shard, over all pixels and both replicates.
     pub fn samples(&self, shard: u32) -> u64 {
-        let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
-            2 * range.len() as u64 * pixels_of(self.settings.size, tile)
-        };
-        self.ranges(shard).into_iter().enumerate().map(samples).sum()
+        self.samples_of(self.ranges(shard).iter().map(|range| range.len() as u32)).sum()
     }
 
     /// Returns the mean samples per pixel in the merged picture, over both replicates.
     pub fn spp(&self) -> f64 {
-        let size = self.settings.size;
-        let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
-        let samples: u64 = self.tiles.iter().enumerate().map(samples).sum();
+        let samples: u64 = self.samples_of(self.tiles.iter().map(|tile| tile.end)).sum();
         let [width, height] = self.settings.size.map(u64::from);
         samples as f64 / (width * height) as f64
+    }
+
+    /// Multiplies samples per pixel and replicate in each tile by its pixels and replicates.
+    fn samples_of(&self, counts: impl Iterator<Item = u32>) -> impl Iterator<Item = u64> {
+        let tiles = counts.enumerate();
+        tiles.map(|(i, count)| 2 * u64::from(count) * pixels_of(self.settings.size, i))
     }
 
     /// Returns the first tile in which the sample counts of `film` are not those of `shards`, which

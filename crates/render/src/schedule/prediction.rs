@@ -18,20 +18,22 @@ const AIM: f64 = 0.95;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     /// Sample counts of the tiles, in row order.
-    pub tiles: Vec<TilePrediction>,
+    pub tiles: Vec<PlannedTile>,
     /// Expected RMSE of the picture, in the unit of the error target.
     pub rmse: f64,
     /// Slopes of tiles that are not glossy, and of glossy tiles.
     pub slopes: [f64; 2],
 }
 
+/// Sample counts of one tile in a prediction or a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TilePrediction {
-    /// Samples per pixel and replicate so far.
-    pub done: u32,
-    /// Predicted samples per pixel and replicate, including `done`.
-    pub count: u32,
-    pub rays_per_sample: f64,
+pub struct PlannedTile {
+    /// Samples per pixel and replicate so far: those of the base.
+    pub base: u32,
+    /// Samples per pixel and replicate at the end, including `base`.
+    pub end: u32,
+    pub rays_per_sample: f32,
+    /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
 }
 
@@ -107,10 +109,11 @@ impl Schedule {
             }
         }
         let error = sum_of(&mut allocation.counts.iter().copied());
-        let tile = |(tile, count): (&Tile, &u32)| TilePrediction {
-            done: tile.done,
-            count: *count,
-            rays_per_sample: tile.rays_per_sample(),
+        let tile = |(tile, count): (&Tile, &u32)| PlannedTile {
+            base: tile.done,
+            end: *count,
+            // Two decimals suffice for an expected cost.
+            rays_per_sample: (tile.rays_per_sample() * 100.0).round() as f32 / 100.0,
             glossy: tile.glossy,
         };
         Some(Prediction {

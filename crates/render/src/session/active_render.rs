@@ -119,13 +119,13 @@ impl ActiveRender {
         checkpoint: Checkpoint,
     ) -> Result<Self, String> {
         let started = Instant::now();
-        let resumed = checkpoint.resume(scene, options).map_err(|error| error.to_string())?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
-        let schedule = resumed.schedule(settings).map_err(|error| error.to_string())?;
+        let resumed =
+            checkpoint.resume(scene, options, settings).map_err(|error| error.to_string())?;
         let mut render = Self {
             traced_for: Duration::from_secs_f64(resumed.seconds),
             first_picture_after: Some(started.elapsed()),
-            ..Self::new(resumed.state, schedule, started)
+            ..Self::new(resumed.state, resumed.schedule, started)
         };
         if resumed.is_relit {
             render.invalidate_estimates();
