@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::common::report;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use proptest::prelude::*;
@@ -11,9 +11,10 @@ use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 use zerkalo_render::film::{
-    Depth, Display, Film, Header, ImageData, ImageOutput, InvalidSample, LightWeights, Replicates,
-    TILE, Tile, TileHandle, Tone, WholeFilm, lattice_pixels, quantised_8, quantised_16,
+    Display, Film, Header, InvalidSample, LightWeights, Replicates, TILE, Tile, TileHandle, Tone,
+    lattice_pixels, quantised_8, quantised_16,
 };
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;

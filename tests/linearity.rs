@@ -6,7 +6,7 @@
 //!   glossy tiles.
 
 use crate::support;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,

@@ -1,9 +1,9 @@
 //! Renders that are divided into shards (parts, each for one process): equality with a render by
 //! one process, interruption, and the noise that a plan promises.
 
-use crate::support::test_film::TestFilm;
 use std::path::Path;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, Noise};
 use zerkalo_render::plan::{Plan, PlanSettings, ShardRender};
 use zerkalo_render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};

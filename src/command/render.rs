@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::ImageOutput;
+use zerkalo_render::image_file::ImageOutput;
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
 use zerkalo_render::{Checkpoint, Options, RegionRender};

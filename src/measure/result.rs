@@ -45,7 +45,7 @@ pub struct Measured {
     pub name: String,
     /// Number of threads that trace rays.
     pub threads: usize,
-    /// Points of the error curve (error after some samples), in ascending order of sample count.
+    /// Points of the error curve, in ascending order of sample count.
     pub points: Vec<Point>,
     /// Share of the processors' time that other programs used, for each repetition of the render.
     /// `None` if unknown.
@@ -285,7 +285,7 @@ impl Measurement {
 mod tests {
     use super::*;
     use crate::measure::reference_image::Errors;
-    use crate::measure::test_random::Rng;
+    use zerkalo_render::film::testing::Rng;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
         let point = |(step, (spp, levels)): (usize, &(f64, f64))| Point {

@@ -4,7 +4,6 @@
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, material, number};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
@@ -12,6 +11,7 @@ use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::export::Provenance;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, Replicates, TILE};
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Session, State};

@@ -1,12 +1,12 @@
 //! Tests of renders that are divided among machines.
 
 use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::file::{
     FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
 };
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, LightWeights};
 use zerkalo_render::plan::{
     Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,

@@ -5,11 +5,11 @@
 mod noise;
 
 use crate::support;
-use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::lanes::{SimdFloat, Single};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, LinearImage, Tone};
 use zerkalo_render::schedule::{Stop, StoppedBy};
 use zerkalo_render::session::{Session, Snapshot, State, View};

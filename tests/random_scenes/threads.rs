@@ -2,9 +2,9 @@
 //! counts must be equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, pool, settings, trace};
 use zerkalo_render::film::Noise;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::schedule::{Step, Stop, StoppedBy};
 use zerkalo_scene::Scene;
 use zerkalo_world::Precision;

@@ -2,7 +2,6 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 pub mod png_file;
-pub mod test_film;
 
 use crate::common::NAME;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -12,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::{Display, Film, LightWeights, Replicates, TILE, Tile};
+use zerkalo_render::film::{Display, Film, Replicates};
 use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 use zerkalo_render::session::Session;
 use zerkalo_render::wave::{Job, Wave, WaveReport};

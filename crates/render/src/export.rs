@@ -1,8 +1,9 @@
 //! Export of pictures as files, with metadata about their origin. The metadata hold no dates,
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
+use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Display, ImageOutput};
+use crate::image_file::{Depth, ImageOutput};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
@@ -36,7 +37,7 @@ impl RenderState {
         depth: Depth,
         output: &ImageOutput,
     ) -> Result<(), WriteError> {
-        film_header(self, report, provenance).write_picture(&self.film, depth, output)
+        output.write_film(&film_header(self, report, provenance), &self.film, depth)
     }
 }
 
@@ -110,8 +111,7 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries of a picture that depend on the film alone: samples per pixel,
-/// noise, and the numbers of bad samples (NaN or negative) and of saturated samples (above the
-/// film's limit).
+/// noise, and the numbers of bad samples and of saturated samples.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {

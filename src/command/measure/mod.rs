@@ -10,7 +10,8 @@ use crate::measure::{self, Experiment, Plan, Reference};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
-use zerkalo_render::film::{self, Display};
+use zerkalo_render::film::Display;
+use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
 use zerkalo_world::{self as world, AnyWorld};
 
@@ -106,7 +107,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
         Drawing::Svg => measure::plot::svg(report.measurement, &title).map(String::into_bytes),
         Drawing::Png => measure::plot::pixels(report.measurement, &title).and_then(|pixels| {
             let (width, height) = measure::plot::size(report.measurement);
-            Ok(film::png_of_rgb([width, height], &pixels)?)
+            Ok(image_file::png_of_rgb([width, height], &pixels)?)
         }),
     };
     let bytes = drawn.map_err(|error| format!("cannot draw: {error}"))?;
@@ -116,7 +117,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
 /// Reads the reference picture, an EXR file of the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
-    let read = film::read_exr(path).map_err(failed)?;
+    let read = image_file::read_exr(path).map_err(failed)?;
     let [width, height] = read.size;
     if read.size != size.map(|n| n as usize) {
         return Err(failed(format!(

@@ -12,7 +12,7 @@ impl UpdateContext<'_> {
         let (scene, selection) = (self.scene(), &self.model.selection);
         let tried = match mode {
             Mode::Move => edit::move_by(scene, selection, [0.0; 3]).err(),
-            Mode::Rotate => edit::turn(scene, selection, 0.0).err(),
+            Mode::Rotate => edit::rotate(scene, selection, 0.0).err(),
             _ => None,
         };
         if let Some(error) = tried {

@@ -81,7 +81,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn rotate_by(&mut self, degrees: f64) {
-        let edit = edit::turn(self.scene(), &self.model.selection, degrees);
+        let edit = edit::rotate(self.scene(), &self.model.selection, degrees);
         self.commit(edit, self.gesture());
     }
 

@@ -1,7 +1,7 @@
 //! Tests of the noise estimate: pictures with a known error.
 
 use crate::film::noise::*;
-use crate::film::test_film::TestFilm;
+use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, fill, film, only, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};

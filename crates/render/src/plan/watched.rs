@@ -1,8 +1,8 @@
 //! Watched films: film files that other processes write, and the sum of their films. A file is read
 //! again when it is replaced.
 //!
-//! After a change all films are added again, which takes the memory of one film, whatever the number
-//! of files.
+//! After a change all films are added again, which takes the memory of one film, whatever the
+//! number of files.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
@@ -269,8 +269,7 @@ impl WatchedFilms {
         self.inputs().flat_map(|input| &input.shards)
     }
 
-    /// Reads the headers of the film files whose stamps have changed. Returns the indices of these
-    /// files.
+    /// Reads the film files whose stamps have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
@@ -383,8 +382,8 @@ impl WatchedFilms {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns the plan that all files share, with all shards in the files. Returns `None` without a
-    /// shard.
+    /// Returns the plan that all files share, with all shards in the files. Returns `None` without
+    /// a shard.
     pub(super) fn part(&self) -> Option<Part> {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();

@@ -1,11 +1,11 @@
 //! Sessions: a thread of its own traces scenes, or reads film files that other processes write, and
 //! publishes snapshots.
 //!
-//! A client first sends a command and then raises the cancel flag of the running wave. The rendering
-//! thread first lowers the flag and then receives all commands. In the reverse order, it could lower
-//! the flag without receiving the command, which would then wait until the wave ends. If several
-//! scenes are waiting, only the newest is compiled. A cancelled wave loses no samples: its remaining
-//! jobs are traced when the render resumes.
+//! A client first sends a command and then raises the cancel flag of the running wave. The
+//! rendering thread first lowers the flag and then receives all commands. In the reverse order, it
+//! could lower the flag without receiving the command, which would then wait until the wave ends.
+//! If several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples:
+//! its remaining jobs are traced when the render resumes.
 //!
 //! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
@@ -153,8 +153,8 @@ impl Session {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
 
-    /// Encodes the render as a checkpoint and calls `task` with it, as [`Session::submit`] does. The
-    /// argument of `task` is `None` if there is no picture yet.
+    /// Encodes the render as a checkpoint and calls `task` with it, as [`Session::submit`] does.
+    /// The argument of `task` is `None` if there is no picture yet.
     pub fn checkpoint(
         &self,
         provenance: Provenance,
@@ -165,8 +165,8 @@ impl Session {
         });
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns a new generation
-    /// (number of a version of the scene), as [`Session::set_scene`] does.
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as
+    /// [`Session::set_scene`] does.
     pub fn restart(&mut self) -> u64 {
         self.begin(Command::Restart)
     }
@@ -269,8 +269,7 @@ impl Session {
     }
 
     /// Sends a command to the rendering thread and cancels the first pass over the picture.
-    /// `command` creates the command from a new generation (number of a version of the scene).
-    /// Returns the generation.
+    /// `command` creates the command from a new generation. Returns the generation.
     fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
         self.generations += 1;
         self.send(command(self.generations));

@@ -29,8 +29,8 @@ pub struct Snapshot {
     /// Progress of the render.
     pub report: Report,
     /// Picture in the size that [`View::raster`] requests. It has the mean radiance of each light
-    /// group (lights that share one weight) in each pixel. The client applies the light weights.
-    /// `None` if no picture is requested, or without a film.
+    /// group in each pixel. The client applies the light weights. `None` if no picture is
+    /// requested, or without a film.
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene that the report describes; empty without a film.
     pub mix: LightWeights,
@@ -70,7 +70,7 @@ pub struct TileMaps {
     pub rows: usize,
     /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
     pub noise_levels: Vec<f32>,
-    /// Samples per pixel of each tile, over both replicates (halves of the samples).
+    /// Samples per pixel of each tile, over both replicates.
     pub spp: Vec<u32>,
 }
 
@@ -118,9 +118,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Creates a snapshot of `film`. `estimates` has the error of each tile, or nothing before the
-    /// first estimate.
-    /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
-    /// so that only changed tiles are read again.
+    /// first estimate. `downsample` caches the contributions of the film's tiles to the picture
+    /// between snapshots, so that only changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,

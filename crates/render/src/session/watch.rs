@@ -3,15 +3,14 @@
 
 use crate::export::{update_display, update_metadata};
 use crate::film::file::FilmFileHeader;
-use crate::film::{Display, Estimator, Film, IncrementalDownsample, Noise, TileNoise};
+use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
 use crate::plan::{WatchedFilms, WatchedShards};
+use crate::session::Command;
 use crate::session::active_render::WorkContext;
 use crate::session::picture::{Picture, Source};
 use crate::session::report::Report;
 use crate::session::snapshot::{Frame, tile_estimates};
-use crate::session::{Command, Task};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
-use std::ops::ControlFlow;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -48,11 +47,18 @@ pub(super) struct Watcher {
     context: WorkContext,
     /// Display transform that the client has set in place of the one in the film files.
     display: Option<Display>,
-    /// Report and noise estimates of the film that is shown. `None` without a film.
-    shown: Option<(Report, Vec<Option<TileNoise>>)>,
+    /// `None` without a film.
+    shown: Option<Shown>,
     downsample: Option<IncrementalDownsample>,
     /// Latest report that was sent to the client.
     reported: Option<WatchReport>,
+}
+
+/// Header, report and noise estimates of the sum of all films, under the present display transform.
+struct Shown {
+    header: FilmFileHeader,
+    report: Report,
+    tiles: Vec<Option<TileNoise>>,
 }
 
 impl Watcher {
@@ -61,85 +67,60 @@ impl Watcher {
     }
 
     pub fn run(mut self, inbox: &Receiver<Command>, on_report: &dyn Fn(WatchReport)) {
-        self.report(on_report);
         self.estimate();
-        let mut due = Instant::now() + POLL;
+        let mut changed = false;
+        let mut due = Instant::now();
         loop {
             match inbox.recv_deadline(due) {
-                Ok(command) => {
-                    if self.apply(command, inbox).is_break() {
-                        return;
-                    }
-                }
-                Err(RecvTimeoutError::Disconnected) => return,
-                Err(RecvTimeoutError::Timeout) => {}
-            }
-            if due <= Instant::now() {
-                let start = Instant::now();
-                if self.films.poll() {
-                    // The cache finds changed tiles by their sample counts. It is dropped, because
-                    // equal counts in two sums of films do not mean equal samples.
-                    self.downsample = None;
-                    self.estimate();
-                    self.publish();
-                }
-                self.report(on_report);
-                due = Instant::now() + POLL.max(REST * start.elapsed());
-            }
-        }
-    }
-
-    /// Executes `command` and those queued after it. Publishes a snapshot if the requested contents
-    /// or the display transform changed. Returns `Break` if the session ends.
-    fn apply(&mut self, command: Command, inbox: &Receiver<Command>) -> ControlFlow<()> {
-        let mut changed = false;
-        for command in std::iter::once(command).chain(inbox.try_iter()) {
-            match command {
-                Command::View(view) => {
+                Ok(Command::View(view)) => {
                     changed |= std::mem::replace(&mut self.context.view, view) != view;
                 }
-                Command::Display(display) => {
+                Ok(Command::Display(display)) => {
                     self.display = Some(display);
                     self.estimate();
                     changed = true;
                 }
-                Command::Task(task) => self.run_task(task),
-                Command::Quit => return ControlFlow::Break(()),
-                Command::Scene(..)
-                | Command::Resume(..)
-                | Command::Restart(_)
-                | Command::Pause(_)
-                | Command::Stop(_)
-                | Command::Pool(_) => {}
+                Ok(Command::Task(task)) => task(self.picture()),
+                Ok(Command::Quit) | Err(RecvTimeoutError::Disconnected) => return,
+                Ok(
+                    Command::Scene(..)
+                    | Command::Resume(..)
+                    | Command::Restart(_)
+                    | Command::Pause(_)
+                    | Command::Stop(_)
+                    | Command::Pool(_),
+                ) => {}
+                Err(RecvTimeoutError::Timeout) => {
+                    let start = Instant::now();
+                    if self.films.poll() {
+                        // The cache finds changed tiles by their sample counts. It is dropped,
+                        // because equal counts in two sums of films do not mean equal samples.
+                        self.downsample = None;
+                        self.estimate();
+                        changed = true;
+                    }
+                    self.report(on_report);
+                    due = Instant::now() + POLL.max(REST * start.elapsed());
+                }
+            }
+            if changed && inbox.is_empty() {
+                self.publish();
+                changed = false;
             }
         }
-        if changed {
-            self.publish();
-        }
-        ControlFlow::Continue(())
     }
 
-    fn sum(&self) -> Option<(&Film, &FilmFileHeader)> {
-        self.films.film().zip(self.films.header())
-    }
-
-    fn run_task(&self, task: Task) {
-        let (Some((film, header)), Some((report, _))) = (self.sum(), &self.shown) else {
-            return task(None);
-        };
-        let mut header = header.clone();
-        header.display = self.display.unwrap_or(header.display);
-        update_metadata(&mut header.metadata, report);
-        update_display(&mut header.metadata, &header.display);
-        let (mix, source) = (&header.weights, Source::Files(&header));
-        task(Some(Picture { film, mix, report, source }));
+    fn picture(&self) -> Option<Picture<'_>> {
+        let (film, Shown { header, report, .. }) = self.films.film().zip(self.shown.as_ref())?;
+        Some(Picture { film, mix: &header.weights, report, source: Source::Files(header) })
     }
 
     /// Estimates the noise of the picture that the sum of all films shows.
     fn estimate(&mut self) {
-        self.shown = self.sum().and_then(|(film, header)| {
-            let display = self.display.unwrap_or(header.display);
-            let estimator = Estimator::new(film.scales(), &header.weights, &display);
+        self.shown = self.films.film().zip(self.films.header()).and_then(|(film, header)| {
+            let mut header = header.clone();
+            header.display = self.display.unwrap_or(header.display);
+            let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
             let pool = &self.context.pool;
             let tiles = tile_estimates(film, &estimator, pool, &AtomicBool::new(false))?;
             let report = Report {
@@ -151,17 +132,19 @@ impl Watcher {
                 threads: pool.current_num_threads(),
                 ..Report::of_samples(film)
             };
-            Some((report, tiles))
+            update_metadata(&mut header.metadata, &report);
+            update_display(&mut header.metadata, &header.display);
+            Some(Shown { header, report, tiles })
         });
     }
 
     fn publish(&mut self) {
-        let (Some(film), Some(header)) = (self.films.film(), self.films.header()) else { return };
-        let Some((report, tiles)) = &self.shown else { return };
+        let Some((film, shown)) = self.films.film().zip(self.shown.as_ref()) else { return };
+        let Shown { header, report, tiles } = shown;
         let frame = Frame {
             view: self.context.view,
             mix: header.weights.clone(),
-            display: self.display.unwrap_or(header.display),
+            display: header.display,
             lighting: None,
             first_hits: None,
         };

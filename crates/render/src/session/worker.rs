@@ -27,8 +27,8 @@ pub(super) struct Worker {
     /// `true` if the newest scene must start with an empty film, even if samples of the active
     /// render could be reused.
     restart: bool,
-    /// Scene to show, and the checkpoint from which its render continues. `None` if no
-    /// checkpoint is waiting to be continued.
+    /// Scene to show, and the checkpoint from which its render continues. `None` if no checkpoint
+    /// is waiting to be continued.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     paused: bool,
@@ -185,7 +185,7 @@ impl Worker {
     }
 
     /// Does the next piece of rendering work, if there is any: estimates the noise again if it is
-    /// out of date, traces a piece of a wave (set of concurrent jobs), and publishes a snapshot.
+    /// out of date, traces a piece of a wave, and publishes a snapshot.
     fn advance(&mut self) {
         let context = &self.context;
         self.idle = true;

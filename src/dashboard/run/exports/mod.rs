@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::{Depth, ImageOutput};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::Settings;
 use zerkalo_render::session::{Picture, Session, State};
 use zerkalo_render::{EncodedCheckpoint, Options};
@@ -52,7 +52,7 @@ impl Exporter {
         let header = picture.header(|scene| self.provenance(scene));
         let write = |path: &Path| {
             let output = ImageOutput::from_path(path)?.create_new();
-            header.write_picture(picture.film, Depth::Eight, &output)
+            output.write_film(&header, picture.film, Depth::Eight)
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;

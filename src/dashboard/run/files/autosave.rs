@@ -220,10 +220,10 @@ fn scene(orphan: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, Scen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::starter;
+    use crate::dashboard::testing::STARTER;
 
     fn scene(depth: u32) -> Arc<Scene> {
-        let mut scene = Scene::parse(starter(), "starter").unwrap();
+        let mut scene = Scene::parse(STARTER, "starter").unwrap();
         scene.trace.max_depth = depth;
         Arc::new(scene)
     }
@@ -248,7 +248,7 @@ mod tests {
     fn orphaned_edits_are_offered_after_crash() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        std::fs::write(&path, starter()).unwrap();
+        std::fs::write(&path, STARTER).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let mut first = Autosave::new(Some(&path), "", None);
         assert!(first.search(Ok(&file)).is_empty());
@@ -267,7 +267,7 @@ mod tests {
         let [Message::OrphanedEdits(left)] = &messages[..] else { panic!("{messages:?}") };
         assert_eq!((&left.scene, left.changed), (&scene(3), false));
         // The next offer reports that another program has changed the scene file.
-        std::fs::write(&path, format!("# new\n{}", starter())).unwrap();
+        std::fs::write(&path, format!("# new\n{}", STARTER)).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let Some(Message::OrphanedEdits(left)) = second.offer(Ok(&file)) else { panic!() };
         assert!(left.changed);
@@ -286,11 +286,11 @@ mod tests {
     fn equal_edits_are_discarded_and_unreadable_ones_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        std::fs::write(&path, starter()).unwrap();
+        std::fs::write(&path, STARTER).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let hidden = folder.path().join(".a.toml.unsaved");
         let mut autosave = Autosave::new(Some(&path), "", None);
-        std::fs::write(&hidden, starter()).unwrap();
+        std::fs::write(&hidden, STARTER).unwrap();
         assert!(autosave.search(Ok(&file)).is_empty() && !hidden.exists());
         std::fs::write(&hidden, "[camera\n").unwrap();
         let messages = autosave.search(Ok(&file));
@@ -306,7 +306,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "[camera\n").unwrap();
-        std::fs::write(folder.path().join(".a.toml.unsaved"), starter()).unwrap();
+        std::fs::write(folder.path().join(".a.toml.unsaved"), STARTER).unwrap();
         let mut autosave = Autosave::new(Some(&path), "", None);
         let messages = autosave.search(Err(&path));
         assert!(
@@ -316,13 +316,13 @@ mod tests {
         let mut file = autosave.recover(Some(&path)).unwrap();
         let scene = file.document().scene().clone();
         file.save(&scene, false).unwrap();
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), starter());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), STARTER);
     }
 
     #[test]
     fn autosave_failure_is_reported_once() {
         let mut autosave = Autosave::new(None, "a", None);
-        let file = SceneFile::untitled(starter().to_string(), "a").unwrap();
+        let file = SceneFile::untitled(STARTER.to_string(), "a").unwrap();
         let mut write = || {
             autosave.note(Some(scene(3)), Instant::now());
             autosave.write(&file)

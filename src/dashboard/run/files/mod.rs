@@ -169,9 +169,9 @@ fn keep_elsewhere(
 mod tests {
     use super::file_worker::CHECK_INTERVAL;
     use super::*;
+    use crate::dashboard::testing::STARTER;
     use crossbeam_channel::Receiver;
     use std::fs;
-    use zerkalo_scene::starter;
     use zerkalo_scene::{SaveError, SceneErrors};
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
@@ -195,9 +195,9 @@ mod tests {
     fn external_change_is_reported_once() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        fs::write(&path, starter()).unwrap();
+        fs::write(&path, STARTER).unwrap();
         let (files, inbox) = opened(&path);
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
@@ -207,7 +207,7 @@ mod tests {
         assert!(quiet.is_err(), "{quiet:?}");
         // A rename replaces the file at once, so the worker never reads an incomplete file.
         let other = folder.path().join("b.toml");
-        fs::write(&other, format!("{}\n# more\n", starter())).unwrap();
+        fs::write(&other, format!("{}\n# more\n", STARTER)).unwrap();
         fs::rename(&other, &path).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL);
@@ -230,7 +230,7 @@ mod tests {
         files.save(Arc::default(), None, true);
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Err(_))));
         assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
-        fs::write(&path, starter()).unwrap();
+        fs::write(&path, STARTER).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
@@ -241,8 +241,8 @@ mod tests {
     fn edits_are_autosaved_at_end_unless_saved() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.toml");
-        fs::write(&path, starter()).unwrap();
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        fs::write(&path, STARTER).unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         let scene = Arc::new(scene);
         let hidden = folder.path().join(".a.toml.unsaved");
@@ -263,7 +263,7 @@ mod tests {
         assert!(!hidden.exists());
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
         let (mut files, _inbox) = opened(&path);
-        files.autosave(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
+        files.autosave(Some(Arc::new(Scene::parse(STARTER, "a").unwrap())));
         files.flush(PATIENCE);
         assert!(hidden.exists());
         files.autosave(None);
@@ -276,20 +276,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new.toml");
         let (results, _inbox) = unbounded();
-        let untitled = SceneFile::untitled(starter().to_string(), "starter").unwrap();
+        let untitled = SceneFile::untitled(STARTER.to_string(), "starter").unwrap();
         let files = Files::new(Ok(untitled), None, results).unwrap();
-        let scene = Scene::parse(starter(), "starter").unwrap();
+        let scene = Scene::parse(STARTER, "starter").unwrap();
         files.save(Arc::new(scene), Some(path.clone()), false);
         drop(files);
-        assert_eq!(fs::read_to_string(&path).unwrap(), starter());
+        assert_eq!(fs::read_to_string(&path).unwrap(), STARTER);
     }
 
     /// Writes a scene file to `folder`. Returns two values: its path, and a scene that differs from
     /// the one in the file.
     fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
         let path = folder.join("a.toml");
-        fs::write(&path, starter()).unwrap();
-        let mut scene = Scene::parse(starter(), "a").unwrap();
+        fs::write(&path, STARTER).unwrap();
+        let mut scene = Scene::parse(STARTER, "a").unwrap();
         scene.film.size = [64, 48];
         (path, Arc::new(scene))
     }

@@ -44,7 +44,7 @@ pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::png_of_rgb;
+    use crate::image_file::png_of_rgb;
 
     #[test]
     fn written_png_is_read_back() {
