@@ -1,9 +1,7 @@
 //! Texts derived from the command table: hint line, help and docs/keys.md.
 
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
+use crate::dashboard::{KeyContext, Model, Overlay};
 
 /// Line of the help.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -24,3 +24,14 @@ mod testing;
 pub mod text;
 pub mod update;
 pub mod view;
+
+// Names that most modules of the dashboard use.
+use convergence::Convergence;
+use editor::Editor;
+use key_context::KeyContext;
+use layout::{BORDER, Focus, Layout};
+use message::{DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits};
+use model::{CompareView, Drag, FieldList, Mode, Model, WatchTable, short_name};
+use overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question, ViewedImage};
+use panel_lines::{FieldLine, OutlineEntry, OutlineLine, PanelLine};
+use update::UpdateContext;

@@ -1,12 +1,10 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
-use crate::dashboard::convergence::Convergence;
-use crate::dashboard::editor::Editor;
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::layout::{Focus, Layout, Request, layout};
-use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::layout::{Request, layout};
 use crate::dashboard::text::wrapped;
+use crate::dashboard::{
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, Layout, OrphanedEdits, Overlay,
+};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;

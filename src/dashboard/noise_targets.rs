@@ -1,7 +1,7 @@
 //! List of noise targets, noise values at which rendering can stop, with the time to reach each of
 //! them.
 
-use crate::dashboard::convergence::Convergence;
+use crate::dashboard::Convergence;
 use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each target in [`QUALITIES`].

@@ -1,9 +1,7 @@
 //! Overlays of the dashboard: help, lists, forms, prompts and questions. An overlay covers panels
 //! and receives the keys.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::model::FieldList;
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{Editor, FieldList, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::session::QUALITIES;

@@ -1,10 +1,8 @@
 //! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
-use crate::dashboard::layout::BORDER;
-use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::text::wrapped_rows;
+use crate::dashboard::{BORDER, Model, Overlay};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 

@@ -1,8 +1,7 @@
 //! Lines of outline, inspector and form as data. `view` draws them, and `update` moves the cursor
 //! over them.
 
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::{Form, Overlay};
+use crate::dashboard::{Form, Model, Overlay};
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use zerkalo_scene::value::truncated;

@@ -1,10 +1,10 @@
 //! Executor of the effects that `update` returns.
 
-use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
+use crate::dashboard::{Effect, Format, Message};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;

@@ -1,9 +1,6 @@
 //! Event loop of the dashboard. One thread updates the model and draws it. Work that may block runs
 //! in other threads, whose results come back through channels.
 
-use crate::dashboard::message::{Effect, Message};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::effects::{EffectRunner, Outcome};
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
@@ -11,6 +8,7 @@ use crate::dashboard::run::input::{self, Input};
 use crate::dashboard::run::job_control::{ResizeDebounce, TerminalIo, stop_group};
 use crate::dashboard::run::latency::LatencyRecorder;
 use crate::dashboard::update::update;
+use crate::dashboard::{Effect, Message, Model, Overlay};
 use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
 use std::sync::Arc;

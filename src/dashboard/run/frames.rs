@@ -1,10 +1,9 @@
 //! Frame pipeline: draws the model, and sends the differences from the contents of the terminal.
 
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
+use crate::dashboard::{Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;

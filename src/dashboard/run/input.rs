@@ -1,6 +1,6 @@
 //! Conversion of terminal events to messages.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;

@@ -1,6 +1,6 @@
 //! Job control by the shell, resizing, and loss of the terminal.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::event_loop::Dashboard;
 use crossbeam_channel::Receiver;
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};

@@ -12,8 +12,7 @@ mod latency;
 mod worker;
 mod writer;
 
-use crate::dashboard::message::{Exported, Message};
-use crate::dashboard::model::Model;
+use crate::dashboard::{Exported, Message, Model};
 use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
 use event_loop::Dashboard;

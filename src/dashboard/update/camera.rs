@@ -1,6 +1,7 @@
 //! Commands that move the camera, by keys and mouse.
 
-use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::{Coalesce, Direction, StepSize};
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::{

@@ -2,12 +2,9 @@
 //! derived.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
-use crate::dashboard::message::{Effect, Format};
-use crate::dashboard::model::{CompareView, Mode, Model};
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{CompareView, Effect, Format, Mode, Model, Overlay, UpdateContext};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
 

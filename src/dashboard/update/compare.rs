@@ -1,8 +1,7 @@
 //! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison.
 
-use crate::dashboard::message::{DisplayChannel, Effect};
-use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
+use crate::dashboard::update::{Direction, StepSize, cycled};
+use crate::dashboard::{CompareView, DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::film::{LinearImage, Tone};
 

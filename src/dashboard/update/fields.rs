@@ -1,9 +1,8 @@
 //! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{FieldLine, walk_fields};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::panel_lines::walk_fields;
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{Editor, FieldLine, Overlay, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget};
 
 impl UpdateContext<'_> {

@@ -1,9 +1,7 @@
 //! Commands on undo, saving, reloading and quitting, and results of saves, loads and exports.
 
-use crate::dashboard::message::{Effect, Exported};
-use crate::dashboard::model::{Tone, first_line, short_name};
-use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::model::{Tone, first_line};
+use crate::dashboard::{Answer, Effect, Exported, UpdateContext, short_name};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_scene::edit::{Target, outline};

@@ -1,8 +1,7 @@
 //! Focus and modes.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::{UpdateContext, cycled};
+use crate::dashboard::update::cycled;
+use crate::dashboard::{CompareView, Focus, Mode, UpdateContext};
 use zerkalo_scene::edit;
 
 impl UpdateContext<'_> {

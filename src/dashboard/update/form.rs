@@ -1,8 +1,7 @@
 //! Creation of objects and lights: the user picks a kind, then fills in a form.
 
-use crate::dashboard::model::FieldList;
-use crate::dashboard::overlay::{Form, Overlay, Pick};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{FieldList, Form, Overlay, Pick, UpdateContext};
 use std::sync::Arc;
 use zerkalo_scene::edit::{self, Edit, EditError, Word};
 

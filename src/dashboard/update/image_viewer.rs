@@ -1,9 +1,6 @@
 //! Viewer of exported images.
 
-use crate::dashboard::message::Effect;
-use crate::dashboard::model::short_name;
-use crate::dashboard::overlay::{Overlay, ViewedImage};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{Effect, Overlay, UpdateContext, ViewedImage, short_name};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_terminal::image::ViewerImage;

@@ -1,11 +1,7 @@
 //! Key dispatch: an open text editor receives a key first, then the command table.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::{FieldList, Model};
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
+use crate::dashboard::{Editor, FieldList, KeyContext, Model, Overlay, UpdateContext};
 use zerkalo_terminal::event::{Code, Key};
 
 /// Returns the character that `key` types.

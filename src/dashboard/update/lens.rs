@@ -1,7 +1,8 @@
 //! Commands on focus and aperture of the camera.
 
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use crate::dashboard::update::mouse::first_hit;
-use crate::dashboard::update::{Coalesce, UpdateContext};
 use zerkalo_scene::camera::{Aperture, Camera};
 use zerkalo_scene::edit::{self, bounds};
 use zerkalo_scene::value::{number, round_significant};

@@ -1,6 +1,7 @@
 //! Commands on lights.
 
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use zerkalo_scene::edit::{Edit, EditError, Target, step, toggle};
 use zerkalo_scene::value::number;
 

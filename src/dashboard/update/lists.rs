@@ -1,13 +1,11 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
-use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
-use crate::dashboard::layout::Focus;
-use crate::dashboard::message::Effect;
-use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
-use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::panel_lines::{outline, outline_position, scrolled};
 use crate::dashboard::update::commands::{COMMANDS, Command};
+use crate::dashboard::{
+    Answer, CommandPalette, Editor, Effect, Focus, OutlineLine, Overlay, Question, UpdateContext,
+};
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 use zerkalo_render::schedule::Stop;

@@ -1,6 +1,7 @@
 //! Commands on the mirror: a reflecting material of the selection, or else of the scene.
 
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use zerkalo_scene::edit::{self, Edit, EditError, Target};
 use zerkalo_scene::value::{number, truncated};
 

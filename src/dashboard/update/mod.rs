@@ -21,10 +21,9 @@ mod render;
 mod undo_coalescing;
 mod watch;
 
-use crate::dashboard::message::{Effect, Message};
-use crate::dashboard::model::{FieldList, Model, Notice, Tone};
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::model::{Notice, Tone};
 use crate::dashboard::panel_lines::{nearest_field, outline, outline_position, scrolled};
+use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
 use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;

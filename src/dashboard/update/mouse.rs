@@ -1,10 +1,9 @@
 //! Mouse: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Drag, FieldList, Mode};
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::panel_lines::outline;
+use crate::dashboard::{
+    Drag, FieldList, Focus, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
+};
 use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_scene::Scene;

@@ -1,7 +1,7 @@
 //! Commands on the selected part of the scene.
 
-use crate::dashboard::model::Mode;
-use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize};
+use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 

@@ -1,10 +1,8 @@
 //! Prompts for names, paths, stop criteria and sizes.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
-use crate::dashboard::overlay::{Overlay, Prompt};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{Editor, Effect, Format, Overlay, Prompt, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;

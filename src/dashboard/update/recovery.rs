@@ -1,9 +1,7 @@
 //! Recovery of unsaved edits after a crash, and requests for autosaves.
 
-use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
-use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{Answer, Effect, OrphanedEdits, UpdateContext};
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -1,10 +1,9 @@
 //! Commands on rendering, exports and the colour depth of the terminal.
 
-use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
-use crate::dashboard::update::{UpdateContext, cycled};
+use crate::dashboard::{Effect, Format, Overlay, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;

@@ -1,10 +1,8 @@
 //! Table of watched film files: reports, cursor and mouse.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Mode, WatchTable, short_name};
 use crate::dashboard::panel_lines::scrolled;
-use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
+use crate::dashboard::{Focus, Mode, UpdateContext, WatchTable, short_name};
 use std::path::Path;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;

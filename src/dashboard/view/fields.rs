@@ -1,12 +1,9 @@
 //! Drawing of properties and their values.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{FieldList, Model};
-use crate::dashboard::panel_lines::{FieldLine, PanelLine};
 use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
+use crate::dashboard::{Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;

@@ -1,12 +1,10 @@
 //! Border of the picture's panel, with file name, mode and settings of the display.
 
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::text::{columns, cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{CompareView, DisplayChannel, Focus, Layout, Mode, Model};
 use ratatui::style::Modifier;
 use zerkalo_render::film::Tone;
 

@@ -1,9 +1,8 @@
 //! Drawing of the viewer of exported images.
 
-use crate::dashboard::model::{Model, short_name};
-use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::paint;
+use crate::dashboard::{Model, ViewedImage, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use zerkalo_terminal::cells::PictureCells;

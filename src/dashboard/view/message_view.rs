@@ -1,9 +1,8 @@
 //! Errors of the scene file, and the reason why a scene cannot be rendered, in the picture's panel.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::session::State;

@@ -18,10 +18,9 @@ mod tests;
 mod theme;
 mod watch;
 
-use crate::dashboard::layout::{Focus, Layout, SMALLEST};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::layout::SMALLEST;
 use crate::dashboard::text;
+use crate::dashboard::{Focus, Layout, Model, Overlay};
 use painter::Painter;
 use picture::PictureView;
 pub use picture::is_settled;

@@ -1,13 +1,13 @@
 //! Panel of the outline.
 
-use crate::dashboard::layout::{BORDER, Focus, Layout};
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Model};
-use crate::dashboard::panel_lines::{OutlineEntry, OutlineLine, outline};
+use crate::dashboard::panel_lines::outline;
 use crate::dashboard::text::columns;
 use crate::dashboard::view::false_color::object_color;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, VisibleLine};
+use crate::dashboard::{
+    BORDER, CompareView, DisplayChannel, Focus, Layout, Model, OutlineEntry, OutlineLine,
+};
 use zerkalo_scene::edit::Target;
 
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {

@@ -1,15 +1,14 @@
 //! Drawing of overlays.
 
 use crate::dashboard::hints::{HelpLine, help};
-use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
-use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut, duration, durations};
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{CommandPalette, Form, Model, Overlay, Pick, Prompt, Question};
 use ratatui::layout::Position;
 use ratatui::style::Style;
 use zerkalo_render::session::QUALITIES;

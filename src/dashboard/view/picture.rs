@@ -1,10 +1,8 @@
 //! Conversion of snapshots to rasters, and drawing of the picture's cells.
 
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Model};
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
 use crate::dashboard::view::legend::Legend;
+use crate::dashboard::{CompareView, DisplayChannel, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;

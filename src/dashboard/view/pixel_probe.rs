@@ -1,9 +1,8 @@
 //! Drawing of the pixel probe: a mark on the picture, and a box with values.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;

@@ -1,10 +1,9 @@
 //! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
 //! the estimated time at which it is reached.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;

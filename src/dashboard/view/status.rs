@@ -1,7 +1,8 @@
 //! Status line and hint line, the last two rows of the screen.
 
+use crate::dashboard::Model;
 use crate::dashboard::hints::hints;
-use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::model::Tone;
 use crate::dashboard::text::{columns, duration, durations, number};
 use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::painter::Painter;

@@ -1,11 +1,10 @@
 //! Drawing of the table of watched film files, and of their summary in the status line.
 
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::text::wrapped;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{Focus, Layout, Model, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Reading and encoding of exported images for the image viewer.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::exports::shrink::shrunk;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::Sender;

@@ -5,9 +5,9 @@ pub mod image_viewer;
 pub mod paths;
 mod shrink;
 
-use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
+use crate::dashboard::{Exported, Format, Message};
 use crossbeam_channel::{Sender, bounded};
 use paths::{numbered, scp};
 use std::io;

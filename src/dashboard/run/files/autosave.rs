@@ -1,7 +1,7 @@
 //! Autosave of unsaved edits to a recovery file, delayed until a pause in editing.
 
-use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::dashboard::model::first_line;
+use crate::dashboard::{Message, OrphanedEdits};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};

@@ -1,6 +1,6 @@
 //! Thread that writes the recovery file. It never accesses the scene file, which may block.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::files::autosave::Autosave;
 use crate::dashboard::run::files::{Job, SharedFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};

@@ -1,6 +1,6 @@
 //! Thread that reads and writes the scene file and checks it for changes by other programs.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::files::{AutosaveJob, SharedFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::PathBuf;

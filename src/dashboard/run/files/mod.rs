@@ -6,7 +6,7 @@ mod autosave_worker;
 mod file_worker;
 mod shared_file;
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::worker::Worker;
 use autosave::Autosave;
 pub use autosave_worker::AutosaveJob;
