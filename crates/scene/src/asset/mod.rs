@@ -16,7 +16,6 @@ mod hdr;
 mod image;
 mod loaded;
 mod mesh;
-mod radiance_distribution;
 mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};
