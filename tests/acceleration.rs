@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::support;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};

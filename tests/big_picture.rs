@@ -1,7 +1,6 @@
 //! Check of a big picture against single pixels, which are traced without tiles and without regions
 //! (bands that are rendered one after the other).
 
-use crate::support::test_film::TestFilm;
 use crate::support::{shipped, sized};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -9,6 +8,7 @@ use std::io::BufReader;
 use std::path::PathBuf;
 use zerkalo_kernel::lanes::{Double, SimdFloat};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
 use zerkalo_world::{AnyWorld, Options, Radiance, TracedPacket, World};
 
@@ -49,7 +49,7 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
         tile.advance(replicate, SAMPLES);
     }
     let display = Display::default();
-    (0..COLUMNS.len()).map(|x| display.codes_8(film.pixel(x, 0, mix))).collect()
+    (0..COLUMNS.len()).map(|x| display.levels_8(film.pixel(x, 0, mix))).collect()
 }
 
 /// Compares 16 columns (262,144 pixels) of the picture in the file `ZERKALO_PICTURE`. `zerkalo

@@ -5,7 +5,7 @@
 use crate::common;
 use crate::common::report;
 use crate::support;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use report::report;

@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::common::report;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use common::Numbers;
 use proptest::prelude::*;
@@ -11,9 +11,10 @@ use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 use zerkalo_render::film::{
-    Depth, Display, Film, Header, ImageData, ImageOutput, InvalidSample, LightWeights, Replicates,
-    TILE, Tile, TileHandle, Tone, WholeFilm, lattice_pixels, quantised_8, quantised_16,
+    Display, Film, Header, InvalidSample, LightWeights, Replicates, TILE, Tile, TileHandle, Tone,
+    lattice_pixels, quantised_8, quantised_16,
 };
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;
@@ -255,7 +256,7 @@ fn strength_of_lights_does_not_change_the_bits() {
         }
         tile.advance(0, 1);
         let display = Display { exposure_ev: f64::from(-exponent), tone: Tone::Clip };
-        (0..256).map(|p| display.codes(film.pixel(p % 16, p / 16, &white))).collect::<Vec<_>>()
+        (0..256).map(|p| display.levels(film.pixel(p % 16, p / 16, &white))).collect::<Vec<_>>()
     };
     assert_eq!(shown(0), shown(40));
     assert_eq!(shown(0), shown(-40));
@@ -297,14 +298,14 @@ fn png_files_hold_the_displayed_picture() {
         assert_eq!(frame.color_type, png::ColorType::Rgb);
         let pixels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
         for (i, (x, y)) in pixels.enumerate() {
-            let codes = display.codes(film.pixel(x, y, &mix()));
+            let levels = display.levels(film.pixel(x, y, &mix()));
             for c in 0..3 {
                 match depth {
-                    Depth::Eight => assert_eq!(bytes[i * 3 + c], quantised_8(codes[c])),
+                    Depth::Eight => assert_eq!(bytes[i * 3 + c], quantised_8(levels[c])),
                     Depth::Sixteen => {
                         let offset = (i * 3 + c) * 2;
                         let value = u16::from_be_bytes([bytes[offset], bytes[offset + 1]]);
-                        assert_eq!(value, quantised_16(codes[c]));
+                        assert_eq!(value, quantised_16(levels[c]));
                     }
                 }
             }

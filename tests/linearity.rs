@@ -6,7 +6,7 @@
 //!   glossy tiles.
 
 use crate::support;
-use crate::support::test_film::TestFilm;
+use zerkalo_render::film::testing::TestFilm;
 
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
@@ -130,7 +130,7 @@ fn unit_of_light_does_not_change_the_picture() {
                 assert!(undone == expected, "{what}, 2^{ev} in {precision:?}");
                 for (other, original) in shown.chunks(3).zip(expected.chunks(3)) {
                     let [other, original] = [other, original].map(|rgb| [rgb[0], rgb[1], rgb[2]]);
-                    assert_eq!(display.codes(other), Display::default().codes(original));
+                    assert_eq!(display.levels(other), Display::default().levels(original));
                 }
             }
         }
@@ -351,7 +351,7 @@ fn horizon_folds_or_absorbs_rays() {
 fn rays_per_pixel_caps_glossy_tiles() {
     let scene = sized(shipped("rays-per-pixel.toml"), [96, 64]);
     assert_eq!(scene.film.rays_per_pixel, 16);
-    let stop = Stop { noise_codes: Some(0.3), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(0.3), ..Stop::default() };
     for adaptive in [false, true] {
         let mut rendering = begin(&scene, 1, Precision::Auto);
         let reason =

@@ -2,12 +2,12 @@
 //! earlier scenes.
 
 use crate::support;
-use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::Checkpoint;
 use zerkalo_render::export::Provenance;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{Report, Session, State};
 use zerkalo_scene::Scene;

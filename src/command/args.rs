@@ -6,7 +6,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_render::film::{Depth, Display, Tone};
+use zerkalo_render::film::{Display, Tone};
+use zerkalo_render::image_file::Depth;
 use zerkalo_render::plan::MAX_SHARDS;
 use zerkalo_scene::{Acceleration, Scene};
 use zerkalo_terminal::Environment;
@@ -451,9 +452,7 @@ where
 
 /// Creates the parser for the name of an acceleration structure.
 fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
-    let names = Acceleration::ALL
-        .map(|structure| PossibleValue::new(structure.name()).aliases(structure.former_name()));
-    PossibleValuesParser::new(names)
+    PossibleValuesParser::new(Acceleration::ALL.map(Acceleration::name))
         .map(|given| Acceleration::from_name(&given).unwrap_or(Acceleration::Auto))
 }
 
@@ -530,19 +529,12 @@ mod tests {
     }
 
     #[test]
-    fn former_names_of_accelerations_and_settings_are_accepted() {
+    fn accelerations_are_parsed_by_name() {
         for structure in Acceleration::ALL {
-            for name in structure.former_name().into_iter().chain([structure.name()]) {
-                let args = render(&["--acceleration", name]).unwrap();
-                assert_eq!(args.acceleration, Some(structure), "{name}");
-            }
+            let args = render(&["--acceleration", structure.name()]).unwrap();
+            assert_eq!(args.acceleration, Some(structure));
         }
         assert!(render(&["--acceleration", "tree"]).is_err());
-        for (former, present) in
-            [("level", "ray-types"), ("depth", "max-depth"), ("min-weight", "min-throughput")]
-        {
-            assert_eq!(former.parse::<Experiment>(), present.parse::<Experiment>(), "{former}");
-        }
     }
 
     #[test]

@@ -17,7 +17,7 @@ use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::asset::Assets;
 use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
-use zerkalo_scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
+use zerkalo_scene::{Recovery, SceneErrors, SceneFile, state_folder};
 use zerkalo_terminal::Environment;
 use zerkalo_world::{self as world, Precision};
 
@@ -64,6 +64,11 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     };
     conclude(&run_dashboard(setup)?, io::stdout().lock())
 }
+
+/// Text of the scene that the dashboard opens without a file.
+const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
+/// File name under which [`OPENING`] is saved.
+const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
 /// Prints the results of a dashboard that has ended: names of written files on `out`, everything
 /// else on stderr. If a signal ended the dashboard, the error holds the exit status of that signal,
@@ -139,12 +144,7 @@ fn open(
     state: Option<&Path>,
 ) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
     match SceneFile::open_with(path, assets) {
-        Ok(file) => {
-            if let Some(warning) = file.document().migration_warning() {
-                warn(&format!("warning: {warning}"));
-            }
-            Ok(Ok(file))
-        }
+        Ok(file) => Ok(Ok(file)),
         Err(errors) => match open_regular(path).is_ok() {
             true => Ok(Err((path.to_path_buf(), errors))),
             false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),
@@ -172,7 +172,7 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
 /// 212 spp noise 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
-    let noise = match exported.noise_codes {
+    let noise = match exported.noise_levels {
         Some(levels) => format!("{levels:.2} 8-bit levels"),
         None => "unknown".to_string(),
     };
@@ -202,7 +202,7 @@ mod tests {
             path: PathBuf::from("room.png"),
             size: [60, 40],
             spp: 4.0,
-            noise_codes: None,
+            noise_levels: None,
             scp: String::new(),
         };
         Ended {

@@ -83,7 +83,7 @@ pub struct Exported {
     pub spp: f64,
     /// Estimated RMSE of the image after the display transform, in 8-bit levels; `None` without an
     /// estimate.
-    pub noise_codes: Option<f64>,
+    pub noise_levels: Option<f64>,
     /// Argument of scp that copies the image file, such as `user@host:path`.
     pub scp: String,
 }

@@ -206,11 +206,11 @@ pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::built_in;
+    use crate::dashboard::testing::mirror_room;
 
     #[test]
     fn every_target_has_outline_line_and_fields() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.cameras.insert("left".into(), scene.camera.clone());
         scene.lights[0].on = false;
         let lines = outline(&scene);
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn cursor_skips_headings() {
-        let scene = built_in();
+        let scene = mirror_room();
         let lines = inspector(&scene, &Target::Object(2));
         let heading = lines.iter().position(|l| l.entry().is_none()).unwrap();
         assert_eq!(walk_fields(&lines, heading - 1, 1), heading + 1);

@@ -88,7 +88,7 @@ impl Experiment {
     }
 
     /// Returns `true` if the pictures of all variants of the experiment have the same expectation,
-    /// so that they differ in noise only. A variant is a render with one setting changed.
+    /// so that they differ in noise only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -106,13 +106,6 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // The names that earlier versions of the program used are accepted, too.
-        let text = match text {
-            "level" => "ray-types",
-            "depth" => "max-depth",
-            "min-weight" => "min-throughput",
-            current => current,
-        };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
         found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
@@ -157,8 +150,7 @@ pub struct Plan {
     pub targets: Vec<f64>,
     /// Experiments to run; each changes one setting of the render.
     pub experiments: Vec<Experiment>,
-    /// Smallest number of timed renders of each variant (the default settings, or one changed
-    /// setting).
+    /// Smallest number of timed renders of each variant.
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
@@ -290,7 +282,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::built_in;
+    use zerkalo_scene::Scene;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
@@ -302,7 +294,8 @@ mod tests {
             seed: 0,
             display: Display::default(),
         };
-        let all = plan.variants(&Arc::new(built_in()));
+        let text = include_str!("../../scenes/mirror-room.toml");
+        let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
         assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }

@@ -1,9 +1,9 @@
 //! Checkpoints of `zerkalo render`: interrupted and resumed renders, refusals, `zerkalo info`.
 
 use super::*;
-use crate::support::test_film::TestFilm;
 use std::time::Duration;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 /// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;

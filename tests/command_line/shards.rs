@@ -2,9 +2,9 @@
 //! shard into a film file (a part), and `zerkalo merge` adds the parts.
 
 use crate::command_line::Desk;
-use crate::support::test_film::TestFilm;
 use std::fs;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 /// Runs the program with `args`, which must succeed. Returns the program's output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {

@@ -3,12 +3,12 @@
 
 use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
-use crate::support::test_film::TestFilm;
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::plan::{WatchedFilms, WatchedShards, WatchedState};
 
 fn open(desk: &Desk, names: &[&str]) -> Result<WatchedFilms, String> {

@@ -170,7 +170,7 @@ fn samples_to_half_a_level(lights: &[f64]) -> f64 {
         text += &format!("intensity = {intensity:?}\n");
     }
     let mut rendering = begin(&scene(&text), 4, Precision::Auto);
-    let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
     let mut schedule = rendering.schedule(settings(true, 0, stop));
     let pool = pool(2);
     loop {

@@ -1,10 +1,10 @@
 //! Lengths of directions: a direction of any length that a file can contain gives the same picture.
 
 use crate::common::tables::{keys, scene, table, value_at};
-use crate::support::test_film::TestFilm;
 use crate::support::{parsed, rendered};
 use std::collections::BTreeSet;
 use toml::Value;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_scene::value::{Field, ValueType};
 use zerkalo_scene::{FIELDS, Scene};
 use zerkalo_world::Precision;
@@ -47,8 +47,8 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
             ValueType::Table(inner)
             | ValueType::OneOf(inner)
             | ValueType::ListOf(inner)
-            | ValueType::Tables(inner)
             | ValueType::Named(inner) => directions(inner, depth + 1, out),
+            ValueType::Tables(inner) => directions(inner(), depth + 1, out),
             _ => {}
         }
     }

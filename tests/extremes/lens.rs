@@ -1,11 +1,11 @@
 //! Thin lens: circles of confusion against their closed form, and lenses of zero size and of the
 //! size of the room.
 
-use crate::support::test_film::TestFilm;
 use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
 use std::f64::consts::PI;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::Replicates;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_scene::camera::{Aperture, Focus};
 use zerkalo_scene::{Filter, Scene};
 use zerkalo_world::Precision;

@@ -50,7 +50,7 @@ fn d5_rectangle_light() {
             ("the wrong side", &|s| lamp(s).direction_mut().unwrap()[1] = 1.0),
             ("sides exchanged", &|s| lamp(s).rectangle.as_mut().unwrap().size.reverse()),
             ("power for radiance", &|s| lamp(s).unit = LightUnit::Power),
-            ("a matt floor", &|s| material(s, "floor").reflection = 0.0),
+            ("a diffuse floor", &|s| material(s, "floor").reflection = 0.0),
         ],
     );
     let filled = |height: f64| {

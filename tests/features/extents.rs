@@ -2,8 +2,8 @@
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
-use crate::support::test_film::TestFilm;
 use crate::support::{rendered, shipped, sized};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_scene::{Acceleration, Scene};
 use zerkalo_world::{AnyWorld, Options, Precision};
 

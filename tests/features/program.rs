@@ -4,7 +4,6 @@
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, material, number};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
@@ -12,6 +11,7 @@ use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::export::Provenance;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, Replicates, TILE};
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Session, State};
@@ -53,9 +53,9 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
 /// 16 samples in such a tile.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
-    let stop = Stop { noise_codes: Some(levels), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(levels), ..Stop::default() };
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut render = SyncRender::new(&scene, &options(), settings, 2).map_err(|e| e.to_string())?;
     let reason = loop {
         if let Some(reason) = render.step() {
@@ -65,7 +65,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let glossy = tiles(&render.state.film, &scene).into_iter().filter(|(_, g)| *g);
     let samples: Vec<u32> = glossy.map(|(samples, _)| samples).collect();
     let most = samples.iter().copied().max().unwrap_or(0);
-    let noise = render.noise_codes().unwrap_or(f64::INFINITY);
+    let noise = render.noise_levels().unwrap_or(f64::INFINITY);
     if cap > 0 {
         ensure(reason == StoppedBy::RaysPerPixel, || format!("ended by {}", reason.name()))?;
         // Reflecting tiles with little noise may have fewer samples than `cap`.
@@ -151,7 +151,7 @@ fn a14_threads() {
 /// Width and height in pixels of the pictures after edits.
 const SMALL: [u32; 2] = [40, 30];
 /// Stop criterion of the pictures after edits.
-const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, seconds: None };
+const SPP: Stop = Stop { spp: Some(8), noise_levels: None, rmse_linear: None, seconds: None };
 
 /// Client of a session, which renders scenes on its own thread while they are edited.
 struct Desk {
@@ -386,9 +386,9 @@ fn a19_checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.zk");
     let scene = Arc::new(sized(shipped("mirror-room.toml"), [96, 72]));
-    let stop = Stop { noise_codes: Some(0.7), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(0.7), ..Stop::default() };
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let start = || Session::new(2, options(), settings).unwrap();
     let mut first = start();
     let generation = first.set_scene(Arc::clone(&scene));

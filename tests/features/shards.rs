@@ -1,12 +1,12 @@
 //! Tests of renders that are divided among machines.
 
 use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::file::{
     FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
 };
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, Film, LightWeights};
 use zerkalo_render::plan::{
     Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,
@@ -50,11 +50,11 @@ fn plan(film: &Film, shards: u32) -> Plan {
             precision: film.header().precision.clone(),
             display: Display::default(),
             rays_per_pixel: 0,
-            noise_codes: 1.0,
+            noise_levels: 1.0,
             shards,
             base_plan: None,
         },
-        predicted_codes: 1.0,
+        predicted_levels: 1.0,
         slopes: [0.7; 2],
         tiles: (0..film.tile_count()).map(tile).collect(),
     }

@@ -4,7 +4,6 @@
 mod files;
 mod mutate;
 
-use crate::support::test_film::TestFilm;
 use mutate::Random;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
@@ -13,6 +12,7 @@ use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::export::Provenance;
 use zerkalo_render::film::Display;
 use zerkalo_render::film::file::{FilmFileHeader, FilmReader};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::plan::Plan;
 use zerkalo_render::schedule::{Criterion, Settings, Stop};
 use zerkalo_render::session::{Session, State};
@@ -265,7 +265,7 @@ fn session(spp: u32) -> Session {
         display: Display::default(),
     };
     let stop = Stop { spp: Some(spp), ..Stop::default() };
-    let criterion = Criterion::Codes;
+    let criterion = Criterion::Levels;
     let settings = Settings { adaptive: true, criterion, rays_per_pixel: 0, stop };
     Session::new(1, options, settings).unwrap()
 }

@@ -296,7 +296,7 @@ fn torus_in_compounds_has_two_intervals() {
         let tree = if swapped { CsgTree::Difference(leaves()) } else { tree };
         let cut = CsgTree::Intersection(vec![tree, CsgTree::Part(2)]);
         let used = [used, vec![parts[2].clone()]].concat();
-        let form = Form::Csg(CsgSolid { parts: used, tree: cut });
+        let form: Form = CsgSolid::new(used, cut).unwrap().into();
         for ((origin, d), hits) in lines.iter().zip(all_hits(&geometry::<Double>(&form), &lines)) {
             assert!(hits.len().is_multiple_of(2), "{origin} {d} {hits:?}");
             several += usize::from(hits.len() > 2);

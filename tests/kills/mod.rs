@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use zerkalo_render::film::read_exr;
+use zerkalo_render::image_file::read_exr;
 use zerkalo_scene::Recovery;
 use zerkalo_terminal::{ENTER, LEAVE};
 

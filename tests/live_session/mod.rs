@@ -5,11 +5,11 @@
 mod noise;
 
 use crate::support;
-use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::lanes::{SimdFloat, Single};
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::film::{Display, LinearImage, Tone};
 use zerkalo_render::schedule::{Stop, StoppedBy};
 use zerkalo_render::session::{Session, Snapshot, State, View};
@@ -56,8 +56,8 @@ fn spp(spp: u32) -> Stop {
     Stop { spp: Some(spp), ..Stop::default() }
 }
 
-fn noise(codes: f64) -> Stop {
-    Stop { noise_codes: Some(codes), ..Stop::default() }
+fn noise(levels: f64) -> Stop {
+    Stop { noise_levels: Some(levels), ..Stop::default() }
 }
 
 fn session(stop: Stop, adaptive: bool) -> Session {
@@ -185,14 +185,14 @@ fn noisy_light_change_resumes_finished_session() {
     })
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
-    assert!(report.noise.unwrap().rmse_codes <= 0.15);
+    assert!(report.noise.unwrap().rmse_levels <= 0.15);
     // The reported estimate equals the one that the current film gives if it is computed anew.
     let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
     // With the original lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
-    assert!(back.noise.unwrap().rmse_codes < 0.15);
+    assert!(back.noise.unwrap().rmse_levels < 0.15);
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn submitted_tasks_always_run_without_waiting() {
     let (answer, answers) = channel();
     let samples = |session: &Session| {
         let answer = answer.clone();
-        session.submit(move |film| answer.send(film.map(|(_, r)| r.generation)).unwrap());
+        session.submit(move |picture| answer.send(picture.map(|p| p.report.generation)).unwrap());
     };
     samples(&session);
     assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), None);
@@ -271,13 +271,10 @@ fn submitted_tasks_always_run_without_waiting() {
     session.set_stop(spp(16));
     let end = resting(&session, generation);
     let (keep, kept) = channel();
-    session.submit(move |film| {
-        keep.send(
-            film.map(|(r, _)| {
-                (LinearImage::of_film(&r.film, &r.mix), r.film.pixel(50, 40, &r.mix))
-            }),
-        )
-        .unwrap();
+    session.submit(move |picture| {
+        let kept =
+            picture.map(|p| (LinearImage::of_film(p.film, p.mix), p.film.pixel(50, 40, p.mix)));
+        keep.send(kept).unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
     for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {
@@ -286,9 +283,9 @@ fn submitted_tasks_always_run_without_waiting() {
     let probe = end.probe.unwrap();
     assert_eq!((probe.pixel, probe.radiance), ([50, 40], pixel));
     assert_eq!(u64::from(probe.samples[0] + probe.samples[1]), u64::from(end.tiles.spp[0]));
-    assert!(probe.difference.is_some() && probe.tile_rmse_codes.is_some());
+    assert!(probe.difference.is_some() && probe.tile_rmse_levels.is_some());
     assert_eq!((end.tiles.columns, end.tiles.rows), (7, 5));
-    assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
+    assert_eq!((end.tiles.noise_levels.len(), end.tiles.spp.len()), (35, 35));
 }
 
 /// Returns the scene of a wall. The colour of the wall and its distance from the eye identify

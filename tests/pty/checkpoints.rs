@@ -1,10 +1,10 @@
 //! Checkpoints of the dashboard, which are written on request and continued after a kill.
 
 use super::*;
-use crate::support::test_film::TestFilm;
 use std::time::{Duration, Instant};
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::FilmReader;
+use zerkalo_render::film::testing::TestFilm;
 
 fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1
@@ -108,7 +108,7 @@ fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: u
 
 #[test]
 fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
-    let text = zerkalo_scene::BUILT_IN.replace("size = [640, 480]", "size = [320, 240]");
+    let text = crate::common::MIRROR_ROOM.replace("size = [640, 480]", "size = [320, 240]");
     kill_at_random_moments(4, &text, 1);
 }
 

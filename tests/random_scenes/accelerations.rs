@@ -2,9 +2,9 @@
 //! identical byte for byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
 use crate::support::{accelerated, picture};
 use zerkalo_render::film::Replicates;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_scene::{Acceleration, Scene};
 use zerkalo_world::Precision;
 

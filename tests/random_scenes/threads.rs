@@ -2,9 +2,9 @@
 //! counts must be equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
 use crate::support::{begin, pool, settings, trace};
 use zerkalo_render::film::Noise;
+use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::schedule::{Step, Stop, StoppedBy};
 use zerkalo_scene::Scene;
 use zerkalo_world::Precision;
@@ -24,7 +24,7 @@ struct Outcome {
 
 fn render(scene: &Scene, threads: usize) -> Outcome {
     let mut rendering = begin(scene, 3, Precision::Auto);
-    let stop = Stop { spp: Some(SAMPLES), noise_codes: Some(0.5), ..Stop::default() };
+    let stop = Stop { spp: Some(SAMPLES), noise_levels: Some(0.5), ..Stop::default() };
     let mut schedule = rendering.schedule(settings(true, scene.film.rays_per_pixel, stop));
     let (pool, mut waves) = (pool(threads), 0);
     loop {

@@ -88,7 +88,7 @@ impl Desk {
     pub fn new(text: &str) -> Self {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
-        let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+        let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
         let mut model = Model::new(Some(FILE.into()), FILE, Ok(scene), stop, 2);
         model.max_threads = 4;
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
@@ -166,7 +166,7 @@ impl Desk {
                 path: format!("room-1.{}", format.extension()).into(),
                 size: [64, 48],
                 spp: 16.0,
-                noise_codes: Some(2.5),
+                noise_levels: Some(2.5),
                 scp: "me@here:room-1.png".into(),
             })),
             Effect::Checkpoint(_) => Message::CheckpointWritten(Ok("room-1.zk".into())),

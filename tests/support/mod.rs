@@ -2,7 +2,6 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 pub mod png_file;
-pub mod test_film;
 
 use crate::common::NAME;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -12,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::{Display, Film, LightWeights, Replicates, TILE, Tile};
+use zerkalo_render::film::{Display, Film, Replicates};
 use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 use zerkalo_render::session::Session;
 use zerkalo_render::wave::{Job, Wave, WaveReport};
@@ -67,7 +66,7 @@ pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session
         sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
         display: Display::default(),
     };
-    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    let settings = Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     Session::new(threads, options, settings).unwrap()
 }
 
@@ -188,7 +187,7 @@ pub fn follow(rendering: &mut RenderState, settings: Settings, pool: &ThreadPool
 
 /// Returns the settings of a schedule that minimises the error in 8-bit levels.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
-    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
+    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel, stop }
 }
 
 /// Returns the radiance of every pixel, row by row.

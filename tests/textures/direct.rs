@@ -203,8 +203,8 @@ fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     let (w, h) = (f64::from(image.width), f64::from(image.height));
     let wrap = |i: f64, n: f64| if clamp { i.clamp(0.0, n - 1.0) } else { i - n * (i / n).floor() };
     let (i, j) = (wrap(i, w), wrap(j, h));
-    let codes = image.pixel(i as u32, (h - 1.0 - j) as u32);
-    DVec3::from(codes.map(|c| f64::from(c) / 255.0))
+    let levels = image.pixel(i as u32, (h - 1.0 - j) as u32);
+    DVec3::from(levels.map(|c| f64::from(c) / 255.0))
 }
 
 /// Returns the bilinear interpolation of `value` between the four pixels nearest to `uv`.

@@ -1,6 +1,5 @@
-//! Pass: traces the jobs of one wave and adds their samples to the film. A wave is a set of jobs
-//! that run concurrently, each with samples of one tile. The pass returns when all jobs are done or
-//! cancelled.
+//! Pass: traces the jobs of one wave and adds their samples to the film. The pass returns when all
+//! jobs are done or cancelled.
 
 use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::wave::{Job, JobReport, Wave, WaveReport};
@@ -25,9 +24,9 @@ pub struct PassContext<'a> {
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` (a set of jobs that run concurrently) and adds their samples to
-/// `film`. If `wave.estimate` is `true`, `estimator` computes the error of each tile. The report
-/// has an entry for each job, which is `None` if the job was cancelled.
+/// Traces the jobs of `wave` and adds their samples to `film`. If `wave.estimate` is `true`,
+/// `estimator` computes the error of each tile. The report has an entry for each job, which is
+/// `None` if the job was cancelled.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -99,11 +98,11 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of `job` in the replicate (half of the samples) with the number
-    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the number
-    /// of rays, and a flag that is `true` if a path made a random choice. A packet has `WIDTH`
-    /// lanes. It holds `WIDTH` samples of one pixel if its first sample index is a multiple of
-    /// `WIDTH` and at least `WIDTH` samples remain. Otherwise it holds samples of several pixels.
+    /// Traces the samples of `job` in the replicate with the number `replicate`, and adds them to
+    /// `tile`, whose first pixel is at `origin`. Returns the number of rays, and a flag that is
+    /// `true` if a path made a random choice. A packet has `WIDTH` lanes. It holds `WIDTH` samples
+    /// of one pixel if its first sample index is a multiple of `WIDTH` and at least `WIDTH` samples
+    /// remain. Otherwise it holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -309,7 +308,7 @@ fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::film::Header;
-    use crate::film::test_film::TestFilm;
+    use crate::film::testing::TestFilm;
     use zerkalo_kernel::lanes::{Float, Single};
     use zerkalo_kernel::sampling::SamplerKind;
 

@@ -3,7 +3,6 @@
 use crate::asset::Assets;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::disk::open_regular;
-use crate::format::migrate::{FormerWord, write_present};
 use crate::format::patch::rewrite;
 use crate::format::read::{SourceScene, read_text};
 use crate::value::TomlValue;
@@ -24,14 +23,8 @@ pub struct Document {
     /// of this text, not the result of the previous change. Undoing a removal therefore restores
     /// its comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Former words in the text as read: keys and values under names from earlier versions of the
-    /// scene format.
-    former_words: Vec<FormerWord>,
     /// Warnings about the text of the scene file as read.
     warnings: Vec<Diagnostic>,
-    /// Warning that the file uses names of keys or values from earlier versions of the program. It
-    /// is also one of the `warnings`. `None` if the file uses none of them.
-    migration_warning: Option<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,
 }
@@ -39,7 +32,7 @@ pub struct Document {
 impl Scene {
     /// Returns the text of a new scene file that describes this scene, which must be valid.
     pub fn to_text(&self) -> String {
-        new_text(String::new(), &[], &Self::default(), self)
+        new_text(String::new(), &Self::default(), self)
     }
 }
 
@@ -80,15 +73,12 @@ impl Document {
     fn parse_in(text: String, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         let source = SourceScene::parse(&text, name, resolver)?;
         let warnings = source.warnings();
-        let migration_warning = source.migration_warning();
-        let (scene, former_words) = (Arc::new(source.scene), source.former_words);
+        let scene = Arc::new(source.scene);
         let text = Arc::new(text);
         Ok(Self {
             name: name.to_string(),
             origin: (Arc::clone(&text), Arc::clone(&scene)),
-            former_words,
             warnings,
-            migration_warning,
             text,
             scene,
         })
@@ -97,10 +87,9 @@ impl Document {
     /// Changes the text so that it describes `scene`, which must be valid.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
-        self.text = if *scene == **old && self.former_words.is_empty() {
-            Arc::clone(text)
-        } else {
-            Arc::new(new_text(text.to_string(), &self.former_words, old, scene))
+        self.text = match *scene == **old {
+            true => Arc::clone(text),
+            false => Arc::new(new_text(text.to_string(), old, scene)),
         };
         self.scene = Arc::new(scene.clone());
     }
@@ -132,23 +121,17 @@ impl Document {
         &self.text
     }
 
-    /// Returns the warnings about the file as it was read, sorted by location: those of
-    /// [`Scene::warnings`] with line and column, and one about names of earlier versions.
+    /// Returns [`Scene::warnings`] about the file as it was read, with line and column, sorted by
+    /// location.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
-    }
-
-    /// Returns the warning about names of earlier versions in the file as it was read. Returns
-    /// `None` if the file has none of these names.
-    pub fn migration_warning(&self) -> Option<&Diagnostic> {
-        self.migration_warning.as_ref()
     }
 }
 
 /// Changes `text`, which describes the scene `old`, to describe the scene `new`, and returns the
 /// result. Uniform line endings are kept, as are a byte order mark and a missing line ending at the
 /// end of the file. Mixed line endings become LF.
-fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
+fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),
         None => ("", text.as_str()),
@@ -157,7 +140,6 @@ fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene)
     let open_end = !body.is_empty() && !body.ends_with('\n');
     // This cannot fail: the text was parsed before.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
-    write_present(&mut document, former_words);
     rewrite(&mut document, &old.to_table(), &new.to_table());
     let mut body = document.to_string();
     if body.starts_with("\n[") {

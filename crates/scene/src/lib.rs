@@ -19,7 +19,6 @@ pub mod value;
 
 mod acceleration;
 mod asset_resolver;
-mod builtin;
 mod contents_hash;
 mod diagnostic;
 mod document;
@@ -37,7 +36,6 @@ pub use crate::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
-pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
@@ -119,3 +117,5 @@ mod file_test;
 mod recovery_test;
 #[cfg(test)]
 mod tables_test;
+#[cfg(test)]
+mod testing;

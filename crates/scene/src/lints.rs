@@ -1,5 +1,7 @@
 //! Lints: legal values of a scene that are probably mistakes.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::light::Light;
 use crate::material::{Fresnel, Highlight, Material};
@@ -113,7 +115,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
         // A dielectric reflects the share F of the light and transmits 1 - F. The larger of the two
         // weights is therefore an upper bound.
         Fresnel::Dielectric => mirrored.max(m.transmission),
-        _ => mirrored * f0 + m.transmission,
+        Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => mirrored * f0 + m.transmission,
     };
     let sum = m.diffuse * m.color.largest() + passed;
     (sum > 1.0 + 1e-9).then(|| {

@@ -11,7 +11,7 @@ description! {
         /// Name of the object; no two objects have the same.
         name: String, or "a number";
         /// Name of the object's material, one of the `[materials.NAME]`.
-        material: String, or "a matt light grey, the default of every material key";
+        material: String, or "a diffuse light grey, the default of every material key";
         /// Shape of the object: exactly one kind.
         shape: Shape;
         /// Steps that move, rotate and scale the object, in order.

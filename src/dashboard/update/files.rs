@@ -165,10 +165,10 @@ impl UpdateContext<'_> {
 
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
-            Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
+            Ok(Exported { path, size: [width, height], spp, noise_levels, scp }) => {
                 // If the image has the size of the export in the background, this export has ended.
                 self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
-                let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
+                let noise = noise_levels.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
                     "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",
                     path.display()

@@ -34,7 +34,7 @@ impl UpdateContext<'_> {
             "" => "no film yet".to_string(),
             source => short_name(Path::new(&sanitized(source))),
         };
-        self.model.stop = Stop { noise_codes: report.target_codes, ..Stop::default() };
+        self.model.stop = Stop { noise_levels: report.target_levels, ..Stop::default() };
         let key = |row: &WatchedShards| (row.path.clone(), row.shards.clone());
         let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
         let same = report.shards.iter().position(|row| Some(key(row)) == at);

@@ -78,7 +78,7 @@ impl PictureView {
                 Some(resized(displayed(&radiance, &model.display, from), size))
             }
             DisplayChannel::Noise => {
-                let noise = &snapshot.tiles.noise_codes;
+                let noise = &snapshot.tiles.noise_levels;
                 self.tiles(model, snapshot, "8-bit levels of noise", size, noise)
             }
             DisplayChannel::Samples => {
@@ -274,7 +274,7 @@ mod tests {
         let radiance = [[0.01, 0.2, 3.0], [0.5, 0.0, 0.1]];
         let raster = displayed(&radiance, &display, [2, 1]);
         for (pixel, radiance) in raster.pixels.iter().zip(radiance) {
-            assert_eq!(*pixel, display.codes_8(radiance.map(f64::from)));
+            assert_eq!(*pixel, display.levels_8(radiance.map(f64::from)));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Camera: description in scene files, lens, navigation, and compiled form.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod lens;
 mod navigate;
 mod perspective;
@@ -14,15 +16,15 @@ description! {
     /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
     pub struct Camera {
         /// Position of the camera.
-        eye: [f64; 3] => eye "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
+        eye: [f64; 3] = [0.0, 1.0, 5.0], in COORDINATE "scene units";
         /// Point that the camera looks at. Exactly one of `target` and `direction` is given.
         target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
         /// View direction of the camera.
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
         /// Up direction of the picture; not parallel to the view direction.
-        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
         /// Opening angle of the camera, across the height or across the width of the picture.
-        view_angle: ViewAngle => view_angle "{ vertical = 40.0 }";
+        view_angle: ViewAngle => ViewAngle::Vertical(40.0), written "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are
         /// invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
@@ -43,28 +45,16 @@ one_of! {
     }
 }
 
-fn eye() -> [f64; 3] {
-    [0.0, 1.0, 5.0]
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
-}
-
-fn view_angle() -> ViewAngle {
-    ViewAngle::Vertical(40.0)
-}
-
 /// Creates the camera of a scene file without a `[camera]` table. This camera looks at the origin.
 /// A `[camera]` table must have `target` or `direction`.
 impl Default for Camera {
     fn default() -> Self {
         Self {
-            eye: eye(),
+            eye: [0.0, 1.0, 5.0],
             target: Some([0.0; 3]),
             direction: None,
-            up: up(),
-            view_angle: view_angle(),
+            up: [0.0, 1.0, 0.0],
+            view_angle: ViewAngle::Vertical(40.0),
             near: 0.0,
             aperture: None,
             focus: None,

@@ -46,7 +46,7 @@ impl Camera {
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         // If the eye moves to the right around the pivot, the view direction rotates to the left.
-        let Some(forward) = self.turned(-right, -up) else { return self.clone() };
+        let Some(forward) = self.rotated(-right, -up) else { return self.clone() };
         let pivot = DVec3::from_array(self.eye) + self.frame()[2] * distance;
         let pivot = self.target.map_or(pivot, DVec3::from_array);
         self.placed(pivot - forward * distance, forward, distance)
@@ -92,7 +92,7 @@ impl Camera {
     /// the camera has a target, the target moves on a circle around the eye.
     pub fn look(&self, right: f64, up: f64) -> Self {
         let distance = self.pivot_distance(1.0);
-        match self.turned(right, up) {
+        match self.rotated(right, up) {
             Some(forward) => self.placed(DVec3::from_array(self.eye), forward, distance),
             None => self.clone(),
         }
@@ -163,7 +163,7 @@ impl Camera {
 
     /// Returns the view direction rotated by `right` degrees to the right and `up` degrees upwards.
     /// Returns `None` if an angle is not finite.
-    fn turned(&self, right: f64, up: f64) -> Option<DVec3> {
+    fn rotated(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;
         }

@@ -1,5 +1,7 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::edit::bounds::{BoundingSphere, scene_bounds};
 use crate::edit::convert::{LIGHT_KINDS, set_kind};
 use crate::edit::placement::place_for;
@@ -96,11 +98,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
 /// longest side of its bounding box to `size` and place the shape upright on the point `base`. The
 /// list is empty if the shape has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
-    // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
-    let mut steps = match shape {
-        Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
-        _ => Vec::new(),
-    };
+    let mut steps: Vec<_> = shape.upright().into_iter().collect();
     let Some((low, high)) = shape.form().transformed(&compose(&steps)).bounds() else {
         return Vec::new();
     };
@@ -132,7 +130,7 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Turns a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
+/// Rotates a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
 /// camera. Other shapes and flat shapes that are nearly horizontal stay unchanged.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
@@ -213,11 +211,11 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
+    use crate::testing::mirror_room;
 
     #[test]
     fn added_objects_are_visible_and_intersect_nothing() {
-        let scene = built_in();
+        let scene = mirror_room();
         for word in object_kinds() {
             let edit = add_object(&scene, &word.name, None).unwrap();
             let Target::Object(i) = edit.subject else { panic!() };
@@ -252,7 +250,7 @@ mod tests {
 
     #[test]
     fn ten_added_cubes_do_not_intersect() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         for _ in 0..10 {
             scene = add_object(&scene, "cube", Some("red")).unwrap().scene;
         }
@@ -280,7 +278,7 @@ mod tests {
 
     #[test]
     fn added_lights_alternate_sides() {
-        let scene = built_in();
+        let scene = mirror_room();
         for word in light_kinds() {
             let edit = add_light(&scene, &word.name).unwrap();
             let light = &edit.scene.lights[1];

@@ -102,11 +102,11 @@ pub fn pivot_distance(scene: &Scene) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
+    use crate::testing::mirror_room;
 
     #[test]
     fn scene_bounds_enclose_the_solids() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let room = scene_bounds(&scene);
         assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
         assert_eq!(step_length(&scene), 0.1);
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn pivot_distance_is_positive() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let target = pivot_distance(&scene);
         let w = scene.camera.view().unwrap();
         scene.camera.target = None;

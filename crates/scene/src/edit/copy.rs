@@ -230,11 +230,11 @@ pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
+    use crate::testing::mirror_room;
 
     #[test]
     fn duplicates_are_apart_and_have_unique_names() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = duplicate(&scene, &Target::Object(3)).unwrap();
         assert_eq!(edit.subject, Target::Object(6));
         let (old, new) = (&scene.objects[3], &edit.scene.objects[6]);
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn delete_selects_neighbour_and_notes_lost_materials() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = delete(&scene, &Target::Object(5)).unwrap();
         assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
         let edit = delete(&scene, &Target::Object(2)).unwrap();
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn rename_material_updates_objects() {
-        let scene = built_in();
+        let scene = mirror_room();
         let red = Target::Material("red".into());
         let edit = rename(&scene, &red, " crimson ").unwrap();
         assert_eq!(edit.scene.objects[2].material, "crimson");
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn own_material_copies_a_shared_material() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = own_material(&scene, &Target::Object(2)).unwrap();
         assert_eq!(edit.scene.objects[2].material, "ball");
         assert_eq!(edit.scene.materials["ball"], scene.materials["red"]);

@@ -3,14 +3,14 @@
 
 use crate::Scene;
 use crate::edit::bounds::step_length;
-use crate::edit::convert::chosen;
-use crate::edit::parse_value::floats;
+use crate::edit::part::{given_key, part};
 use crate::edit::properties::is_material;
 use crate::edit::set::{label, lookup, replace};
-use crate::edit::toml_view::{get, read};
 use crate::edit::{Edit, EditError, Target};
-use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
-use toml::Value;
+use crate::value::{
+    DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, floor_log10, node_at,
+    rounded_to,
+};
 
 /// Changes the numbers of `key` by `steps` arrow steps. If `steps` is a whole number, the steps are
 /// coarse. Otherwise `steps` counts fine steps in tenths: 0.1 is one fine step forward, -0.3 is
@@ -34,13 +34,14 @@ pub fn step(
     component: Option<usize>,
     steps: f64,
 ) -> Result<Edit, EditError> {
-    let values = read(scene, subject)?;
+    let part = part(scene, subject)?;
     let field = lookup(subject, key)?;
     let Some(rule) = StepRule::of(field, scene) else {
         return toggle(scene, subject, key, steps > 0.0);
     };
-    let given = get(&values, key).cloned().or_else(|| start(field, scene, subject));
-    let Some(numbers) = given.as_ref().and_then(floats) else {
+    let given = node_at(part, key).and_then(KeyNode::value);
+    let given = given.or_else(|| start(field, scene, subject));
+    let Some(KeyValue::Numbers(numbers)) = given else {
         return Err(EditError::new(&format!("{} has no value yet", field.name), "Type one."));
     };
     if component.is_some_and(|c| c >= numbers.len()) {
@@ -61,14 +62,8 @@ pub fn step(
     // A step that would make all numbers of a direction 0 is dropped, because such a direction is
     // invalid.
     let is_zero = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
-    let next = if is_zero { numbers.clone() } else { next };
-    let whole = matches!(field.takes, ValueType::Whole(_) | ValueType::Wholes(..));
-    let one = |x: f64| if whole { Value::Integer(x as i64) } else { Value::Float(x) };
-    let value = match given {
-        Some(Value::Array(_)) => Value::Array(next.into_iter().map(one).collect()),
-        _ => one(next[0]),
-    };
-    replace(scene, subject, key, values, value).or_else(|refusal| {
+    let next = if is_zero { numbers } else { next };
+    replace(scene, subject, key, KeyValue::Numbers(next)).or_else(|refusal| {
         let (scene, subject) = (scene.clone(), subject.clone());
         let label = label(&scene, &subject, key);
         Ok(Edit { scene, subject, label, note: Some(refusal.to_string()) })
@@ -87,28 +82,26 @@ pub fn toggle(
     key: &str,
     forward: bool,
 ) -> Result<Edit, EditError> {
-    let values = read(scene, subject)?;
+    let part = part(scene, subject)?;
     let field = lookup(subject, key)?;
-    let value = get(&values, key);
+    let value = node_at(part, key).and_then(KeyNode::value);
+    let word = match &value {
+        Some(KeyValue::Text(word)) => Some(word.as_str()),
+        Some(KeyValue::Numbers(_) | KeyValue::Switch(_)) | None => None,
+    };
     let optional = matches!(field.preset, DefaultValue::Without(_));
     let (words, present): (Vec<&str>, Option<&str>) = match field.takes {
         ValueType::Switch => {
-            let on = value.and_then(Value::as_bool).unwrap_or(false);
+            let on = value == Some(KeyValue::Switch(true));
             return crate::edit::set(scene, subject, key, if on { "false" } else { "true" });
         }
         ValueType::OneOf(kinds) => {
-            let present = match value.and_then(Value::as_table) {
-                Some(inner) => kinds.iter().find(|k| inner.contains_key(k.name)).map(|k| k.name),
-                None => chosen(subject, &values),
-            };
-            (kinds.iter().map(|k| k.name).collect(), present)
+            (kinds.iter().map(|k| k.name).collect(), word.or_else(|| given_key(part, subject)))
         }
-        ValueType::Choice(choices) => {
-            (choices.iter().map(|c| c.name).collect(), value.and_then(Value::as_str))
-        }
+        ValueType::Choice(choices) => (choices.iter().map(|c| c.name).collect(), word),
         _ if is_material(subject, field) => {
             let names = scene.materials.keys().map(String::as_str);
-            (names.collect(), value.and_then(Value::as_str))
+            (names.collect(), word)
         }
         _ => {
             let found = format!("{} has no words to choose from", field.name);
@@ -139,16 +132,16 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
 /// Returns the value from which the first arrow step of a key without a value starts. For `alpha`
 /// or `f0` of a material it is the value that follows from other keys of the material. Returns
 /// `None` for any other key.
-fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
+fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
         _ => None,
     };
     match (field.name, material) {
         ("alpha", Some(material)) => {
-            Some(Value::Float(rounded_to(material.microfacet_alpha(), -4)))
+            Some(KeyValue::Numbers(vec![rounded_to(material.microfacet_alpha(), -4)]))
         }
-        ("f0", Some(material)) => Some(Value::Array(material.f0().0.map(Value::Float).to_vec())),
+        ("f0", Some(material)) => material.f0().value(),
         _ => None,
     }
 }

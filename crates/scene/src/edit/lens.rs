@@ -119,8 +119,8 @@ pub(super) fn switch(camera: &mut Camera, scene: &Scene, key: &str, name: &str) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::edit::set;
+    use crate::testing::mirror_room;
 
     fn distance(scene: &Scene) -> f64 {
         scene.camera.focus_depth()
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn focus_is_set_to_a_point() {
-        let scene = built_in();
+        let scene = mirror_room();
         let forward = scene.camera.view().unwrap();
         let point =
             (DVec3::from_array(scene.camera.eye) + forward * 3.0 + DVec3::X * 0.1).to_array();
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn aperture_opens_and_closes_by_stops() {
         let open = |scene: &Scene, stops| change_aperture(scene, stops).unwrap().scene;
-        let scene = built_in();
+        let scene = mirror_room();
         let mut lens = open(&scene, 1.0);
         let first = lens.camera.lens_radius();
         assert!((first / (FIRST_RADIUS * distance(&scene)) - 1.0).abs() < 0.2, "{first}");
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn converted_lenses_keep_the_picture() {
-        let scene = built_in();
+        let scene = mirror_room();
         let set = |scene: &Scene, key, text| set(scene, &Target::Camera, key, text).unwrap().scene;
         let lens = set(&scene, "aperture", "radius");
         assert!(lens.camera.focus.is_none() && lens.camera.lens_radius() > 0.0);

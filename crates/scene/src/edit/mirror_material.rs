@@ -1,10 +1,12 @@
 //! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
 //! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::Scene;
 use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
-use zerkalo_kernel::primitive::Form;
+use crate::shape::Shape;
 
 /// Returns the name of the material that the mirror commands change: the first of the following
 /// that reflects.
@@ -19,9 +21,9 @@ use zerkalo_kernel::primitive::Form;
 /// the reflection can be increased from 0 again. Returns `None` if there is neither.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
-    let chosen = selected.and_then(|subject| match subject.material(scene) {
-        Some(Target::Material(name)) => Some(name),
-        _ => None,
+    let chosen = selected.and_then(|subject| {
+        let Target::Material(name) = subject.material(scene)? else { return None };
+        Some(name)
     });
     let is_specular = |material: &String| {
         scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
@@ -35,10 +37,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
         return Some(part);
     }
     // Rectangles of any orientation count; the ground (`platform`) does not.
-    let rectangle = |i: &usize| {
-        let object = &scene.objects[*i];
-        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))
-    };
+    let rectangle = |i: &usize| matches!(scene.objects[*i].shape, Shape::Rectangle(_));
     let mut all = 0..scene.objects.len();
     if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
         return Some(name);
@@ -73,12 +72,12 @@ pub fn step_mirror(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::material::Lobe;
+    use crate::testing::mirror_room;
 
     #[test]
     fn mirror_prefers_selection_then_rectangle() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
         assert_eq!(at(&scene, Some(Target::Object(2))), "red");
@@ -93,7 +92,7 @@ mod tests {
         for material in scene.materials.values_mut() {
             material.reflection = 0.0;
         }
-        assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
+        assert_eq!(at(&scene, None), "mirror", "so that it can be increased again");
         assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
@@ -122,7 +121,7 @@ mod tests {
 
     #[test]
     fn adjust_roughness_from_zero_and_back() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
         let start = scene.clone();
         let mut seen = vec![0.0];
@@ -148,7 +147,7 @@ mod tests {
 
     #[test]
     fn next_lobe_cycles_and_reflect_steps() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let mut lobes = Vec::new();
         for _ in 0..5 {
             scene = step_mirror(&scene, None, "lobe", 1.0).unwrap().scene;

@@ -1,6 +1,8 @@
 //! Placement of objects: on the surfaces that support them, and at positions that are free of other
 //! objects.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 use crate::camera::Camera;
 use crate::edit::bounds::{BoundingSphere, Extent, scene_bounds};
 use crate::edit::{Edit, EditError, Target};
@@ -194,8 +196,8 @@ fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::edit::move_by;
+    use crate::testing::mirror_room;
 
     fn lowest(scene: &Scene, i: usize) -> f64 {
         scene.objects[i].form().bounds().unwrap().0.y
@@ -203,7 +205,7 @@ mod tests {
 
     #[test]
     fn snap_to_ground_rests_exactly_on_the_surface() {
-        let scene = built_in();
+        let scene = mirror_room();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
                 let subject = Target::Object(i);

@@ -155,30 +155,27 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns the target of a material: that of the object if this target is an object, or this
-    /// target itself if it is a material. Returns `None` for other targets, or if the scene does
-    /// not have the material.
+    /// Returns this target if it is a material, or the material of this object. Returns `None` if
+    /// the scene does not have it.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
-        match self {
-            Self::Material(_) => self.exists(scene).then(|| self.clone()),
-            Self::Object(i) => {
-                let name = &scene.objects.get(*i)?.material;
-                scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
-            }
-            _ => None,
-        }
+        let name = match self {
+            Self::Material(name) => name,
+            Self::Object(i) => &scene.objects.get(*i)?.material,
+            _ => return None,
+        };
+        scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
+    use crate::testing::mirror_room;
     use std::collections::HashSet;
 
     #[test]
     fn outline_lists_every_target_once_in_order() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
         let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
@@ -193,7 +190,7 @@ mod tests {
 
     #[test]
     fn targets_exist_and_have_materials() {
-        let scene = built_in();
+        let scene = mirror_room();
         assert!(!Target::Object(6).exists(&scene) && !Target::View("x".into()).exists(&scene));
         assert_eq!(Target::Object(2).material(&scene), Some(Target::Material("red".into())));
         assert_eq!(Target::Camera.material(&scene), None);

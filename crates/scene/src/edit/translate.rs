@@ -94,30 +94,30 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::shape::Shape;
+    use crate::testing::mirror_room;
 
     #[test]
     fn objects_move_by_shape_key_or_last_translation() {
-        let scene = built_in();
+        let scene = mirror_room();
         let ball = Target::Object(2);
         let edit = move_by(&scene, &ball, [0.1, 0.0, -0.2]).unwrap();
         assert_eq!(edit.label, "move ball");
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
         assert_eq!(sphere.center, [-0.8, 0.5, -0.2]);
-        let mut turned = scene.clone();
-        turned.objects[2].transform = vec![TransformOp::RotateY(30.0)];
-        let once = move_by(&turned, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
+        let mut rotated = scene.clone();
+        rotated.objects[2].transform = vec![TransformOp::RotateY(30.0)];
+        let once = move_by(&rotated, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
         let twice = move_by(&once, &ball, [0.1, 0.2, 0.0]).unwrap().scene;
         let steps = [TransformOp::RotateY(30.0), TransformOp::Translate([0.2, 0.4, 0.0])];
         assert_eq!(twice.objects[2].transform, steps);
         let back = move_by(&twice, &ball, [-0.2, -0.4, 0.0]).unwrap().scene;
-        assert_eq!(back, turned);
+        assert_eq!(back, rotated);
     }
 
     #[test]
     fn point_lights_move_and_directional_lights_rotate() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn move_beyond_coordinate_range_is_refused() {
-        let scene = built_in();
+        let scene = mirror_room();
         assert!(move_by(&scene, &Target::Object(2), [1e10, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Film, [1.0, 0.0, 0.0]).is_err());

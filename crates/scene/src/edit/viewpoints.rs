@@ -40,11 +40,11 @@ pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
+    use crate::testing::mirror_room;
 
     #[test]
     fn cameras_are_stored_and_recalled() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = store_view(&scene, None).unwrap();
         assert_eq!(edit.subject, Target::View("view".into()));
         let edit = store_view(&edit.scene, None).unwrap();

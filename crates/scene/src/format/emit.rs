@@ -28,15 +28,18 @@ pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
             item(outer)
         }
         (ValueType::Tables(fields), Value::Array(list)) if headers => {
-            Item::ArrayOfTables(list.iter().map(|v| fresh_entry(fields, v)).collect())
+            Item::ArrayOfTables(list.iter().map(|v| fresh_entry(fields(), v)).collect())
         }
-        (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Array(list)) => {
-            let entries = list.iter().map(|v| fresh_entry(fields, v).into_inline_table());
-            Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
-        }
+        (ValueType::Tables(fields), Value::Array(list)) => inline_list(fields(), list),
+        (ValueType::ListOf(fields), Value::Array(list)) => inline_list(fields, list),
         (ValueType::Color(_), value) => Item::Value(color_leaf(value)),
         _ => Item::Value(leaf(value)),
     }
+}
+
+fn inline_list(fields: &'static [Field], list: &[Value]) -> Item {
+    let entries = list.iter().map(|v| fresh_entry(fields, v).into_inline_table());
+    Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
 }
 
 /// Returns a colour as a TOML value: a list of three numbers. If some of them are not whole numbers

@@ -129,11 +129,12 @@ fn patch_item(
                 patch_table(keeper, table, headers_inside, a, b, takes);
             }
         }
-        (
-            ValueType::Tables(fields) | ValueType::ListOf(fields),
-            Some(Value::Array(a)),
-            Value::Array(b),
-        ) => patch_list(keeper, item, a, b, fields),
+        (ValueType::Tables(fields), Some(Value::Array(a)), Value::Array(b)) => {
+            patch_list(keeper, item, a, b, fields());
+        }
+        (ValueType::ListOf(fields), Some(Value::Array(a)), Value::Array(b)) => {
+            patch_list(keeper, item, a, b, fields);
+        }
         _ => edit_leaf(item, old, new),
     }
 }

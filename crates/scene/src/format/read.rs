@@ -1,12 +1,11 @@
 //! Reading of scene files: from text to a validated scene.
 
 use crate::diagnostic::{Diagnostic, FirstDiagnostics, SceneErrors};
-use crate::format::migrate::{self, FormerWord, migrate};
 use crate::format::parts::{PART_BYTES, Part, split};
 use crate::format::schema;
-use crate::format::source_map::{line_column, locate, subject_in};
+use crate::format::source_map::{line_column, locate};
 use crate::process_memory::missing_memory;
-use crate::value::{TomlError, TomlValue, sort_by_number};
+use crate::value::{TomlError, TomlValue};
 use crate::{AssetResolver, Document, Object, Scene};
 use std::fs::File;
 use std::io::{self, Read};
@@ -58,10 +57,6 @@ impl Scene {
 /// scene has been validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
-    pub former_words: Vec<FormerWord>,
-    /// First of the `former_words` in the file, with the name of its table in diagnostics. `None`
-    /// if there are no former words.
-    first_word: Option<(FormerWord, String)>,
     name: &'a str,
     text: &'a str,
     parts: Vec<Part>,
@@ -87,14 +82,7 @@ impl<'a> SourceScene<'a> {
         resolver: AssetResolver,
         parts: Vec<Part>,
     ) -> Result<Self, SceneErrors> {
-        let mut source = Self {
-            scene: Scene::default(),
-            former_words: Vec::new(),
-            first_word: None,
-            name,
-            text,
-            parts,
-        };
+        let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
             // The objects outside of `[[object]]` sections belong to the same list; the file is
             // therefore parsed again as a whole.
@@ -122,7 +110,7 @@ impl<'a> SourceScene<'a> {
         let is_split = self.parts.len() > 1;
         for (number, part) in self.parts.iter().enumerate() {
             let part_text = part.text(text);
-            let (mut root, part_syntax) = DeTable::parse_recoverable(&part_text);
+            let (root, part_syntax) = DeTable::parse_recoverable(&part_text);
             let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
             if let Some(error) = part_syntax.iter().min_by_key(|error| start(error)) {
                 let at = part.in_file(start(error));
@@ -144,14 +132,6 @@ impl<'a> SourceScene<'a> {
                     "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
                 ));
             }
-            let words = migrate(text, root.get_mut(), part, &mut errors);
-            if let Some(word) = words.iter().min_by_key(|word| word.start)
-                && self.first_word.as_ref().is_none_or(|(first, _)| word.start < first.start)
-            {
-                let subject = subject_in(root.get_ref(), &word.table, part.first_object);
-                self.first_word = Some((word.clone(), subject));
-            }
-            self.former_words.extend(words);
             schema::check(&root, part, &mut errors);
             if !errors.is_empty() {
                 continue;
@@ -177,22 +157,11 @@ impl<'a> SourceScene<'a> {
         Ok(true)
     }
 
-    /// Returns the warnings about doubtful values and about former names of keys and values, sorted
-    /// by location.
+    /// Returns the warnings about doubtful values, sorted by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let mut found = FirstDiagnostics::default();
         locate(self.text, &self.parts, self.scene.warnings(), &mut found);
-        let mut warnings = found.located((self.name, self.text)).0;
-        warnings.extend(self.migration_warning());
-        let place = |(line, column): (usize, usize)| (line << 32 | column) as i64;
-        sort_by_number(&mut warnings, |warning| warning.line_column.map_or(0, place));
-        warnings
-    }
-
-    /// Returns the warning about former names of keys and values; `None` if the file has none.
-    pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
-        let first = self.first_word.as_ref()?;
-        Some(migrate::warning((self.name, self.text), first, self.former_words.len()))
+        found.located((self.name, self.text)).0
     }
 }
 
@@ -314,13 +283,11 @@ mod tests {
     #[test]
     fn parts_agree_with_the_whole_in_special_cases() {
         let ball = "shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
-        let former = "shape.unit_cylinder = { s = 0.5 }\n";
         for text in [
             format!("object = []\n[[object]]\n{ball}"),
             format!("[[object]]\n{ball}[[\"object\"]]\n{ball}"),
             format!("[[object]]\n{ball}[materials.a]\n[object.x]\n"),
             format!("[[object]]\n{ball}[[object]]\nname = 'a\n[[object]]\n{ball}"),
-            format!("[[object]]\n{former}[[object]]\nname = \"b\"\n{former}"),
             format!("[[object]]\nradius = 1\n[[object]]\nname = \"b\"\nsize = 2\n{ball}"),
             format!("[[object]]\n{ball}[[object]]\n{ball}material = \"gold\"\n[[object]]\n"),
             format!("[[object]]\n{ball}name = \"a\"\n[[object]]\n{ball}name = \"a\"\n"),

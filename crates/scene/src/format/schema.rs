@@ -41,7 +41,13 @@ pub const FIELDS: &[Field] = &[
     ),
     table("background", Background::FIELDS, "Radiance of rays that hit no surface."),
     table("ambient", Ambient::FIELDS, "Ambient light: uniform, without shadows."),
-    Field::optional("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
+    Field::optional(
+        "light",
+        ValueType::Tables(|| light::FIELDS),
+        "",
+        "there are none",
+        "The lights.",
+    ),
     Field::optional(
         "materials",
         ValueType::Named(material::FIELDS),
@@ -51,7 +57,7 @@ pub const FIELDS: &[Field] = &[
     ),
     Field::optional(
         "object",
-        ValueType::Tables(Object::FIELDS),
+        ValueType::Tables(|| Object::FIELDS),
         "",
         "there are none",
         "The objects.",
@@ -235,7 +241,7 @@ impl SchemaChecker<'_> {
                 self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
             }
             (ValueType::Tables(fields), DeValue::Array(list)) => {
-                self.entries(list, "a table", |w, t, s| w.table(t, s, fields));
+                self.entries(list, "a table", |w, t, s| w.table(t, s, fields()));
             }
             (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {

@@ -1,7 +1,6 @@
 //! Source map of a scene file: lines and columns of keys and values.
 
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
-use crate::format::migrate::migrate;
 use crate::format::parts::Part;
 use crate::validate::{Problem, subject};
 use std::collections::BTreeMap;
@@ -83,8 +82,7 @@ pub(crate) fn locate(
     for (number, problems) in by_part {
         let part = &parts[number];
         let part_text = part.text(text);
-        let (mut root, _) = DeTable::parse_recoverable(&part_text);
-        migrate(text, root.get_mut(), part, &mut FirstDiagnostics::default());
+        let (root, _) = DeTable::parse_recoverable(&part_text);
         for Problem { mut path, subject, found: finding, help } in problems {
             if let [list, index, ..] = path.as_mut_slice()
                 && list == "object"

@@ -27,7 +27,7 @@ description! {
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`. If the two are parallel, the
         /// height is along z.
-        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
     }
 }
 

@@ -46,14 +46,14 @@ description! {
         /// Sphere, rectangle or disk: radiance or power, as `unit` says. Environment: factor of its
         /// radiance. Point or spot: radiant intensity [W/sr], of a spot inside its inner cone, if
         /// `falloff` is `inverse-square`. Directional light, or point or spot without falloff: the
-        /// brightness of a white matt surface that faces the light.
+        /// brightness of a white diffuse surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
         /// Unit of the intensity of a sphere, rectangle or disk.
         unit: LightUnit = "radiance";
         /// Falloff of a point or spot light with the distance.
         falloff: Falloff = "none";
         /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from the
-        /// camera and from mirrors. It still lights matt surfaces and makes highlights.
+        /// camera and from mirrors. It still lights diffuse surfaces and makes highlights.
         visible: bool = true;
         /// `false` switches the light off.
         on: bool = true;

@@ -298,21 +298,11 @@ impl FieldValue for Bump {
 }
 
 impl crate::material::Material {
-    /// Iterates over the names and contents of the files of the texture and the bump map.
-    fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded<Image>)> {
-        let texture = match &mut self.texture {
-            Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
-            _ => None,
-        };
-        let bump = self.bump.as_mut().map(|Bump::Image(image)| (&image.file, &mut image.content));
-        [texture, bump].into_iter().flatten().filter(|(file, _)| !file.is_empty())
-    }
-
     /// Returns the names of the files of the texture and the bump map.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => Some(image.file.as_str()),
-            _ => None,
+            Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref().map(|Bump::Image(image)| image.file.as_str());
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
@@ -322,27 +312,19 @@ impl crate::material::Material {
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => image.image(),
-            _ => None,
+            Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref().and_then(|Bump::Image(image)| image.image());
         [texture, bump].into_iter().flatten()
     }
 
-    /// Calls `load` for the files that were not loaded before, and stores the results.
+    /// Reads the files of the texture and of the bump map by `load`, unless they are loaded already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
-        for (file, content) in self.files_mut() {
-            content.resolve(|| load(file));
+        if let Some(Texture::Image(image)) = &mut self.texture {
+            image.content.resolve(&image.file, &load);
         }
-    }
-
-    /// Copies from `other` the contents of files that both materials name.
-    pub fn resolve_as(&mut self, other: &Self) {
-        let mut known = other.clone();
-        let known: Vec<_> = known.files_mut().collect();
-        for (file, content) in self.files_mut() {
-            if let Some((_, found)) = known.iter().find(|(name, _)| *name == file) {
-                content.clone_from(found);
-            }
+        if let Some(Bump::Image(image)) = &mut self.bump {
+            image.content.resolve(&image.file, &load);
         }
     }
 }

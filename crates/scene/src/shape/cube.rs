@@ -19,6 +19,8 @@ description! {
 }
 
 impl ShapeDesc for Cube {
+    const EXAMPLE: &str = "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
+
     fn form(&self) -> Form {
         let e = self.edge;
         prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)

@@ -3,6 +3,8 @@
 //! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
 //! intersection kernels.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod axial;
 mod cone;
 mod csg;
@@ -35,7 +37,7 @@ pub use plane::Plane;
 pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
-pub use registry::{KINDS, Shape, ShapeDesc};
+pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
 pub use texture_space::TextureSpace;
@@ -48,9 +50,3 @@ pub use zerkalo_kernel::primitive::DefaultMapping;
 mod normals_at_test;
 #[cfg(test)]
 mod ray_query_test;
-#[cfg(test)]
-#[path = "../../../../tests/common/shape_examples.rs"]
-mod shape_examples;
-
-#[cfg(test)]
-pub use shape_examples::EXAMPLES;

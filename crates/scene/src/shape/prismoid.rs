@@ -13,12 +13,16 @@ macro_rules! by_corner_and_rotation {
         }
 
         fn rotate_y(&mut self, degrees: f64) -> bool {
-            self.rotation = $crate::shape::registry::turned_rotation(self.rotation, degrees);
+            self.rotation = $crate::shape::registry::wrapped_angle(self.rotation, degrees);
             true
         }
 
+        fn rotation(&self) -> f64 {
+            self.rotation
+        }
+
         fn texture_axes(&self) -> glam::DMat3 {
-            $crate::shape::texture_space::turned_axes(self.rotation)
+            $crate::shape::texture_space::axes_rotated_y(self.rotation)
         }
     };
 }
@@ -42,12 +46,12 @@ pub(super) fn prismoid(
 ) -> Form {
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
-    let turned = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
+    let rotated = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
     // The corners `b` and the centroid `c` are relative to `corner`, which is added last. Without a
     // rotation (b - c) + c is then exact, and a cube keeps its corners. If `corner` were added to
     // both first, the sum would be rounded.
     let corner_at = |scale: f64, b: DVec2, y: f64| {
-        let offset = centroid + turned(b - centroid) * scale;
+        let offset = centroid + rotated(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)
     };
     let mut corners: Vec<DVec3> = base.iter().map(|b| corner_at(1.0, *b, 0.0)).collect();
@@ -66,7 +70,7 @@ pub(super) fn prismoid(
         let end = base[(i + 1) % base.len()];
         let across = (end - start).perp().normalize();
         let apothem = across.dot(start - centroid);
-        let outward = turned(across * apothem.signum());
+        let outward = rotated(across * apothem.signum());
         // At height y the distance of the side from the axis is
         // `apothem (1 - (1 - top_over_base) y / height)`.
         let up = apothem.abs() * (1.0 - top_over_base) / height;

@@ -1,12 +1,10 @@
 //! Table of shape kinds. A new kind needs a file of its own and one line in this table.
-//! Tests then demand an example of it, in `tests/common/shape_examples.rs`.
 
-use crate::shape::csg::OF_FIELDS;
 use crate::shape::{
-    Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
-    Prism, Pyramid,
+    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
+    MeshDesc, Plane, Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
 use crate::value::{
     Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
 };
@@ -15,6 +13,9 @@ use zerkalo_kernel::primitive::Form;
 
 /// Description of one kind of shape, with the keys that users write in scene files.
 pub trait ShapeDesc: Description {
+    /// Example of an `[[object]]` in TOML, for the manual and for tests.
+    const EXAMPLE: &str;
+
     /// Converts the description to its canonical form: the geometry as one of the kinds of
     /// primitives, in double precision. The description must be valid.
     fn form(&self) -> Form;
@@ -41,6 +42,26 @@ pub trait ShapeDesc: Description {
         false
     }
 
+    /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
+    fn rotation(&self) -> f64 {
+        0.0
+    }
+
+    /// Returns the step that makes the kind stand upright, if its axis is not y.
+    fn upright(&self) -> Option<TransformOp> {
+        None
+    }
+
+    /// Returns the parts of a compound; `None` for any other kind.
+    fn parts(&self) -> Option<&[CsgOperand]> {
+        None
+    }
+
+    /// Returns the parts of a compound; empty for any other kind.
+    fn parts_mut(&mut self) -> &mut [CsgOperand] {
+        &mut []
+    }
+
     /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
     /// matrix. They are right-handed, orthonormal vectors in the shape's space.
     fn texture_axes(&self) -> DMat3 {
@@ -50,26 +71,13 @@ pub trait ShapeDesc: Description {
 
 /// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
 /// than -180 and at most 180 degrees.
-pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Expands to the keys of the shape kind `$kind`, for the table of kinds. The keys of a compound
-/// are in the static `$fields`. These keys refer to the table of kinds, because the parts of a
-/// compound can be of any kind. Such a cycle is possible between statics, but not between
-/// constants.
-macro_rules! keys {
-    ($kind:ident) => {
-        $kind::FIELDS
-    };
-    ($kind:ident $fields:path) => {
-        &$fields
-    };
-}
-
 macro_rules! kinds {
-    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
+    ($($key:literal => $kind:ident),+ $(,)?) => {
         /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
         /// with one key, the name of the kind.
         #[derive(Clone, Debug, PartialEq)]
@@ -86,12 +94,15 @@ macro_rules! kinds {
 
         // A static instead of a constant, because the table refers to itself through the keys of
         // compounds: their parts are shapes of any kind in this table.
-        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
-            $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
+        static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
         ];
 
         /// Every kind of shape, with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
+
+        /// Key and example of every kind of shape, in the order of [`KINDS`].
+        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
 
         impl Shape {
             /// Returns the key of the shape's kind.
@@ -122,6 +133,35 @@ macro_rules! kinds {
             pub(super) fn texture_axes(&self) -> DMat3 {
                 match self {
                     $(Self::$kind(kind) => kind.texture_axes(),)+
+                }
+            }
+
+            /// Returns the rotation about the vertical [degrees], as far as the keys of the kind
+            /// express it.
+            pub fn rotation(&self) -> f64 {
+                match self {
+                    $(Self::$kind(kind) => kind.rotation(),)+
+                }
+            }
+
+            /// Returns the step that makes the shape stand upright, if its axis is not y.
+            pub fn upright(&self) -> Option<TransformOp> {
+                match self {
+                    $(Self::$kind(kind) => kind.upright(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; `None` for any other kind.
+            pub(super) fn parts(&self) -> Option<&[CsgOperand]> {
+                match self {
+                    $(Self::$kind(kind) => kind.parts(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; empty for any other kind.
+            pub(super) fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                match self {
+                    $(Self::$kind(kind) => kind.parts_mut(),)+
                 }
             }
 
@@ -169,9 +209,9 @@ kinds! {
     "rectangle" => Rectangle,
     "plane" => Plane,
     "mesh" => MeshDesc,
-    "union" => Union with OF_FIELDS,
-    "intersection" => Intersection with OF_FIELDS,
-    "difference" => Difference with OF_FIELDS,
+    "union" => Union,
+    "intersection" => Intersection,
+    "difference" => Difference,
 }
 
 impl FieldValue for Shape {

@@ -1,7 +1,6 @@
 //! Coordinate systems in which textures are mapped onto shapes.
 
 use crate::shape::Shape;
-use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::DefaultMapping;
@@ -40,7 +39,7 @@ impl TextureSpace {
         match self.default_mapping {
             DefaultMapping::Uv => true,
             DefaultMapping::Planar => low != high,
-            _ => false,
+            DefaultMapping::Spherical | DefaultMapping::Cylindrical | DefaultMapping::Box => false,
         }
     }
 }
@@ -49,7 +48,7 @@ impl Shape {
     /// Returns the texture space of each part of the shape, in the order of
     /// [`CanonicalShape::parts`](zerkalo_kernel::primitive::CanonicalShape::parts). The shape must be valid.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
-        let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
+        let Some(of) = self.parts() else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
             let map = compose(&part.transform);
             let spaces = part.shape.texture_spaces().into_iter();
@@ -82,7 +81,7 @@ pub(super) fn on_plane(z: DVec3) -> DMat3 {
 
 /// Returns the texture axes of a shape that is rotated by `degrees` about the vertical,
 /// counter-clockwise seen from above, as the columns of a matrix.
-pub(super) fn turned_axes(degrees: f64) -> DMat3 {
+pub(super) fn axes_rotated_y(degrees: f64) -> DMat3 {
     let (sin, cos) = crate::value::sin_cos_degrees(degrees);
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
 }

@@ -3,7 +3,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
-use crate::value::{Description, ValidationError, description, round_nice, turned, unit};
+use crate::value::{Description, ValidationError, description, rotated_y, round_nice, unit};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, TorusForm};
 
@@ -22,6 +22,9 @@ description! {
 }
 
 impl ShapeDesc for Torus {
+    const EXAMPLE: &str = "shape.torus = { center = [0.0, 0.25, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, \
+        tube = 0.25 }";
+
     fn form(&self) -> Form {
         let scene_from_torus =
             DAffine3::from_mat3_translation(self.texture_axes(), self.center.into());
@@ -56,7 +59,7 @@ impl ShapeDesc for Torus {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.axis = turned(self.axis, degrees);
+        self.axis = rotated_y(self.axis, degrees);
         true
     }
 

@@ -2,13 +2,11 @@
 
 use crate::shape::Shape;
 use crate::value::{
-    Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, ValueType, description,
-    one_of, sin_cos_degrees, unit,
+    Field, FieldValue, KeyNode, KeyValue, NumberRange, ValidationError, ValueType, description,
+    one_of, sin_cos_degrees, single_value, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
-use toml::de::DeValue;
-use toml::{Spanned, Value};
-use zerkalo_kernel::primitive::{Form, PlaneForm};
+use zerkalo_kernel::primitive::Form;
 
 one_of! {
     /// One step of a transform. Angles are counter-clockwise for a viewer at whom the axis points.
@@ -42,30 +40,29 @@ description! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
-impl TomlValue for Scale {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        if value.get_ref().is_array() {
-            return TomlValue::from_toml(value).map(Self);
-        }
-        f64::from_toml(value).map(|factor| Self([factor; 3]))
-    }
-
-    fn to_toml(&self) -> Value {
-        let [x, y, z] = self.0;
-        if x == y && y == z { x.to_toml() } else { self.0.to_toml() }
-    }
-}
-
-impl FieldValue for Scale {
-    const TYPE: ValueType = ValueType::Factor;
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let [x, y, z] = &self.0;
-        if x == y && y == z { x.errors(field) } else { self.0.errors(field) }
-    }
+single_value! {
+    [] Scale: ValueType::Factor,
+        |scale| {
+            let [x, y, z] = scale.0;
+            KeyValue::Numbers(if x == y && y == z { vec![x] } else { vec![x, y, z] })
+        },
+        |value| {
+            let uniform = value.clone().numbers().map(|[factor]| [factor; 3]);
+            uniform.or_else(|| value.numbers()).map(Self)
+        };
 }
 
 impl TransformOp {
+    /// Steps of every kind that change nothing.
+    pub const IDENTITIES: [Self; Self::FIELDS.len()] = [
+        Self::Translate([0.0; 3]),
+        Self::RotateX(0.0),
+        Self::RotateY(0.0),
+        Self::RotateZ(0.0),
+        Self::Rotate(Rotate { axis: [0.0, 1.0, 0.0], degrees: 0.0 }),
+        Self::Scale(Scale([1.0; 3])),
+    ];
+
     /// Returns the transform step as an affine map. The step must be valid.
     pub fn map(&self) -> DAffine3 {
         match *self {
@@ -91,9 +88,23 @@ impl FieldValue for Vec<TransformOp> {
         };
         self.iter().enumerate().flat_map(errors).collect()
     }
+}
 
+impl KeyNode for Vec<TransformOp> {
     fn is_absent(&self) -> bool {
         self.is_empty()
+    }
+
+    fn make_absent(&mut self) {
+        self.clear();
+    }
+
+    fn child(&self, index: &str) -> Option<&dyn KeyNode> {
+        Some(self.get(index.parse::<usize>().ok()?)?)
+    }
+
+    fn child_mut(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.get_mut(index.parse::<usize>().ok()?)?)
     }
 }
 
@@ -141,15 +152,9 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
         ));
     }
     let form = shape.form().transformed(&map);
-    let (max_coordinate, extent) = match (&form, form.bounds()) {
-        (_, Some((low, high))) => {
-            let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
-            let size = if is_empty { f64::INFINITY } else { (high - low).max_element() };
-            (low.abs().max(high.abs()).max_element(), size)
-        }
-        (Form::Plane(PlaneForm { offset, .. }), None) => (offset.abs(), f64::INFINITY),
-        (_, None) => (0.0, f64::INFINITY),
-    };
+    let max_coordinate = form.max_coordinate();
+    let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
+    let is_tiny = |(low, high): (DVec3, DVec3)| (high - low).max_element() < 1e-12 * max_coordinate;
     if !NumberRange::COORDINATE.holds(max_coordinate) {
         return Some(ValidationError::new(
             "transform",
@@ -157,7 +162,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
             "coordinates from -1e9 to 1e9",
         ));
     }
-    (extent < 1e-12 * max_coordinate).then(|| {
+    (!is_empty && form.bounds().is_some_and(is_tiny)).then(|| {
         ValidationError::new(
             "transform",
             "transform makes the object too small for its distance from the origin",

@@ -70,8 +70,9 @@ pub enum ValueType {
     OneOf(&'static [Field]),
     /// List of tables, each with exactly one of the listed keys.
     ListOf(&'static [Field]),
-    /// List of `[[name]]` tables, each with the listed keys.
-    Tables(&'static [Field]),
+    /// List of `[[name]]` tables, each with the listed keys. A function, because the keys of a
+    /// compound's parts contain themselves, and constants cannot refer to each other in a cycle.
+    Tables(fn() -> &'static [Field]),
     /// Tables `[name.NAME]` with the listed keys. The scene file chooses each NAME, as in
     /// `[materials.gold]`.
     Named(&'static [Field]),

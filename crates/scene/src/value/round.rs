@@ -48,7 +48,7 @@ pub fn round_fine(x: f64, scale: f64) -> f64 {
 /// The horizontal components of the result are rounded to about a millionth of its horizontal
 /// length. The heading of the result, its angle about the vertical, is rounded to thousandths of a
 /// degree, so that rounding errors do not add up over repeated rotations.
-pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
+pub fn rotated_y(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
     let horizontal = x.hypot(z);
     if horizontal == 0.0 || !horizontal.is_finite() {
@@ -96,12 +96,12 @@ mod tests {
         let start = [0.3, -0.2, 0.7];
         let mut v = start;
         for _ in 0..7200 {
-            v = turned(v, 5.0);
+            v = rotated_y(v, 5.0);
         }
         for i in 0..3 {
             assert!((v[i] - start[i]).abs() < 2e-5, "{v:?}");
         }
-        assert_eq!(turned([0.0, 0.0, 1.0], 90.0), [1.0, 0.0, 0.0]);
-        assert_eq!(turned([0.0, 1.0, 0.0], 33.0), [0.0, 1.0, 0.0]);
+        assert_eq!(rotated_y([0.0, 0.0, 1.0], 90.0), [1.0, 0.0, 0.0]);
+        assert_eq!(rotated_y([0.0, 1.0, 0.0], 33.0), [0.0, 1.0, 0.0]);
     }
 }

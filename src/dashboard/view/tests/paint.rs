@@ -24,7 +24,7 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
     };
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut session = Session::new(2, options, settings).unwrap();
     session.set_view(View { raster: Some(model.layout().unwrap().raster), probe: model.probe });
     session.set_scene(Arc::clone(model.scene()));

@@ -1,12 +1,12 @@
-//! Tests of changes during a render: other stop criteria, other noise estimates, and waves (sets of
-//! concurrent jobs) of which only a part is traced.
+//! Tests of changes during a render: other stop criteria, other noise estimates, and waves of which
+//! only a part is traced.
 
 use crate::schedule::tests::*;
 
-/// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
-/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel. It then keeps
-/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. Later
-/// waves have the samples that were cut off.
+/// Renders the simulated picture to the end in pieces. Before each wave is traced, [`Wave::cut`]
+/// shortens its jobs to at most `longest` samples per pixel. It then keeps only so many jobs that
+/// they have about `tiles` times `longest` samples per pixel in total. Later waves have the samples
+/// that were cut off.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
@@ -101,7 +101,7 @@ fn new_estimates_replace_the_old_ones() {
     let estimates: Vec<_> = (0..36).map(|tile| Some(model.estimate(tile))).collect();
     schedule.set_estimates(&estimates);
     let after = schedule.noise().unwrap();
-    assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);
+    assert!((after.rmse_levels / before.rmse_levels - 3.0).abs() < 1e-9);
     assert_eq!(schedule.samples(), samples);
     // The convergence of the new picture is unknown. The estimated range is wide, but contains the
     // true time.

@@ -1,0 +1,94 @@
+//! Bounding boxes of single primitives, axis-aligned or oriented, which rays are tested against
+//! before the primitive's own intersection.
+
+use crate::bvh::Ray;
+use crate::bvh::packet::SlabPacket;
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::primitive::canonical::{Bounds, CanonicalShape};
+use glam::DVec3;
+
+/// Bounding box of one primitive.
+pub struct PrimitiveBox<S> {
+    low: [S; 3],
+    high: [S; 3],
+    /// Object space of the box; `None` if its axes are those of the scene.
+    space: Option<BoxFrame<S>>,
+}
+
+/// Object space of an oriented bounding box. A point p of the scene has the coordinates
+/// `rows (p - center)` in it.
+struct BoxFrame<S> {
+    center: [S; 3],
+    rows: [[S; 3]; 3],
+    /// Sum of the magnitudes of each row: the largest factor by which the map to object space
+    /// enlarges a rounding error on that axis.
+    growth: [S; 3],
+    /// Largest magnitude of a coordinate of the primitive in the scene.
+    reach: S,
+}
+
+/// Returns the corners of a bounding box, moved outward by 4 times the largest coordinate times
+/// `epsilon`, the relative rounding error. The margin covers the rounding errors of the box and of
+/// the primitive's own intersection test.
+pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
+    let reach = low.abs().max(high.abs()).max_element();
+    let pad = DVec3::splat(reach * 4.0 * epsilon);
+    [low - pad, high + pad]
+}
+
+/// Largest distance between a side of a solid's bounding box and the solid, as a fraction of the
+/// largest coordinate. It is not 0 far from the origin of the scene file, because box and solid are
+/// rounded differently in double precision.
+const GIVEN: f64 = 1.0 / 4_294_967_296.0;
+
+impl<S: Float> PrimitiveBox<S> {
+    /// Returns the bounding box of a canonical form; `None` without finite bounds. If `oriented` is
+    /// `true` and the form has an object space, the box is in that space.
+    pub fn new(form: &dyn CanonicalShape, oriented: bool) -> Option<Self> {
+        let bounds = form.bounds()?;
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        let made = |bounds, space| {
+            let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
+            Self { low, high, space }
+        };
+        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| oriented) else {
+            return Some(made(bounds, None));
+        };
+        let rows = scene_from_own.matrix3.inverse().transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let middle = 0.5 * (low + high);
+        let space = BoxFrame {
+            center: vector(scene_from_own.transform_point3(middle)),
+            rows: rows.map(vector),
+            growth: rows.map(|r| S::from_f64(r.abs().element_sum())),
+            reach: S::from_f64(bounds.0.abs().max(bounds.1.abs()).max_element()),
+        };
+        Some(made((low - middle, high - middle), Some(space)))
+    }
+
+    /// Returns the lanes whose ray may hit the primitive in this box at a distance up to `limit`.
+    #[inline(always)]
+    pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
+        let far = ray.origin.max_abs();
+        let packet = match &self.space {
+            None => {
+                let pad = far * L::from_f64(4.0 * L::EPSILON);
+                SlabPacket::new(ray, Vec3::new(pad, pad, pad))
+            }
+            Some(space) => {
+                // Bound of the rounding errors of the ray's origin, of its direction and of the
+                // box's centre, in scene units.
+                let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
+                let rows = space.rows.map(Vec3::splat);
+                let transform =
+                    |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
+                let inner = Ray {
+                    origin: transform(ray.origin - Vec3::splat(space.center)),
+                    direction: transform(ray.direction),
+                };
+                SlabPacket::new(&inner, Vec3::splat(space.growth) * lost)
+            }
+        };
+        packet.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
+    }
+}

@@ -1,0 +1,123 @@
+//! Intervals in which a line is inside the parts of a compound: their sorted ends, and the
+//! transitions of the line between inside and outside.
+
+use crate::lanes::SimdFloat;
+use crate::primitive::csg::solid::Span;
+
+/// Lower limit of the cosine by which the tolerance of coincident faces is divided. It keeps the
+/// tolerance finite for lines parallel to the surface.
+const FLATTEST: f64 = 1e-9;
+
+/// End of an interval in which a line is inside a solid.
+#[derive(Clone, Copy)]
+pub struct Event<L> {
+    /// Distance along the line.
+    pub t: L,
+    /// Tolerance. Two ends coincide if the distance between them is at most the smaller one of
+    /// their tolerances.
+    pub tie: L,
+}
+
+/// Interval of distances in which a line is inside a part of a compound.
+#[derive(Clone, Copy)]
+pub struct Interval<L> {
+    pub enter: L,
+    pub leave: L,
+}
+
+impl<L: SimdFloat> Interval<L> {
+    #[inline(always)]
+    pub fn at(&self, t: L) -> L::Mask {
+        self.enter.le(t) & self.leave.ge(t)
+    }
+}
+
+/// Transition of the line of each lane through the surface of a compound, or of an operand of its
+/// set operations.
+#[derive(Clone, Copy)]
+pub struct Transition<L: SimdFloat> {
+    /// Lanes in which the line is inside the solid before the surface.
+    pub before: L::Mask,
+    /// Lanes in which the line is inside the solid after the surface.
+    pub after: L::Mask,
+    /// Distance along the line to the surface; undefined in lanes without a transition.
+    pub t: L,
+    /// Id of the part to which the surface belongs.
+    pub tag: L,
+}
+
+impl<L: SimdFloat> Transition<L> {
+    pub fn inverted(self) -> Self {
+        Self { before: !self.before, after: !self.after, ..self }
+    }
+
+    /// Combines the transitions of two operands into that of the result, with the given `before`
+    /// and `after`. In a lane in which `self` changes sides and ends on the same side as the
+    /// result, the surface is that of `self`, in other lanes that of `other`.
+    fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
+        let same = (self.after & after) | (!self.after & !after);
+        let first = same & ((self.before & !self.after) | (!self.before & self.after));
+        Self {
+            before,
+            after,
+            t: L::select(first, self.t, other.t),
+            tag: L::select(first, self.tag, other.tag),
+        }
+    }
+
+    pub fn or(self, other: Self) -> Self {
+        self.joined(other, self.before | other.before, self.after | other.after)
+    }
+
+    pub fn and(self, other: Self) -> Self {
+        self.joined(other, self.before & other.before, self.after & other.after)
+    }
+}
+
+/// Calls `use_it` with a slice of `n` elements that equal `fill`. The slice is on the stack if `n`
+/// is at most `FEW`, otherwise on the heap.
+#[inline(always)]
+pub fn with_scratch<const FEW: usize, T: Copy, R>(
+    n: usize,
+    fill: T,
+    use_it: impl FnOnce(&mut [T]) -> R,
+) -> R {
+    let (mut few, mut many) = ([fill; FEW], Vec::new());
+    // A single call, so that the compiler inlines `use_it`.
+    use_it(if n <= FEW {
+        &mut few[..n]
+    } else {
+        many.resize(n, fill);
+        &mut many
+    })
+}
+
+/// Returns the start and the end of `span`; both are `L::MAX` in lanes whose line misses the solid.
+/// `tie` is the tolerance for a line perpendicular to the face.
+#[inline(always)]
+pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
+    let never = L::from_f64(L::MAX);
+    let end = |t: L, cosine: L| {
+        let real = span.meets & t.abs().lt(never);
+        Event {
+            t: L::select(span.meets, t, never),
+            tie: (tie / cosine.max(L::from_f64(FLATTEST))).masked(real),
+        }
+    };
+    [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
+}
+
+/// Inserts `end` into `ends`. The first `count` elements must be sorted by distance in each lane.
+/// The first `count + 1` elements are then sorted.
+#[inline(always)]
+pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
+    for slot in &mut ends[..count] {
+        let sooner = end.t.lt(slot.t);
+        let old = *slot;
+        slot.t = L::select(sooner, end.t, old.t);
+        slot.tie = L::select(sooner, end.tie, old.tie);
+        end.t = L::select(sooner, old.t, end.t);
+        end.tie = L::select(sooner, old.tie, end.tie);
+    }
+    ends[count] = end;
+}

@@ -1,0 +1,282 @@
+//! OpenEXR writer. Pictures are linear radiance in 32-bit floats, with additional channels for
+//! replicates, light groups and sample count.
+//!
+//! All channels are in one part; prefixes of their names form layers. `R G B` is the picture.
+//! `A.R ..` and `B.R ..` are the pictures from the two halves of the samples (replicates); half of
+//! their difference is an estimate of the picture's error. `light_NAME.R ..` are the contributions
+//! of the light groups; their sum is the picture. `count` is the number of samples of a pixel.
+//!
+//! The file consists of tiles, so that programs can read a part of a large picture. A row of tiles
+//! is written as soon as it is complete. The header is written again at the end if metadata have
+//! changed.
+
+use crate::film::{Replicates, Sums};
+use crate::image_file::bands::Bands;
+use crate::image_file::exr_header::Ordered;
+use crate::image_file::image_data::{ImageData, WriteSeek, replace_start};
+use crate::image_file::metadata::padded;
+use exr::block::UncompressedBlock;
+use exr::block::writer::ChunksWriter;
+use exr::compression::Compression;
+use exr::error::Error;
+use exr::math::{RoundingMode, Vec2};
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, Chromaticities, LevelMode, LineOrder, SampleType, Text,
+    TileDescription,
+};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::{BlockDescription, Headers};
+use std::io::{self, Cursor};
+use std::ops::Range;
+
+/// Width and height in pixels of a tile of the OpenEXR file. A row of tiles is held in memory while
+/// it is encoded.
+const TILE: [usize; 2] = [64, 16];
+
+/// Encodes a picture as OpenEXR and writes it to `sink`, one row of tiles after another.
+pub(super) fn encode(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    encode_to(picture, bands, sink).map_err(|error| match error {
+        Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    })
+}
+
+/// Source of the values of one channel, such as `A.R`, of the OpenEXR file.
+#[derive(Clone, Copy)]
+enum Source {
+    /// Radiance summed over all light groups. The fields are the replicates (halves of the samples)
+    /// whose samples are averaged, and the colour channel (0 red, 1 green, 2 blue).
+    Mixed(Replicates, usize),
+    /// Radiance of one light group alone. The fields are the group's index and the colour channel
+    /// (0 red, 1 green, 2 blue).
+    Group(usize, usize),
+    /// Number of samples of a pixel, summed over both replicates (halves of the samples).
+    Count,
+}
+
+fn encode_to(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> Result<(), Error> {
+    let channels = channels(&layer_names(picture.group_names, picture.mix.weights.len()));
+    let metadata = bands.metadata();
+    let headers = headers(picture, &channels, &metadata);
+    exr::block::write(Ordered::new(&mut *sink), headers, true, |meta, writer| {
+        let mut rows = TileRow::new(picture, channels.iter().map(|(_, source)| *source).collect());
+        let mut compressor = writer.sequential_blocks_compressor(&meta);
+        for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
+            let Vec2(left, top) = block.pixel_position;
+            if left == 0 {
+                rows.load(top..top + block.pixel_size.height(), bands)?;
+            }
+            let channels = &meta.headers[0].channels;
+            let block = UncompressedBlock::from_lines(channels, block, |line| {
+                let Vec2(x, y) = line.location.position;
+                let bytes = &rows.bytes[line.location.channel];
+                let start = ((y - top) * picture.size[0] as usize + x) * 4;
+                line.value.copy_from_slice(&bytes[start..start + line.value.len()]);
+            });
+            compressor.compress_block(index, block)?;
+        }
+        Ok(())
+    })?;
+    let last = bands.metadata();
+    if last != metadata {
+        let [before, after] = [&metadata, &last].map(|m| header(picture, &channels, m));
+        replace_start(sink, &before?, &after?)?;
+    }
+    Ok(())
+}
+
+/// Returns all bytes of an OpenEXR file before its table of chunks, that is, magic number, version
+/// and header.
+fn header(
+    picture: &ImageData,
+    channels: &[(String, Source)],
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, Error> {
+    let mut file = Ordered::new(Cursor::new(Vec::new()));
+    let headers = headers(picture, channels, metadata);
+    match exr::block::write(&mut file, headers, true, |_, _| Err(Error::Aborted)) {
+        Ok(()) | Err(Error::Aborted) => Ok(file.into_header()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Returns the headers of the OpenEXR file: a list of one, because the file has one part.
+fn headers(
+    picture: &ImageData,
+    channels: &[(String, Source)],
+    metadata: &[(String, String)],
+) -> Headers {
+    let size = Vec2(picture.size[0] as usize, picture.size[1] as usize);
+    let mut image = ImageAttributes::with_size(size);
+    image.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.3, 0.6),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.329),
+    });
+    let mut layer = LayerAttributes::default();
+    for (key, value) in metadata {
+        layer.other.insert(text(key), AttributeValue::Text(text(&padded(value))));
+    }
+    let descriptions = channels
+        .iter()
+        .map(|(name, source)| {
+            let kind = if let Source::Count = source { SampleType::U32 } else { SampleType::F32 };
+            ChannelDescription::named(text(name), kind)
+        })
+        .collect();
+    let tiles = TileDescription {
+        tile_size: Vec2(TILE[0], TILE[1]),
+        level_mode: LevelMode::Singular,
+        rounding_mode: RoundingMode::Down,
+    };
+    let header = Header::new(text("picture"), size, descriptions)
+        // RLE is used because it is fast and noisy pictures compress poorly anyway. A picture of
+        // 1920x1080 pixels takes 108 MB uncompressed. RLE reduces it to 100 MB in 0.55 s, ZIP to 71
+        // MB in 3.4 s.
+        .with_encoding(Compression::RLE, BlockDescription::Tiles(tiles), LineOrder::Increasing)
+        .with_shared_attributes(image)
+        .with_attributes(layer);
+    Headers::from_elem(header, 1)
+}
+
+fn text(text: &str) -> Text {
+    Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
+}
+
+/// Returns all channels of the OpenEXR file, each as its name and the source of its values. They
+/// are sorted by name, as the format requires.
+fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
+    let mut channels = vec![("count".to_string(), Source::Count)];
+    for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
+        channels.push((color.to_string(), Source::Mixed(Replicates::Both, c)));
+        channels.push((format!("A.{color}"), Source::Mixed(Replicates::A, c)));
+        channels.push((format!("B.{color}"), Source::Mixed(Replicates::B, c)));
+        for (group, layer) in group_layers.iter().enumerate() {
+            channels.push((format!("{layer}.{color}"), Source::Group(group, c)));
+        }
+    }
+    channels.sort_by(|(a, _), (b, _)| a.as_bytes().cmp(b.as_bytes()));
+    channels
+}
+
+/// Returns a unique layer name for each light group. A layer is a group of OpenEXR channels with a
+/// common prefix. The layer name contains the light group's name in `names`, or the number of the
+/// group if it has no name. It consists of ASCII letters, digits, `_` and `-`.
+fn layer_names(names: &[String], groups: usize) -> Vec<String> {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    let mut layers: Vec<String> = Vec::new();
+    for group in 0..groups {
+        let name: String = match names.get(group).filter(|name| !name.is_empty()) {
+            Some(name) => name.chars().map(plain).take(100).collect(),
+            None => group.to_string(),
+        };
+        let candidates = std::iter::once(format!("light_{name}"))
+            .chain((2..).map(|n| format!("light_{name}_{n}")));
+        let unique = candidates.into_iter().find(|candidate| !layers.contains(candidate));
+        layers.extend(unique);
+    }
+    layers
+}
+
+/// Pixel values of a row of tiles of the OpenEXR file, encoded as bytes.
+struct TileRow<'a> {
+    picture: &'a ImageData<'a>,
+    sources: Vec<Source>,
+    /// Encoded values of each channel, in `[row][column]` order.
+    bytes: Vec<Vec<u8>>,
+}
+
+impl<'a> TileRow<'a> {
+    fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
+        Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
+    }
+
+    /// Replaces the encoded values by those of the given rows of the picture.
+    fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
+        let Self { picture, sources, bytes } = self;
+        bytes.iter_mut().for_each(Vec::clear);
+        for y in rows {
+            let film = bands.film_with_row(y)?;
+            let mixed = &picture.mix.radiance_per_step(film.scales());
+            let start = bytes.first().map_or(0, Vec::len);
+            for bytes in bytes.iter_mut() {
+                bytes.resize(start + film.width() * 4, 0);
+            }
+            film.visit_row(y - film.first_row(), |x, sums| {
+                let means = [Replicates::Both, Replicates::A, Replicates::B]
+                    .map(|replicates| sums.mean(replicates, mixed));
+                for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
+                    let value = match *source {
+                        Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
+                        Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
+                        Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
+                        Source::Group(group, c) => {
+                            group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
+                        }
+                        Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
+                    };
+                    bytes[start + x * 4..][..4].copy_from_slice(&value);
+                }
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Returns the contribution of one light group to one colour channel of a pixel: the mean over the
+/// pixel's samples; 0 without samples. `i` is the position of this group and channel in
+/// `[group][channel]` order. `per_unit` has the factors that convert integer sums to sums of
+/// radiance, in the same order.
+fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
+    match sums.count(Replicates::Both) {
+        0 => 0.0,
+        count => (sums.value(Replicates::Both, i) * per_unit[i] / f64::from(count)) as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Display;
+    use crate::film::testing::{fill, film, white};
+    use crate::image_file::{Depth, ImageOutput, WholeFilm, read_exr};
+    use exr::meta::MetaData;
+
+    #[test]
+    fn tiles_hold_the_pixels_of_their_place() {
+        let size = [2 * TILE[0] + 2, 2 * TILE[1] + 5];
+        let mut film = film(size[0], size[1], &[1.0]);
+        let value = |x: usize, y: usize| (1000 * y + x) as f64;
+        fill(&mut film, 2, |x, y, _| vec![2.0 * value(x, y); 3]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let picture = ImageData {
+            size: size.map(|side| side as u32),
+            mix: &white(1),
+            group_names: &[],
+            display: Display::default(),
+            depth: Depth::Eight,
+        };
+        let output = ImageOutput::from_path(&path).unwrap();
+        output.write(&picture, &mut WholeFilm { film: &film, metadata: &[] }).unwrap();
+        let meta = MetaData::read_from_file(&path, true).unwrap();
+        let BlockDescription::Tiles(tiles) = meta.headers[0].blocks else { panic!("{meta:?}") };
+        assert_eq!(tiles.tile_size, Vec2(TILE[0], TILE[1]));
+        assert_eq!(meta.headers[0].chunk_count, 9);
+        let read = read_exr(&path).unwrap();
+        assert_eq!(read.size, size);
+        for (i, pixel) in read.pixels.iter().enumerate() {
+            let (x, y) = (i % size[0], i / size[0]);
+            assert_eq!(*pixel, [value(x, y); 3], "{x} {y}");
+        }
+    }
+}

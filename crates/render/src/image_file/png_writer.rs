@@ -1,0 +1,139 @@
+//! PNG writer: displayed pictures in 8 or 16 bits per channel, sRGB, with text metadata.
+
+use crate::film::Replicates;
+use crate::film::quantised_16;
+use crate::image_file::bands::Bands;
+use crate::image_file::image_data::{Depth, ImageData, WriteSeek, replace_start};
+use crate::image_file::metadata::padded;
+use png::{
+    BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
+    SrgbRenderingIntent, Writer,
+};
+use std::io::{self, Write};
+
+/// Largest number of bytes of image data in a chunk of the PNG file.
+const CHUNK_BYTES: usize = 1 << 18;
+/// Number of bytes of the PNG file's last chunk, which has no data.
+const END_CHUNK_BYTES: usize = 12;
+
+/// Encodes a picture as PNG and writes it to `sink` row by row.
+pub(super) fn encode(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    encode_to(picture, bands, sink).map_err(|error| match error {
+        EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    })
+}
+
+fn encode_to(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> Result<(), EncodingError> {
+    let metadata = bands.metadata();
+    let mut writer = start(picture, &metadata, &mut *sink)?;
+    let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
+    let mut row = Vec::new();
+    for y in 0..picture.size[1] as usize {
+        encode_row(picture, bands, y, &mut row)?;
+        stream.write_all(&row)?;
+    }
+    stream.finish()?;
+    writer.finish()?;
+    let last = bands.metadata();
+    if last != metadata {
+        replace_start(sink, &preamble(picture, &metadata)?, &preamble(picture, &last)?)?;
+    }
+    Ok(())
+}
+
+/// Returns all bytes of a PNG file before its image data.
+fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
+    let mut bytes = Vec::new();
+    // The writer adds the last chunk of a PNG file when it is dropped. This chunk is cut off.
+    drop(start(picture, metadata, &mut bytes)?);
+    bytes.truncate(bytes.len() - END_CHUNK_BYTES);
+    Ok(bytes)
+}
+
+/// Writes the part of a PNG file before the image data, and returns a writer for the image data.
+fn start<W: Write>(
+    picture: &ImageData,
+    metadata: &[(String, String)],
+    sink: W,
+) -> Result<Writer<W>, EncodingError> {
+    let [width, height] = picture.size;
+    let mut encoder = Encoder::new(sink, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(match picture.depth {
+        Depth::Eight => BitDepth::Eight,
+        Depth::Sixteen => BitDepth::Sixteen,
+    });
+    encoder.set_compression(Compression::Fast);
+    // Some readers ignore the sRGB chunk. For them the file also contains the gamma and the
+    // chromaticities that the PNG specification gives for sRGB.
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
+    let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
+    encoder.set_source_chromaticities(SourceChromaticities {
+        white: xy(31_270, 32_900),
+        red: xy(64_000, 33_000),
+        green: xy(30_000, 60_000),
+        blue: xy(15_000, 6_000),
+    });
+    for (key, value) in metadata {
+        // Text chunks (tEXt) can hold only Latin-1, but more programs read them than the newer iTXt
+        // chunks. They are therefore used for ASCII values.
+        if value.is_ascii() {
+            encoder.add_text_chunk(key.clone(), padded(value))?;
+        } else {
+            encoder.add_itxt_chunk(key.clone(), padded(value))?;
+        }
+    }
+    encoder.write_header()
+}
+
+/// Encodes an 8-bit sRGB picture as PNG. `rgb` has red, green and blue of each pixel, row by row.
+///
+/// # Errors
+/// Fails if the length of `rgb` is not 3 bytes per pixel.
+pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgb)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Replaces `bytes` by those of row `y` of the PNG image: red, green, blue of each pixel. 16-bit
+/// values are big-endian, as PNG requires.
+fn encode_row(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    y: usize,
+    bytes: &mut Vec<u8>,
+) -> io::Result<()> {
+    let film = bands.film_with_row(y)?;
+    let mut row = Vec::new();
+    film.row(y - film.first_row(), Replicates::Both, picture.mix, &mut row);
+    bytes.clear();
+    match picture.depth {
+        Depth::Eight => {
+            let to_8 = picture.display.to_8();
+            row.iter().for_each(|rgb| bytes.extend(to_8(*rgb)));
+        }
+        Depth::Sixteen => bytes.extend(
+            row.iter()
+                .flat_map(|rgb| picture.display.levels(*rgb))
+                .flat_map(|value| quantised_16(value).to_be_bytes()),
+        ),
+    }
+    Ok(())
+}
