@@ -22,13 +22,10 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Self { world, sampler: Sampler::new(*sampling, world.camera_dimensions()) }
     }
 
-    /// Creates the tracer of `pixels`. `replicate` is 0 for replicate A, 1 for replicate B; each
-    /// has half of the samples. `pixels` has at most
-    /// [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) pairs of column and row. All pixels
-    /// must be in the rectangle of the raster with the upper left corner `origin` and the size
-    /// `extent`, because culling uses this rectangle. Returns `None` if all samples in the
-    /// rectangle are black: no camera ray can hit a primitive, no light with a size and no
-    /// environment is visible, and the background is black.
+    /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
+    /// of column and row, in `replicate` 0 (A) or 1 (B). Culling uses the rectangle of the raster
+    /// with the upper left corner `origin` and the size `extent`, which must contain them. Returns
+    /// `None` if all samples in the rectangle are black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -42,8 +39,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
     }
 
-    /// Creates the tracer of `pixels` at any positions in the picture, without culling. `replicate`
-    /// is 0 for replicate A, 1 for replicate B; each has half of the samples.
+    /// Creates the tracer of `pixels` at any positions in the picture, without culling.
     pub fn scattered(
         &self,
         replicate: usize,
@@ -60,7 +56,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
 }
 
 /// Tracer of the samples of up to [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) pixels in
-/// one replicate (half of the samples). It tests rays against the candidate primitives of the tile.
+/// one replicate. It tests rays against the candidate primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,

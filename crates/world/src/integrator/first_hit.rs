@@ -7,12 +7,11 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 /// Object, distance and normal at the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
-    /// Index of the object in the scene's list of objects; `None` for the background.
+    /// Index of the object in the scene; `None` for the background.
     pub object: Option<u32>,
     /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
-    /// Unit geometric normal in scene coordinates, on the side that faces the eye; zero for the
-    /// background.
+    /// Unit geometric normal on the side that faces the eye; zero for the background.
     pub normal: [f32; 3],
     /// `true` if the surface reflects rays (mirror or glossy lobe) on the side that faces the eye.
     pub reflects: bool,
@@ -24,8 +23,7 @@ impl FirstHit {
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-/// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
-/// length. A point is a position in the picture: a column and a row in pixels, with fractions.
+/// Implements [`World::first_hit`].
 #[inline(never)]
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
@@ -37,8 +35,7 @@ pub(crate) fn trace_first_hits<L: SimdFloat>(
     }
 }
 
-/// Writes the first hits of at most `WIDTH` camera rays into `hits`. The rays go through `points`,
-/// positions in the picture in pixels.
+/// Writes the first hits of at most `WIDTH` camera rays.
 fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut [FirstHit]) {
     let point = |lane: usize| points[lane.min(points.len() - 1)];
     let corner_directions = Vec3::from_fn(|lane| {
