@@ -1,5 +1,5 @@
-//! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
-//! brightness are kept where possible.
+//! Conversion between kinds of shapes, lights, textures and cameras, which keeps position, size,
+//! direction and brightness where possible.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -41,8 +41,7 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
 pub(super) const KIND: Field =
     Field::required("kind", ValueType::OneOf(LIGHT_KINDS), "", "Kind of light source.");
 
-/// Field for the choice between `target` and `direction` of a camera. The inspector shows it as a
-/// row, but it is not a key of scene files.
+/// Choice between `target` and `direction` of a camera, a row of the inspector but no key of files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -53,8 +52,7 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
-/// another shape or light. Nothing changes if it has this kind already.
+/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -92,14 +90,12 @@ pub(super) fn switch(
     Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
 }
 
-/// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
-/// there is no such kind.
+/// Returns a shape of the kind `name` with the place, size and rotation of `shape`.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The size is that of the bounding box before rotation, because the bounding box of a
-            // rotated shape is larger than the shape.
+            // The bounding box of a rotated shape is larger than the shape.
             let mut straight = shape.clone();
             straight.rotate_y(-shape.rotation());
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
@@ -245,8 +241,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Sets the kind of a material's texture or bump map to `name`. `key` is `texture` or `bump`. The
-/// placement of a texture on the shape is kept.
+/// Sets the kind of `texture` or `bump`. The placement of a texture is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -258,8 +253,8 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts the value of the camera's `key` to the kind `name`, such as `target` to `direction`.
-/// The picture stays the same, except for rounding.
+/// Converts the value of `key`, such as `target` to `direction`. The picture stays the same, except
+/// for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -286,8 +281,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
             if camera.lens_radius() > 0.0 && camera.focus.is_none() {
-                // So far the target was in focus. A focus distance keeps it in focus without a
-                // target.
+                // The target was in focus; a focus distance keeps it so.
                 let distance = round_significant(camera.focus_depth(), 5);
                 camera.focus = Some(Focus::Distance(distance));
             }

@@ -21,8 +21,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Returns the mutually exclusive keys of `subject`, of which at most one may be given; empty if it
-/// has none.
+/// Returns the keys of which at most one may be given.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
@@ -71,15 +70,13 @@ pub(super) fn part_mut<'a>(
     part.ok_or_else(|| EditError::gone(subject))
 }
 
-/// Returns the given one of the mutually exclusive keys of `subject`, such as the kind `point` of a
-/// light.
+/// Returns the given one of the [`exclusive_keys`].
 pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static str> {
     let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
     exclusive_keys(subject).iter().find(is_given).copied()
 }
 
-/// Returns the description (type, range, help) of the dotted key `key`, whose parts are keys and
-/// list indices. Returns `None` if there is no such key.
+/// Returns the description of the dotted key `key`; its parts are keys and list indices.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),
