@@ -131,8 +131,8 @@ fn tasks(session: &Session, count: usize) -> Vec<Duration> {
         session.take();
         let (answer, result) = channel();
         let start = Instant::now();
-        session.submit(move |film| {
-            answer.send(film.map(|(_, report)| report.samples)).expect("the bench waits");
+        session.submit(move |picture| {
+            answer.send(picture.map(|p| p.report.samples)).expect("the bench waits");
         });
         assert!(result.recv().unwrap().is_some());
         start.elapsed()

@@ -2,8 +2,8 @@
 //! dashboard uses them, and how to improve them.
 
 use crate::command::{Failure, print_line};
-use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
+use crate::dashboard::text::wrapped;
 use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};

@@ -17,7 +17,6 @@ mod progress;
 mod regions;
 mod render;
 mod shard;
-mod signals;
 mod stats;
 mod watch;
 
@@ -35,6 +34,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Document, Scene};
+use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision, requires_double};
 
 /// Exit status for an invalid command line. clap uses the same status.
@@ -122,6 +122,11 @@ fn end(error: &clap::Error) -> ! {
     let printed = error.print();
     let failed = printed.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe);
     std::process::exit(if failed { 1 } else { error.exit_code() })
+}
+
+/// Handles SIGINT and SIGTERM: the first one saves the picture so far, a second one ends the program.
+fn handle_signals() -> Result<Signals, Failure> {
+    Signals::catch_end().map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
 
 /// Prints a line on stderr. Errors of writing are ignored.

@@ -65,7 +65,7 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
         sampler: settings.sampler,
         adaptive: true,
     };
-    let mut header = film_header(state, report, &provenance, settings.display);
+    let mut header = film_header(state, report, &provenance);
     part.record(&mut header);
     header
 }

@@ -4,9 +4,10 @@ use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
-use crate::command::signals::Signals;
 use crate::command::stats::Stats;
-use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
+use crate::command::{
+    Failure, handle_signals, print_line, read_scene, shard, warn, warn_of_precision,
+};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,6 +21,7 @@ use zerkalo_render::{Checkpoint, Options, RegionRender};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, WriteError, check_writable};
 use zerkalo_scene::process_memory::resident_memory;
+use zerkalo_terminal::Signals;
 
 /// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
 /// of an 8-bit file.
@@ -50,7 +52,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let division = args.memory.map(|cap| Division::new(&scene, args, cap)).transpose()?;
 
     let size = scene.film.size;
@@ -168,9 +170,9 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     // An error of writing the checkpoint is kept until the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
+    let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
-        let written = state.write(report, &provenance, display, depth, &output);
+        let written = state.write(report, &provenance, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
     });
     let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;

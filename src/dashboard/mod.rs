@@ -19,5 +19,6 @@ pub mod panel_lines;
 pub mod run;
 #[cfg(test)]
 mod testing;
+pub mod text;
 pub mod update;
 pub mod view;

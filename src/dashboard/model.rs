@@ -6,7 +6,7 @@ use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::overlay_layout::wrapped;
+use crate::dashboard::text::wrapped;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -313,7 +313,7 @@ impl Model {
             (None, Focus::Picture, mode) => match mode {
                 Mode::Orbit => KeyContext::Picture,
                 Mode::Move => KeyContext::Moving,
-                Mode::Rotate => KeyContext::Turning,
+                Mode::Rotate => KeyContext::Rotating,
                 Mode::Fly => KeyContext::Flying,
                 Mode::Probe => KeyContext::Probing,
             },

@@ -4,8 +4,8 @@ use crate::dashboard::layout::BORDER;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::text::wrapped_rows;
 use ratatui::layout::Rect;
-use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use zerkalo_render::session::QUALITIES;
 
 /// Areas of an overlay. Areas that an overlay does not use are empty.
@@ -148,55 +148,9 @@ fn divided(area: Rect, rows: u16) -> (Rect, Rect) {
     (upper, Rect { y: area.y + upper.height, height, ..area })
 }
 
-/// Returns the number of lines that `text` wraps to in `width` columns.
-pub fn wrapped_rows(text: &str, width: u16) -> u16 {
-    wrapped(text, width).len() as u16
-}
-
-/// Wraps `text` between words to lines of `width` columns. Words longer than a line are broken.
-pub fn wrapped(text: &str, width: u16) -> Vec<String> {
-    let width = usize::from(width.max(1));
-    let mut lines = Vec::new();
-    let mut line = String::new();
-    let mut columns = 0;
-    for word in text.split_whitespace() {
-        if columns > 0 && columns + 1 + word.width() > width {
-            lines.push(std::mem::take(&mut line));
-            columns = 0;
-        }
-        if columns > 0 {
-            line.push(' ');
-            columns += 1;
-        }
-        for c in word.chars() {
-            let added = c.width().unwrap_or(0);
-            if columns > 0 && columns + added > width {
-                lines.push(std::mem::take(&mut line));
-                columns = 0;
-            }
-            line.push(c);
-            columns += added;
-        }
-    }
-    if !line.is_empty() || lines.is_empty() {
-        lines.push(line);
-    }
-    lines
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn wrapping_keeps_words_whole() {
-        assert_eq!(wrapped("one two three", 7), ["one two", "three"]);
-        assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
-        assert_eq!(wrapped("abcdef", 3), ["abc", "def", ""].map(String::from)[..2]);
-        assert_eq!(wrapped("", 5), [""]);
-        assert_eq!(wrapped("日本 日本語 ü", 5), ["日本", "日本", "語 ü"], "two columns each");
-        assert!(wrapped("a\nb\tc", 1).iter().all(|line| line.chars().count() == 1));
-    }
 
     #[test]
     fn panel_splits_into_lines_and_help() {

@@ -88,7 +88,7 @@ impl Experiment {
     }
 
     /// Returns `true` if the pictures of all variants of the experiment have the same expectation,
-    /// so that they differ in noise only. A variant is a render with one setting changed.
+    /// so that they differ in noise only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -150,8 +150,7 @@ pub struct Plan {
     pub targets: Vec<f64>,
     /// Experiments to run; each changes one setting of the render.
     pub experiments: Vec<Experiment>,
-    /// Smallest number of timed renders of each variant (the default settings, or one changed
-    /// setting).
+    /// Smallest number of timed renders of each variant.
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,

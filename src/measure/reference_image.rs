@@ -12,9 +12,9 @@ pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     levels: Vec<[f64; 3]>,
-    /// Half the difference between the reference's two replicates (halves of its samples) in each
-    /// pixel, in 8-bit levels. Its root mean square is an estimate of the error of the reference.
-    /// Empty if the reference counts as exact.
+    /// Half the difference between the reference's two replicates in each pixel, in 8-bit levels.
+    /// Its root mean square is an estimate of the error of the reference. Empty if the reference
+    /// counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
     /// Variance of the reference's mean brightness, which is the mean over all its pixels and
@@ -42,9 +42,9 @@ pub struct Errors {
     /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels,
     /// with x the value of a pixel in the picture and r its value in the reference.
     pub rel_mse: f64,
-    /// Relative uncertainty of `rmse_levels`, from 0 to 1, because of the error of the reference. It
-    /// is the standard deviation of `rmse_levels` over different references as noisy as this one,
-    /// divided by `rmse_levels`.
+    /// Relative uncertainty of `rmse_levels`, from 0 to 1, because of the error of the reference.
+    /// It is the standard deviation of `rmse_levels` over different references as noisy as this
+    /// one, divided by `rmse_levels`.
     pub spread: f64,
 }
 
@@ -102,8 +102,7 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
     (own, mean_variance / (values * values))
 }
 
-/// Returns the pixels of replicate A and those of replicate B (halves of the samples) of `film`,
-/// both row by row.
+/// Returns the pixels of replicate A and those of replicate B of `film`, both row by row.
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
     [Replicates::A, Replicates::B].map(|replicates| {
         let mut all = Vec::with_capacity(film.width() * film.height());
@@ -117,9 +116,8 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 }
 
 impl Reference {
-    /// Creates a reference from the picture of `film`. The film's two replicates (halves of the
-    /// samples) must hold equal numbers of samples; the error of the reference itself is estimated
-    /// from their difference.
+    /// Creates a reference from the picture of `film`. The film's two replicates must hold equal
+    /// numbers of samples; the error of the reference itself is estimated from their difference.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
@@ -162,8 +160,8 @@ impl Reference {
         self.own.levels.sqrt()
     }
 
-    /// Returns the noise of the reference picture in linear radiance: its estimated root mean square
-    /// error against the exact picture, over all pixels and channels.
+    /// Returns the noise of the reference picture in linear radiance: its estimated root mean
+    /// square error against the exact picture, over all pixels and channels.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }
@@ -263,8 +261,8 @@ mod tests {
         (0..count).map(pixel).collect()
     }
 
-    /// Checks the estimated error of a reference. Its two replicates (halves of the samples) have
-    /// noise of standard deviation s, so that their mean has the error s / sqrt 2.
+    /// Checks the estimated error of a reference. Its two replicates have noise of standard
+    /// deviation s, so that their mean has the error s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);

@@ -45,7 +45,7 @@ pub struct Measured {
     pub name: String,
     /// Number of threads that trace rays.
     pub threads: usize,
-    /// Points of the error curve (error after some samples), in ascending order of sample count.
+    /// Points of the error curve, in ascending order of sample count.
     pub points: Vec<Point>,
     /// Share of the processors' time that other programs used, for each repetition of the render.
     /// `None` if unknown.

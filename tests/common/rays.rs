@@ -10,7 +10,7 @@ use zerkalo_kernel::primitive::{Aggregate, Form, SurfacePoint};
 use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
 use zerkalo_scene::shape::EXAMPLES;
-use zerkalo_world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
+use zerkalo_world::{AnyWorld, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);
@@ -153,7 +153,7 @@ impl Traced {
         let sampler = Sampler::new(settings, world.camera_dimensions());
         let mut out = Vec::with_capacity(lines.len());
         let points = sampler.block(0, L::WIDTH);
-        let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+        let mut radiance = Radiance::black();
         for (ray, count) in packets::<L>(lines) {
             let draws = points.for_pixel(sampler.key((0, 0), 0));
             world.trace(&mut Path::new(ray), None, &draws, L::mask(true), &mut radiance);

@@ -5,7 +5,7 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
-use zerkalo_world::{MAX_GROUPS, Path, Radiance, World};
+use zerkalo_world::{Path, Radiance, World};
 
 /// Returns three numbers as a TOML array.
 pub fn array(v: glam::DVec3) -> String {
@@ -29,7 +29,7 @@ pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: im
         let half = L::from_f64(0.5);
         let offset = if world.jitter() { draws.pixel() } else { (half, half) };
         let corner = Vec3::splat(world.camera().pixel_corner_direction((0, 0)));
-        let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+        let mut radiance = Radiance::black();
         let (origin, direction) = world.camera().rays(corner, offset);
         let mut path = Path::new(Ray { origin, direction });
         world.trace(&mut path, None, &draws, L::mask(true), &mut radiance);

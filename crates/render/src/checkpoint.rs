@@ -110,7 +110,7 @@ impl EncodedCheckpoint {
     ) -> Self {
         let film = &state.film;
         let compiled = state.lighting().compiled();
-        let mut header = film_header(state, report, provenance, state.display());
+        let mut header = film_header(state, report, provenance);
         header.chunks.extend([
             SampleInputs::new(compiled, provenance.sampler).encode(),
             (SCHEDULE, schedule.encode()),

@@ -3,7 +3,7 @@
 
 use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
+use crate::image_file::{Depth, ImageOutput};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
@@ -34,15 +34,10 @@ impl RenderState {
         &self,
         report: &Report,
         provenance: &Provenance,
-        display: Display,
         depth: Depth,
         output: &ImageOutput,
     ) -> Result<(), WriteError> {
-        let metadata = &metadata(self, report, provenance, &display);
-        let group_names = &self.group_names();
-        let picture =
-            ImageData { size: self.scene().film.size, mix: &self.mix, group_names, display, depth };
-        output.write(&picture, &mut WholeFilm { film: &self.film, metadata })
+        output.write_film(&film_header(self, report, provenance), &self.film, depth)
     }
 }
 
@@ -63,28 +58,26 @@ pub fn film_header(
     state: &RenderState,
     report: &Report,
     provenance: &Provenance,
-    display: Display,
 ) -> FilmFileHeader {
     FilmFileHeader {
         film: state.film.header().clone(),
         weights: state.mix.clone(),
         group_names: state.group_names(),
-        display,
-        metadata: metadata(state, report, provenance, &display),
+        display: state.display(),
+        metadata: metadata(state, report, provenance),
         chunks: Default::default(),
     }
 }
 
 /// Returns the metadata of a picture file as pairs of key and value.
 pub fn metadata(
-    rendering: &RenderState,
+    state: &RenderState,
     report: &Report,
     provenance: &Provenance,
-    display: &Display,
 ) -> Vec<(String, String)> {
-    let biases = rendering.world.biases();
+    let biases = state.world.biases();
     let biased = if biases.is_empty() { "no".to_string() } else { biases.join("; ") };
-    let header = rendering.film.header();
+    let header = state.film.header();
     let (sampler, adaptive) = (provenance.sampler.name(), provenance.adaptive);
     let origin = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
@@ -92,7 +85,7 @@ pub fn metadata(
         ("Scene hash", provenance.scene_hash.clone()),
         ("Seed", header.seed.to_string()),
     ];
-    let settings = settings_text(sampler, &header.precision, adaptive, display);
+    let settings = settings_text(sampler, &header.precision, adaptive, &state.display());
     let method = [("Biased", biased), (SETTINGS, settings)];
     let entries = origin.into_iter().chain(film_entries(report)).chain(method);
     entries.map(|(key, value)| (key.to_string(), value)).collect()
@@ -118,8 +111,7 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries of a picture that depend on the film alone: samples per pixel,
-/// noise, and the numbers of bad samples (NaN or negative) and of saturated samples (above the
-/// film's limit).
+/// noise, and the numbers of bad samples and of saturated samples.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {

@@ -9,11 +9,11 @@ use std::sync::atomic::Ordering;
 use zerkalo_kernel::lanes::SimdFloat;
 use zerkalo_world::{AnyWorld, Counts, TileTracer, World};
 
-/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A (the first of two
-/// halves of the samples). The first stage traces every 8th pixel in x and y. Three further stages
-/// trace the pixels between, with steps of 4, 2 and 1. Each stage covers all tiles. Calls
-/// `on_stage` with the film after every stage except the last. If the pass is cancelled, it
-/// completes its first stage, starts no jobs of later stages, and returns `None`.
+/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A. The first stage
+/// traces every 8th pixel in x and y. Three further stages trace the pixels between, with steps of
+/// 4, 2 and 1. Each stage covers all tiles. Calls `on_stage` with the film after every stage except
+/// the last. If the pass is cancelled, it completes its first stage, starts no jobs of later
+/// stages, and returns `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -109,11 +109,10 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the first sample of the pixels that one stage of the first pass adds. A lattice with
-    /// the step n holds every n-th pixel in x and y. `steps` has two steps: that of the previous
-    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share ray
-    /// packets if the stage adds only few pixels to each. `counts` receives the ray counts of the
-    /// tiles.
+    /// Traces the first sample of the pixels that one stage of the first pass adds. `steps` has two
+    /// steps: that of the previous stage's lattice (0: none), and that of this one. `slots` are
+    /// adjacent tiles, which share ray packets if the stage adds only few pixels to each. `counts`
+    /// receives the ray counts of the tiles.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();

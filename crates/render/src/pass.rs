@@ -1,6 +1,5 @@
-//! Pass: traces the jobs of one wave and adds their samples to the film. A wave is a set of jobs
-//! that run concurrently, each with samples of one tile. The pass returns when all jobs are done or
-//! cancelled.
+//! Pass: traces the jobs of one wave and adds their samples to the film. The pass returns when all
+//! jobs are done or cancelled.
 
 use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::wave::{Job, JobReport, Wave, WaveReport};
@@ -25,9 +24,9 @@ pub struct PassContext<'a> {
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` (a set of jobs that run concurrently) and adds their samples to
-/// `film`. If `wave.estimate` is `true`, `estimator` computes the error of each tile. The report
-/// has an entry for each job, which is `None` if the job was cancelled.
+/// Traces the jobs of `wave` and adds their samples to `film`. If `wave.estimate` is `true`,
+/// `estimator` computes the error of each tile. The report has an entry for each job, which is
+/// `None` if the job was cancelled.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -99,11 +98,11 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of `job` in the replicate (half of the samples) with the number
-    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the number
-    /// of rays, and a flag that is `true` if a path made a random choice. A packet has `WIDTH`
-    /// lanes. It holds `WIDTH` samples of one pixel if its first sample index is a multiple of
-    /// `WIDTH` and at least `WIDTH` samples remain. Otherwise it holds samples of several pixels.
+    /// Traces the samples of `job` in the replicate with the number `replicate`, and adds them to
+    /// `tile`, whose first pixel is at `origin`. Returns the number of rays, and a flag that is
+    /// `true` if a path made a random choice. A packet has `WIDTH` lanes. It holds `WIDTH` samples
+    /// of one pixel if its first sample index is a multiple of `WIDTH` and at least `WIDTH` samples
+    /// remain. Otherwise it holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -310,7 +309,7 @@ mod tests {
     use super::*;
     use crate::film::Header;
     use crate::film::testing::TestFilm;
-    use zerkalo_kernel::lanes::{Float, Single, Vec3};
+    use zerkalo_kernel::lanes::{Float, Single};
     use zerkalo_kernel::sampling::SamplerKind;
 
     /// Checks that invalid samples are counted and stored as black, and that samples above the
@@ -341,7 +340,7 @@ mod tests {
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
             let mut rejected = RejectedSamples::new(0);
-            let mut radiance = Radiance { groups: [Vec3::<Single>::zero(); MAX_GROUPS] };
+            let mut radiance = Radiance::<Single>::black();
             radiance.groups[0].x =
                 Single::from_fn(|i| Float::from_f64(if i == 3 { value } else { 0.5 }));
             radiance.groups[1].y = Single::from_f64(0.25);

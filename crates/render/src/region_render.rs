@@ -2,13 +2,12 @@
 //! bottom.
 //!
 //! Each region has its own film and its own schedule. Its film uses the memory of the previous
-//! region's film. A sample is a function of seed, pixel, replicate (half of the samples) and index;
-//! a uniform render in regions therefore equals a render of the whole picture, bit for bit. An
-//! adaptive render in regions differs from that of the whole picture, because it allocates samples
-//! within each region.
+//! region's film. A sample is a function of seed, pixel, replicate and index; a uniform render in
+//! regions therefore equals a render of the whole picture, bit for bit. An adaptive render in
+//! regions differs from that of the whole picture, because it allocates samples within each region.
 
 use crate::export::{Provenance, metadata};
-use crate::film::{Display, Film, Noise, TileNoise};
+use crate::film::{Film, Noise, TileNoise};
 use crate::image_file::{Bands, Depth, ImageData, ImageOutput};
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
@@ -25,11 +24,10 @@ use zerkalo_scene::disk::WriteError;
 /// calls of the observer, a callback that receives reports on the progress.
 const PIECE_SECONDS: f64 = 0.25;
 /// Number of samples, over all pixels, of the first piece of a render in regions. A piece is the
-/// work between two calls of the observer (the progress callback). The first piece measures the
-/// speed of tracing.
+/// work between two calls of the observer. The first piece measures the speed of tracing.
 const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
-/// Largest number of samples per pixel of a tracing job (samples of one tile) in a region. Jobs are
-/// short, so that all threads have work until the end of a piece.
+/// Largest number of samples per pixel of a tracing job in a region. Jobs are short, so that all
+/// threads have work until the end of a piece.
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
 /// Callback that receives a report between two pieces of work and before each row is written. If it
@@ -44,7 +42,6 @@ pub struct RegionRender<'a> {
     settings: Settings,
     pool: rayon::ThreadPool,
     provenance: Provenance,
-    display: Display,
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
     /// Number of rows of the picture in the finished regions.
@@ -90,7 +87,6 @@ impl<'a> RegionRender<'a> {
             settings: Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings },
             pool,
             provenance,
-            display: options.display,
             rows,
             finished_rows: 0,
             estimates: Vec::new(),
@@ -113,7 +109,7 @@ impl<'a> RegionRender<'a> {
     ) -> Result<(Report, StoppedBy), WriteError> {
         let state = self.state();
         let (mix, group_names) = (&state.mix.clone(), &state.group_names());
-        let (size, display) = (state.scene().film.size, self.display);
+        let (size, display) = (state.scene().film.size, state.display());
         output.write(&ImageData { size, mix, group_names, display, depth }, self)?;
         Ok((self.report.clone(), self.stopped_by))
     }
@@ -225,6 +221,6 @@ impl Bands for RegionRender<'_> {
     }
 
     fn metadata(&self) -> Vec<(String, String)> {
-        metadata(self.state(), &self.report, &self.provenance, &self.display)
+        metadata(self.state(), &self.report, &self.provenance)
     }
 }

@@ -6,8 +6,7 @@ use std::sync::Arc;
 use zerkalo_scene::Scene;
 use zerkalo_world::LightGroups;
 
-/// Light groups of a film (lights that share one weight), and the scene for which the film's
-/// samples were traced.
+/// Light groups of a film, and the scene for which the film's samples were traced.
 #[derive(Clone, Debug)]
 pub struct Relighting {
     compiled: Arc<Scene>,

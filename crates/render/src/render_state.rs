@@ -209,8 +209,8 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave, a set of jobs that run concurrently, and adds the samples to the film. If
-    /// `cancel_wave` becomes `true`, no further job starts.
+    /// Traces a wave, and adds the samples to the film. If `cancel_wave` becomes `true`, no further
+    /// job starts.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

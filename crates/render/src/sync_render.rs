@@ -43,9 +43,9 @@ impl SyncRender {
     }
 
     /// Traces the next allocation round: the samples that the schedule adds next, in both
-    /// replicates (halves of the samples). Estimates the error of the picture if the schedule
-    /// requests an estimate at the end of this round. Returns the stop criterion that ended the
-    /// render, or `None` if it continues.
+    /// replicates. Estimates the error of the picture if the schedule requests an estimate at the
+    /// end of this round. Returns the stop criterion that ended the render, or `None` if it
+    /// continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {

@@ -1,11 +1,9 @@
-//! Waves: sets of jobs that are traced concurrently. An allocation round (one decision of the
-//! schedule on the next samples of all tiles) is traced as two or more waves. Each replicate (half
-//! of the samples) has at least one of them.
+//! Waves: sets of jobs that are traced concurrently. An allocation round is traced as two or more
+//! waves. Each replicate has at least one of them.
 
 use crate::film::{TILE_PIXELS, TileNoise};
 
-/// Tracing job: the samples `first..first + count` of one replicate (half of the samples), in every
-/// pixel of one tile.
+/// Tracing job: the samples `first..first + count` of one replicate, in every pixel of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
     /// Number of the tile that the job samples; tiles are numbered row by row.
@@ -20,20 +18,19 @@ pub struct Job {
 /// wave has at most one job for each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wave {
-    /// Replicate (half of the samples) to which the samples are added: 0 for A, 1 for B.
+    /// Replicate to which the samples are added: 0 for A, 1 for B.
     pub replicate: usize,
     /// Tracing jobs of the wave, in any order.
     pub jobs: Vec<Job>,
-    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B (the
-    /// second half of the samples) set it. The estimate needs equally many samples in both
-    /// replicates, and B is traced after A.
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B set
+    /// it. The estimate needs equally many samples in both replicates, and B is traced after A.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Cuts a piece from the wave (a set of concurrent jobs). Each job is shortened to at most
-    /// `longest` samples per pixel. The piece has only the first of these jobs: just enough to
-    /// trace `pixel_samples` samples, summed over all pixels, and at least one job.
+    /// Cuts a piece from the wave. Each job is shortened to at most `longest` samples per pixel.
+    /// The piece has only the first of these jobs: just enough to trace `pixel_samples` samples,
+    /// summed over all pixels, and at least one job.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -60,7 +57,7 @@ pub struct JobReport {
     pub error: Option<TileNoise>,
 }
 
-/// Results of the jobs of a wave, a set of jobs that run concurrently.
+/// Results of the jobs of a wave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveReport {
     /// Reports on the jobs of the wave, in the order of its jobs. `None` for a job that was

@@ -15,6 +15,7 @@ mod input_reader;
 mod restorer;
 mod screen;
 mod sequence;
+mod signals;
 #[cfg(test)]
 mod tests;
 
@@ -26,6 +27,7 @@ pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
+pub use signals::{HUNG_UP, SignalEvent, SignalQueue, Signals};
 
 /// Event to which terminal input is decoded.
 #[derive(Clone, Debug, PartialEq)]

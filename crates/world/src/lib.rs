@@ -21,9 +21,10 @@ mod truncation_bias;
 mod world;
 
 pub use any_world::{AnyWorld, Options, Precision, requires_double};
+pub use integrator::KERNELS;
 pub use integrator::first_hit::FirstHit;
 pub use integrator::path::{Counts, Path, Radiance};
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
 pub use tile_tracer::{CameraTracer, TileTracer, TracedPacket};
-pub use world::{KERNELS, World};
+pub use world::World;

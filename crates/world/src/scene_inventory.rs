@@ -5,7 +5,7 @@ use crate::integrator::surface_textures::SurfaceTextures;
 use crate::light_groups::LightGroupSource;
 use crate::world::World;
 use zerkalo_kernel::lanes::SimdFloat;
-use zerkalo_scene::material::{Bsdf, ReflectionLobe, SpecularModel, Transmission};
+use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel, Transmission};
 use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
@@ -16,10 +16,20 @@ pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     let any_specular =
         |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
     let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
-        bsdfs.iter().any(|bsdf| bsdf.reflection.as_ref().is_some_and(|(_, lobe)| test(lobe)))
+        bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
     };
-    let any_transmission = |test: fn(&Transmission<L::Scalar>) -> bool| {
-        bsdfs.iter().filter_map(|bsdf| bsdf.transmission.as_ref()).any(test)
+    let any_transmission = |dielectric: bool| {
+        let is_kind = |t: &Transmission<L::Scalar>| t.dielectric == dielectric;
+        bsdfs.iter().any(|bsdf| bsdf.transmission.as_ref().is_some_and(is_kind))
+    };
+    let any_facets = |test: fn(&FacetNormals) -> bool| {
+        let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
+        bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
+            ReflectionLobe::MicrofacetDistribution(facets) => test(&facets.normals),
+            ReflectionLobe::Mirror
+            | ReflectionLobe::Cone { .. }
+            | ReflectionLobe::Square { .. } => false,
+        })
     };
     let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
     let mut parts = vec![world.geometry.to_string()];
@@ -34,17 +44,11 @@ pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),
-        (
-            any_lobe(|lobe| matches!(lobe, ReflectionLobe::MicrofacetDistribution(d) if !d.ggx)),
-            "Beckmann lobe",
-        ),
-        (
-            any_lobe(|lobe| matches!(lobe, ReflectionLobe::MicrofacetDistribution(d) if d.ggx)),
-            "GGX lobe",
-        ),
-        (any_transmission(|t| !t.dielectric), "transmission"),
-        (any_transmission(|t| t.dielectric), "dielectric"),
-        (any_transmission(|t| !matches!(t.lobe, ReflectionLobe::Mirror)), "rough transmission"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Beckmann)), "Beckmann lobe"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Ggx)), "GGX lobe"),
+        (any_transmission(false), "transmission"),
+        (any_transmission(true), "dielectric"),
+        (bsdfs.iter().any(|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
         (bsdfs.iter().any(Bsdf::absorbs), "absorption"),
         (absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)), "absorbing horizon"),
     ]));

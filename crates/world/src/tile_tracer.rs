@@ -3,7 +3,6 @@
 
 use crate::culling::tile::TileCandidates;
 use crate::integrator::path::{Counts, Path, Radiance};
-use crate::light_groups::MAX_GROUPS;
 use crate::pixel_block::PixelBlock;
 use crate::world::World;
 use std::ops::Range;
@@ -55,8 +54,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
             sampler: &self.sampler,
             candidates: None,
             pixels: PixelBlock::new(&self.world.camera, &self.sampler, replicate, pixels),
-            radiance: Radiance { groups: [Vec3::zero(); MAX_GROUPS] },
-            counts: Counts::default(),
+            radiance: Radiance::black(),
         }
     }
 }
@@ -69,7 +67,6 @@ pub struct TileTracer<'a, L: SimdFloat> {
     candidates: Option<TileCandidates>,
     pixels: PixelBlock<L::Scalar>,
     radiance: Radiance<L>,
-    counts: Counts,
 }
 
 impl<L: SimdFloat> TileTracer<'_, L> {
@@ -117,10 +114,9 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Returns two values: the number of rays traced so far, and a flag that is `true` if a path
-    /// has made a random choice (see [`Counts`]).
+    /// Returns the work of all packets that were traced so far.
     pub fn counts(&self) -> Counts {
-        self.counts
+        self.radiance.counts
     }
 
     #[inline(always)]
@@ -143,9 +139,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
             path.ray = Ray { origin, direction };
         }
         let candidates = self.candidates.as_ref();
-        let counts = world.trace(&mut path, candidates, sampler, active, &mut self.radiance);
-        self.counts.rays += counts.rays;
-        self.counts.glossy |= counts.glossy;
+        world.trace(&mut path, candidates, sampler, active, &mut self.radiance);
     }
 }
 

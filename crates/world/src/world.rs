@@ -2,21 +2,17 @@
 
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::tile::{CullingMode, TileCandidates};
-use crate::integrator::first_hit::{self, FirstHit};
-use crate::integrator::indirect_diffuse::{DiffuseLimits, trace_generations};
+use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
-use crate::integrator::opaque::trace_opaque;
-use crate::integrator::path::{Counts, Path, Radiance};
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::light_choice::LightChoice;
 use crate::light_groups::LightGroups;
 use crate::lights_on_surfaces::OnSurface;
 use crate::surface_emission::SurfaceEmission;
 use crate::tile_tracer::CameraTracer;
-use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
-use zerkalo_kernel::sampling::{CameraDimensions, PacketSampler, SampleSettings};
+use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings};
 use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::{DeltaLight, Emitter, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
@@ -214,60 +210,10 @@ impl<L: SimdFloat> World<L> {
             && !self.environments.iter().any(|source| source.visible)
     }
 
-    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside of `active`
-    /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
-    /// their hit points are tested against; `None` means all primitives.
+    /// Returns the lanes whose paths continue with `throughput`.
     #[inline(always)]
-    pub fn trace(
-        &self,
-        path: &mut Path<L>,
-        candidates: Option<&TileCandidates>,
-        sampler: &PacketSampler<'_, L>,
-        active: L::Mask,
-        out: &mut Radiance<L>,
-    ) -> Counts {
-        for group in &mut out.groups[..self.groups()] {
-            *group = Vec3::zero();
-        }
-        let candidates = candidates.unwrap_or(&self.all_candidates);
-        if let Some(limits) = self.diffuse_limits {
-            return trace_generations(self, limits, path.ray, candidates, sampler, active, out);
-        }
-        if let Some(nested_dielectrics) = &self.nested_dielectrics {
-            let mut start = Branch::camera(path.ray, active);
-            nested_dielectrics.add_at_start(&path.ray, &mut start.media);
-            TransmissionIntegrator { world: self, nested_dielectrics, sampler }
-                .trace(&mut start, self.depth, candidates, None, out)
-        } else {
-            let trace = match (self.simple, !self.has_emitters()) {
-                (true, true) => trace_opaque::<_, true, false>,
-                (false, true) => trace_opaque::<_, false, false>,
-                (_, false) => trace_opaque::<_, false, true>,
-            };
-            trace(self, (path, active, self.depth), candidates, sampler, None, out)
-        }
-    }
-
-    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a position in the picture: a column and a row in pixels, with
-    /// fractions.
-    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
-        first_hit::trace_first_hits(self, points, hits);
+    pub(super) fn reaches_min_weight(&self, throughput: Vec3<L>) -> L::Mask {
+        let max_throughput = throughput.max_element();
+        max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(self.min_weight))
     }
 }
-
-/// Type of [`World::trace`] for the SIMD type `L`.
-type Trace<L> = fn(
-    &World<L>,
-    &mut Path<L>,
-    Option<&TileCandidates>,
-    &PacketSampler<'_, L>,
-    <L as SimdFloat>::Mask,
-    &mut Radiance<L>,
-) -> Counts;
-
-/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate
-/// the machine code of the kernels in this crate, so that other crates call it instead of
-/// generating their own.
-#[doc(hidden)]
-pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

@@ -6,8 +6,7 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
-use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, read_scene_and_warn};
+use crate::command::{Failure, handle_signals, print_line, read_scene_and_warn};
 use crate::measure::{self, Experiment, Plan, Reference};
 use indicatif::ProgressBar;
 use std::path::Path;
@@ -56,7 +55,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let world = AnyWorld::compile(&scene, &world::Options::default());
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
         bar.set_length(progress.total as u64);

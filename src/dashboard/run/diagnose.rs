@@ -1,13 +1,13 @@
 //! Diagnostics of the terminal and its connection, without visible output.
 
-use crate::dashboard::run::signals::{block, watch};
+use crate::dashboard::run::job_control::handle_signals;
 use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
 use zerkalo_terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use zerkalo_terminal::{
-    Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, Tty, cell_px,
-    cursor_request, query_capabilities, size,
+    Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, SignalQueue, Tty,
+    cell_px, cursor_request, query_capabilities, size,
 };
 
 /// Timeout for a reply to a request that the terminal may not support.
@@ -45,10 +45,10 @@ pub struct TerminalReport {
 /// Fails if there is no terminal, or the terminal is closed during the query.
 pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not support.
-    let signals = block()?;
+    let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
-    watch(signals, screen.tty(), Duration::ZERO)?;
+    handle_signals(signals, screen.tty(), Duration::ZERO)?;
     let mut input = InputReader::new(&environment);
     let mut terminal = query_capabilities(&tty, &mut input, environment, &|| false)?;
     let multiplexer = terminal.environment.multiplexer;

@@ -3,7 +3,7 @@
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::run::image_upload::ImageUpload;
+use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
 use ratatui::buffer::Buffer;

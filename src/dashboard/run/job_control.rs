@@ -1,13 +1,23 @@
 //! Job control by the shell (suspend and resume), resizing, and loss of the terminal.
 
 use crate::dashboard::message::Message;
-use crate::dashboard::run::Dashboard;
-use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, stop_process};
+use crate::dashboard::run::event_loop::Dashboard;
 use crossbeam_channel::Receiver;
+use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use std::io;
 use std::sync::Arc;
+use std::thread;
 use std::time::Duration;
-use zerkalo_terminal::{TimedEvent, Tty, size};
+use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
+
+/// Grace period after a terminating signal. If the dashboard has not ended by then, the thread that
+/// handles signals restores the terminal and ends the program.
+pub const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Longest time from a terminating signal to the end of the dashboard, even if the renderer is
+/// busy. It is so much shorter than the grace period that the program can still report where
+/// unsaved edits are kept.
+pub const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
@@ -51,6 +61,33 @@ impl ResizeDebounce {
     pub fn due(&self) -> Option<Duration> {
         self.0.map(|(first, last)| (last + SETTLED).min(first + LONGEST))
     }
+}
+
+/// Handles the signals in `queue`. If the program is still running when `patience` has passed after
+/// a terminating signal, restores the terminal and ends the program.
+pub fn handle_signals(
+    queue: SignalQueue,
+    tty: Arc<Tty>,
+    patience: Duration,
+) -> io::Result<Signals> {
+    queue.handle(move |status| {
+        thread::sleep(patience);
+        tty.leave();
+        std::process::exit(status.into());
+    })
+}
+
+/// Stops this process, which may still run for a moment after this function returns. The signal is
+/// SIGTTIN, because SIGTSTP has a handler in this program. Nothing happens if no shell could
+/// continue the process: the kernel ignores SIGTTIN in orphaned process groups.
+pub fn stop_process() -> rustix::io::Result<()> {
+    kill_process(getpid(), Signal::TTIN)
+}
+
+/// Stops all processes in the group of this process as [`stop_process`] does. Ctrl-Z in a shell
+/// suspends such a group.
+pub fn stop_group() -> rustix::io::Result<()> {
+    kill_current_process_group(Signal::TTIN)
 }
 
 impl Dashboard {

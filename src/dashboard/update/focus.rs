@@ -8,8 +8,8 @@ use zerkalo_scene::edit;
 
 impl UpdateContext<'_> {
     /// Enters `mode`, which determines the effect of the arrow keys, and gives the focus to the
-    /// picture. If the mode moves or turns the selection and the selection cannot be moved or
-    /// turned, reports an error instead.
+    /// picture. If the mode moves or rotates the selection and the selection cannot be moved or
+    /// rotated, reports an error instead.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let (scene, selection) = (self.scene(), &self.model.selection);
         let tried = match mode {

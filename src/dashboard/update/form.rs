@@ -75,7 +75,7 @@ impl UpdateContext<'_> {
         self.record(edit, Coalesce::Single);
         self.select(form.subject);
         let label = self.model.selection.label(self.scene());
-        self.say(format!("{label} added · m moves it · r turns it · u undoes"));
+        self.say(format!("{label} added · m moves it · r rotates it · u undoes"));
     }
 
     /// Closes the form and restores the scene and the selection from before it was opened.

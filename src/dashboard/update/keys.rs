@@ -83,10 +83,10 @@ impl UpdateContext<'_> {
     /// Runs a command if it is available. Otherwise shows the reason why it is not: there is no
     /// scene, or `zerkalo watch` cannot edit or render.
     pub(super) fn run(&mut self, command: &Command) {
-        if self.model.watch.is_some() && !command.while_watching {
-            self.refuse("Read-only: `zerkalo watch` edits and renders nothing · ? keys");
-        } else if (command.available)(self.model) {
+        if (command.available)(self.model) {
             (command.run)(self);
+        } else if self.model.watch.is_some() {
+            self.refuse("Read-only: `zerkalo watch` edits and renders nothing · ? keys");
         } else {
             self.refuse("No scene: fix the errors in its file first");
         }

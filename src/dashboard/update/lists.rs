@@ -25,11 +25,10 @@ impl UpdateContext<'_> {
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let list = self.model.overlay_layout().map(|layout| layout.list);
         let (width, rows) = list.map_or((1, 1), |list| (list.width, usize::from(list.height)));
-        let inventory = self.model.inventory(width).len();
+        let [help, inventory] = [help(self.model).len(), self.model.inventory(width).len()];
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
-                let lines = help(self.model.watch.is_some()).len();
-                *scroll = moved(*scroll, steps, lines.saturating_sub(rows) + 1);
+                *scroll = moved(*scroll, steps, help.saturating_sub(rows) + 1);
             }
             Some(Overlay::Inventory { scroll }) => {
                 *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
@@ -138,17 +137,16 @@ impl UpdateContext<'_> {
     pub(super) fn open_command_palette(&mut self) {
         self.model.overlay = Some(Overlay::CommandPalette(CommandPalette {
             editor: Editor::default(),
-            found: self.offered().map(|(i, _)| i).collect(),
+            found: self.offered().into_iter().map(|(i, _)| i).collect(),
             cursor: 0,
             scroll: 0,
         }));
     }
 
-    /// Iterates over the commands that the command palette offers, each with its index in the
-    /// command table.
-    fn offered(&self) -> impl Iterator<Item = (usize, &'static Command)> + use<> {
-        let watching = self.model.watch.is_some();
-        COMMANDS.iter().enumerate().filter(move |(_, row)| row.while_watching || !watching)
+    /// Returns the commands that the command palette offers, each with its index in the command
+    /// table.
+    fn offered(&self) -> Vec<(usize, &'static Command)> {
+        COMMANDS.iter().enumerate().filter(|(_, command)| command.is_listed(self.model)).collect()
     }
 
     /// Updates the command palette's list to the commands that match the search text, best match
@@ -161,6 +159,7 @@ impl UpdateContext<'_> {
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
         let mut found: Vec<(u32, usize)> = offered
+            .into_iter()
             .filter_map(|(i, row)| {
                 let line = format!("{} {}", row.label, row.chapter);
                 let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;

@@ -58,7 +58,7 @@ impl UpdateContext<'_> {
         let Some(layout) = self.model.layout() else { return };
         if is_in(mouse, layout.picture) {
             self.model.focus = Focus::Picture;
-            if !self.moves_or_turns() {
+            if !self.moves_or_rotates() {
                 self.end_gesture();
             }
             let Mouse { column, row, modified, .. } = mouse;
@@ -146,7 +146,7 @@ impl UpdateContext<'_> {
         match (self.model.mode, other) {
             (Mode::Probe, _) => self.probe_at(mouse),
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
-            (Mode::Rotate, false) => self.turn_by(right * 2.0),
+            (Mode::Rotate, false) => self.rotate_by(right * 2.0),
             (Mode::Fly, false) => self.look_by_hand(right, down),
             (Mode::Orbit, false) => self.orbit_by_hand(right, down),
             (_, true) => self.pan_by_hand(right, down),
@@ -156,7 +156,7 @@ impl UpdateContext<'_> {
     fn released(&mut self, mouse: Mouse) {
         let Some(drag) = self.model.drag.take() else { return };
         if drag.moved {
-            if !self.moves_or_turns() {
+            if !self.moves_or_rotates() {
                 self.end_gesture();
             }
         } else if self.model.overlay.is_none() {
@@ -166,7 +166,7 @@ impl UpdateContext<'_> {
 
     /// Returns `true` if the current mode moves or rotates the selection. In such a mode, all edits
     /// with the same label form one undo step.
-    fn moves_or_turns(&self) -> bool {
+    fn moves_or_rotates(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
 

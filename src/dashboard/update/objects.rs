@@ -1,13 +1,13 @@
-//! Commands that move, turn, duplicate and delete the selected part of the scene.
+//! Commands that move, rotate, duplicate and delete the selected part of the scene.
 
 use crate::dashboard::model::Mode;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
-/// Angle in degrees of one step of turning the selection.
-const TURN_DEGREES: f64 = 15.0;
-const TURN_DEGREES_FINE: f64 = 1.0;
+/// Angle in degrees of one step of rotating the selection.
+const ROTATE_DEGREES: f64 = 15.0;
+const ROTATE_DEGREES_FINE: f64 = 1.0;
 /// Largest factor by which a drag multiplies the movement of the selection in depth. The view
 /// direction meets the ground plane at an angle, so depth appears shortened by the sine of this
 /// angle. The selection stays under the mouse if its movement is divided by this sine. The quotient
@@ -45,7 +45,7 @@ impl UpdateContext<'_> {
     }
 
     /// Returns the rule by which the current edit joins an undo step. During a drag, and in a mode
-    /// that moves or turns the selection, all edits with the same label form one step. Otherwise an
+    /// that moves or rotates the selection, all edits with the same label form one step. Otherwise an
     /// edit joins one with the same label that was made shortly before.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
@@ -78,14 +78,15 @@ impl UpdateContext<'_> {
         self.move_by(by);
     }
 
-    pub(super) fn turn_selection(&mut self, direction: Direction, step_size: StepSize) {
-        let degrees = if step_size == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
-        // A positive angle turns counter-clockwise as seen from above. The side of the object that
+    pub(super) fn rotate_selection(&mut self, direction: Direction, step_size: StepSize) {
+        let degrees =
+            if step_size == StepSize::Fine { ROTATE_DEGREES_FINE } else { ROTATE_DEGREES };
+        // A positive angle rotates counter-clockwise as seen from above. The side of the object that
         // faces the viewer then moves to the right.
-        self.turn_by(if direction == Direction::Right { degrees } else { -degrees });
+        self.rotate_by(if direction == Direction::Right { degrees } else { -degrees });
     }
 
-    pub(super) fn turn_by(&mut self, degrees: f64) {
+    pub(super) fn rotate_by(&mut self, degrees: f64) {
         let edit = edit::rotate(self.scene(), &self.model.selection, degrees);
         self.commit(edit, self.gesture());
     }

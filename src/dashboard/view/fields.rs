@@ -4,11 +4,9 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::{FieldList, Model};
 use crate::dashboard::panel_lines::{FieldLine, PanelLine};
-use crate::dashboard::view::frame::{panel, window};
+use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::text::{Row, columns, paragraphs, skip};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
@@ -39,45 +37,42 @@ pub struct Fields<'a> {
 
 /// Draws the inspector, or nothing if the panel is hidden. Returns the position of the text cursor,
 /// or `None` if the cursor is hidden.
-pub fn inspector(
-    model: &Model,
-    layout: &Layout,
-    theme: &Theme,
-    buffer: &mut Buffer,
-) -> Option<Position> {
+pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<Position> {
     let area = layout.inspector?;
     let (list, help) = model.inspector_rows()?;
     let active = is_active(model, Focus::Inspector);
-    panel(area, &model.selection.title(model.scene()), active, theme, buffer);
+    painter.panel(area, &model.selection.title(model.scene()), active);
     let lines = model.field_lines();
     let fields =
         Fields { lines: &lines, list, help, state: &model.inspector, problem: None, active };
-    fields.draw(theme, buffer)
+    fields.draw(painter)
 }
 
 impl Fields<'_> {
     /// Draws the list of properties. Returns the position of the text cursor, or `None` if the
     /// cursor is hidden.
-    pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
+    pub fn draw(&self, painter: &mut Painter) -> Option<Position> {
         let label = |line: &PanelLine| {
             line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
         };
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
         let mut typing = None;
-        let border = theme.border(self.active);
-        for (row, i) in window(self.list, self.state.scroll, self.lines.len(), border, buffer) {
-            let to = Row::new(buffer, self.list, row);
-            match &self.lines[i] {
-                PanelLine::Heading(title) => heading(to, title, theme),
+        let border = painter.theme.border(self.active);
+        let visible = painter.window(self.list, self.state.scroll, self.lines.len(), border);
+        for VisibleLine { row, index } in visible {
+            let to = painter.row(self.list, row);
+            match &self.lines[index] {
+                PanelLine::Heading(title) => heading(to, title),
                 PanelLine::Entry(field) => {
-                    let position = self.field(field, i == self.state.cursor, labels, to, theme);
+                    let chosen = self.active && index == self.state.cursor;
+                    let position = self.field(field, chosen, labels, to);
                     typing = typing.or(position);
                 }
             }
         }
         if self.active {
-            self.say(theme, buffer);
+            self.say(painter);
         }
         typing
     }
@@ -88,9 +83,8 @@ impl Fields<'_> {
         chosen: bool,
         labels: usize,
         mut to: Row,
-        theme: &Theme,
     ) -> Option<Position> {
-        let chosen = chosen && self.active;
+        let theme = to.theme;
         let (name, value) = match (chosen, field.property.is_default) {
             (true, _) => (theme.selected(true), theme.selected(true)),
             (false, true) => (theme.dim(), theme.dim()),
@@ -103,7 +97,7 @@ impl Fields<'_> {
         to.skip(indent.min(labels));
         to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
         if let Some(editor) = self.state.editor.as_ref().filter(|_| chosen) {
-            return typed(editor, &mut to, theme);
+            return typed(editor, &mut to);
         }
         let swatch =
             field.swatch.and_then(|color| theme.swatch(Display::default().levels_8(color)));
@@ -130,7 +124,8 @@ impl Fields<'_> {
     /// Draws help on the property under the cursor. If a new value of the property was refused, the
     /// help is the reason. Otherwise it is the property's description and a description of its
     /// valid values.
-    fn say(&self, theme: &Theme, buffer: &mut Buffer) {
+    fn say(&self, painter: &mut Painter) {
+        let theme = painter.theme;
         let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::entry) else {
             return;
         };
@@ -144,7 +139,7 @@ impl Fields<'_> {
             ],
         };
         texts.retain(|(text, _)| !text.is_empty());
-        paragraphs(self.help.inner(Margin::new(1, 0)), &texts, buffer);
+        painter.paragraphs(self.help.inner(Margin::new(1, 0)), &texts);
     }
 }
 
@@ -160,7 +155,8 @@ fn expected(property: &Property) -> String {
 }
 
 /// Draws the heading `title` with a line up to the last column but one of the row `to`.
-pub fn heading(mut to: Row, title: &str, theme: &Theme) {
+pub fn heading(mut to: Row, title: &str) {
+    let theme = to.theme;
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
     let left = to.left().saturating_sub(1);
     to.put(&"─".repeat(left), theme.border(false));
@@ -168,15 +164,15 @@ pub fn heading(mut to: Row, title: &str, theme: &Theme) {
 
 /// Draws the text of `editor` in the free columns of the row `to`. Returns the position of the text
 /// cursor, or `None` if there is no room.
-pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
+pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
         return None;
     }
     let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
-        Some(_) => theme.bad(),
-        None => theme.accent(),
+        Some(_) => to.theme.bad(),
+        None => to.theme.accent(),
     });
     let (x, y) = (to.x, to.y);
     to.put_wide(skip(editor.text(), hidden), width, style);

@@ -1,9 +1,8 @@
 //! Legend of pictures in false colour.
 
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
@@ -45,10 +44,10 @@ impl Legend {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of the row `row` of `area`. Omits the unit if there is no
+    /// Draws the legend at the right end of the row `line`. Omits the unit if there is no
     /// room for it. Draws nothing if even the legend without the unit does not fit.
-    pub fn draw(&self, area: Rect, row: u16, theme: &Theme, buffer: &mut Buffer) {
-        let mut line = Row::new(buffer, area, row);
+    pub fn draw(&self, mut line: Row) {
+        let theme = line.theme;
         let words = columns(&self.unit) + 1;
         let (width, with_words) = match line.left() {
             left if left >= self.columns() => (self.columns(), true),
@@ -57,13 +56,13 @@ impl Legend {
         };
         line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
         line.put(" ", theme.text());
-        let bar = Rect { x: line.x, y: area.y + row, width: BAR as u16, height: 1 };
+        let bar = Rect { x: line.x, y: line.y, width: BAR as u16, height: 1 };
         line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
         if with_words {
             line.put(" ", Style::new()).put(&self.unit, theme.dim());
         }
         line.put(" ", Style::new());
-        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, buffer);
+        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, line.buffer);
     }
 }
 

@@ -10,24 +10,26 @@ mod legend;
 mod message_view;
 mod outline;
 mod overlay;
+mod painter;
 mod picture;
 mod pixel_probe;
 mod plot;
 mod status;
 #[cfg(test)]
 mod tests;
-mod text;
 mod theme;
 mod watch;
 
 use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::text;
+use painter::Painter;
 use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use text::Row;
+use ratatui::style::Style;
 use theme::Theme;
 use zerkalo_terminal::cells::{Colors, PictureCells};
 
@@ -67,11 +69,12 @@ impl View {
     /// Returns the position of the text cursor, or `None` if the cursor is hidden.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme { colors: model.colors };
+        let painter = &mut Painter { theme, buffer };
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
-            let cells = image_viewer::draw(model, viewed, &theme, buffer);
+            let cells = image_viewer::draw(model, viewed, painter);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
                 (Some(cells), Some(image)) => {
-                    picture::visible_mask(&cells, image.layout.place, buffer)
+                    picture::visible_mask(&cells, image.layout.place, painter.buffer)
                 }
                 _ => (Rect::ZERO, Vec::new()),
             };
@@ -79,36 +82,36 @@ impl View {
         }
         (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         let Some(layout) = model.layout() else {
-            too_small(model.screen, buffer);
+            too_small(model.screen, painter);
             return None;
         };
         self.picture(model, &layout);
-        frame::draw(model, &layout, self.imager.legend.as_ref(), &theme, buffer);
+        frame::draw(model, &layout, self.imager.legend.as_ref(), painter);
         if model.file.unreadable {
-            message_view::broken(model, &layout, &theme, buffer);
+            message_view::broken(model, &layout, painter);
         } else {
-            picture::paint(&self.picture, layout.image, buffer);
-            message_view::failure(model, &layout, &theme, buffer);
-            pixel_probe::draw(model, &layout, &theme, buffer);
+            picture::paint(&self.picture, layout.image, painter.buffer);
+            message_view::failure(model, &layout, painter);
+            pixel_probe::draw(model, &layout, painter);
         }
-        status::draw(model, layout.status, &theme, buffer);
-        status::hints_line(model, layout.hints, &theme, buffer);
+        status::draw(model, layout.status, painter);
+        status::hints_line(model, layout.hints, painter);
         // An open form replaces the panels: outline, inspector and plot are not drawn then.
         let mut cursor = None;
         if model.watch.is_some() {
-            watch::draw(model, &layout, &theme, buffer);
-            plot::draw(model, &layout, &theme, buffer);
+            watch::draw(model, &layout, painter);
+            plot::draw(model, &layout, painter);
         } else if !matches!(model.overlay, Some(Overlay::Form(_))) {
-            outline::draw(model, &layout, &theme, buffer);
-            cursor = fields::inspector(model, &layout, &theme, buffer);
-            plot::draw(model, &layout, &theme, buffer);
+            outline::draw(model, &layout, painter);
+            cursor = fields::inspector(model, &layout, painter);
+            plot::draw(model, &layout, painter);
         }
         if model.overlay.is_some() {
-            cursor = overlay::draw(model, &theme, buffer);
+            cursor = overlay::draw(model, painter);
         }
         if !model.file.unreadable {
             (self.place, self.uncovered) =
-                picture::visible_mask(&self.picture, layout.image, buffer);
+                picture::visible_mask(&self.picture, layout.image, painter.buffer);
         }
         cursor
     }
@@ -121,17 +124,17 @@ fn is_active(model: &Model, focus: Focus) -> bool {
 }
 
 /// Draws a message on a terminal that is too small.
-fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
+fn too_small([width, height]: [u16; 2], painter: &mut Painter) {
     let [columns, rows] = SMALLEST;
-    let text = format!(
+    let message = format!(
         "zerkalo needs at least {columns} columns and {rows} rows; this terminal has {width} and \
          {height}."
     );
-    let lines = crate::dashboard::overlay_layout::wrapped(&text, width.max(1));
+    let lines = text::wrapped(&message, width.max(1));
     let area = Rect { x: 0, y: 0, width, height };
     let top = height.saturating_sub(lines.len() as u16) / 2;
     for (row, line) in (top..).zip(&lines) {
         let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;
-        Row::new(buffer, area, row).skip(indent).put(line, ratatui::style::Style::new());
+        painter.row(area, row).skip(indent).put(line, Style::new());
     }
 }

@@ -2,10 +2,8 @@
 
 use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
-use crate::dashboard::view::frame::overlay;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::painter::Painter;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;
@@ -15,7 +13,8 @@ use zerkalo_scene::edit::Target;
 const WIDTH: u16 = 36;
 
 /// Draws the pixel probe: a mark and a box with values. Draws nothing if no pixel is probed.
-pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let Some([x, y]) = model.probe else { return };
     let film = model.scene().film.size;
     // The half cell that shows the pixel.
@@ -24,12 +23,12 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     };
     let column = layout.image.x + place(x, film[0], layout.raster[0]);
     let row = layout.image.y + place(y, film[1], layout.raster[1]) / 2;
-    mark(column, row, theme, buffer);
+    mark(column, row, painter);
     let lines = readout(model);
     let height = lines.len() as u16 + 2;
     let area = layout.picture;
     if area.width < WIDTH + 4 || area.height < height + 4 {
-        let mut row = Row::new(buffer, area, area.height.saturating_sub(1));
+        let mut row = painter.row(area, area.height.saturating_sub(1));
         row.skip(2);
         for (name, value) in lines.iter().take(2) {
             row.put(&format!(" {name} {value} "), theme.text());
@@ -44,10 +43,10 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let bottom = area.y + area.height - height - 1;
     let y_box = if row < area.y + area.height / 2 { bottom } else { top };
     let frame = Rect { x: x_box, y: y_box, width: WIDTH, height };
-    overlay(frame, &format!("pixel {x}, {y}"), theme, buffer);
+    painter.overlay(frame, &format!("pixel {x}, {y}"));
     let inner = frame.inner(BORDER);
     for (i, (name, value)) in (0..).zip(&lines) {
-        let mut row = Row::new(buffer, inner, i);
+        let mut row = painter.row(inner, i);
         row.skip(1).put_wide(name, 10, theme.dim());
         if i == 1
             && let Some(probe) = model.probed()
@@ -94,8 +93,8 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
 }
 
 /// Draws a cross in a cell, in a colour that contrasts with the cell.
-fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
-    let Some(cell) = buffer.cell_mut((column, row)) else { return };
+fn mark(column: u16, row: u16, painter: &mut Painter) {
+    let Some(cell) = painter.buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
         _ => false,
@@ -103,7 +102,7 @@ fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
     // The cross covers both half cells, so its colour must contrast with both.
     let style = match (cell.bg, cell.fg) {
         (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
-            theme.accent()
+            painter.theme.accent()
         }
         (bg @ Color::Rgb(..), _) if light(bg) => Style::new().fg(Color::Rgb(0, 0, 0)),
         (Color::Rgb(..), _) => Style::new().fg(Color::Rgb(255, 255, 255)),

@@ -3,10 +3,8 @@
 
 use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
-use crate::dashboard::view::frame::panel;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::painter::Painter;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
@@ -68,20 +66,20 @@ fn label(value: f64) -> String {
 }
 
 /// Draws the convergence plot. Draws nothing if the layout has no area for it.
-pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let Some(area) = layout.plot else { return };
-    panel(area, "convergence", false, theme, buffer);
+    painter.panel(area, "convergence", false);
     let inner = area.inner(BORDER);
     let points = &model.convergence.points;
     let Some(last) = points.last() else {
         let middle = inner.height / 2;
         let text = "no estimate of the noise yet";
         let indent = usize::from(inner.width).saturating_sub(columns(text)) / 2;
-        Row::new(buffer, inner, middle).skip(indent).put(text, theme.dim());
+        painter.row(inner, middle).skip(indent).put(text, theme.dim());
         return;
     };
-    let corner = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
-    let mut title = Row::new(buffer, corner, 0);
+    let mut title = painter.edge(area, 0);
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_levels)), 0, theme.text());
     let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
@@ -96,7 +94,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let seconds = points.iter().map(|p| p.seconds).chain(reached.map(|(s, _)| s));
     let noise = points.iter().map(|p| p.noise_levels).chain(target);
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
-    let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
+    let Some(plot) = axes(inner, &x, &y, painter) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
     // A ratatui canvas supports colours, but no other style.
     let color = |style: Style| style.fg.unwrap_or(Color::Reset);
@@ -135,7 +133,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             let point = place(last.seconds, last.noise_levels);
             canvas.draw(&line(point, point, theme.accent()));
         })
-        .render(plot, buffer);
+        .render(plot, painter.buffer);
 }
 
 /// Number of dashes of a dashed line in the convergence plot.
@@ -143,7 +141,8 @@ const DASHES: usize = 16;
 
 /// Draws both axes of the convergence plot inside of `area`. Returns the area between them for the
 /// plot. Returns `None` if there is no room.
-fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Rect> {
+fn axes(area: Rect, x: &Axis, y: &Axis, painter: &mut Painter) -> Option<Rect> {
+    let theme = painter.theme;
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
     let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
     let left = labels + 2;
@@ -154,10 +153,10 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         Rect { x: area.x + left, y: area.y, width: area.width - left - 1, height: area.height - 2 };
     let line = theme.border(false);
     for row in 0..plot.height {
-        Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
+        painter.row(Rect { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
     }
     let foot = Rect { x: plot.x - 1, width: plot.width + 1, ..area };
-    Row::new(buffer, foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
+    painter.row(foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
@@ -165,8 +164,8 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         // at most one label.
         if row < free {
             let indent = usize::from(labels) - columns(text);
-            Row::new(buffer, area, row).skip(indent).put(text, theme.dim());
-            Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
+            painter.row(area, row).skip(indent).put(text, theme.dim());
+            painter.row(Rect { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
             free = row;
         }
     }
@@ -178,8 +177,8 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         let end = start + columns(&text) as u16;
         if start >= free && end <= area.x + area.width && column < plot.x + plot.width {
             let label_area = Rect { x: start, width: end - start, ..area };
-            Row::new(buffer, label_area, plot.height + 1).put(&text, theme.dim());
-            Row::new(buffer, Rect { x: column, width: 1, ..area }, plot.height).put("┬", line);
+            painter.row(label_area, plot.height + 1).put(&text, theme.dim());
+            painter.row(Rect { x: column, width: 1, ..area }, plot.height).put("┬", line);
             free = end + 1;
         }
     }

@@ -2,11 +2,11 @@
 
 use crate::dashboard::hints::hints;
 use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::text::{columns, duration, durations, number};
 use crate::dashboard::update::commands::Hint;
-use crate::dashboard::view::text::{Row, columns, duration, durations, number};
+use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
-use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
@@ -25,8 +25,8 @@ struct Part {
 }
 
 /// Draws the status line. If it is too long, omits whole parts until the others fit.
-pub fn draw(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
-    let mut parts = parts(model, theme);
+pub fn draw(model: &Model, area: Rect, painter: &mut Painter) {
+    let mut parts = parts(model, &painter.theme);
     let width = |parts: &[Part]| -> usize {
         parts.iter().flat_map(|p| &p.text).map(|(text, _)| columns(text)).sum::<usize>()
             + 2 * parts.len()
@@ -36,7 +36,7 @@ pub fn draw(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
         let Some(last) = parts.iter().rposition(|p| p.expendable == most) else { break };
         parts.remove(last);
     }
-    let mut row = Row::new(buffer, area, 0);
+    let mut row = painter.row(area, 0);
     row.skip(1);
     for part in &parts {
         for (text, style) in &part.text {
@@ -183,8 +183,9 @@ fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec
 
 /// Draws the hint line. It shows the current notice (a message to the user) if there is one,
 /// otherwise the key hints.
-pub fn hints_line(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
-    let mut row = Row::new(buffer, area, 0);
+pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
+    let theme = painter.theme;
+    let mut row = painter.row(area, 0);
     row.skip(1);
     if let Some(notice) = &model.notice {
         let (mark, style) = match notice.tone {

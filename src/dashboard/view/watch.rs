@@ -3,12 +3,10 @@
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::{Model, short_name};
-use crate::dashboard::overlay_layout::wrapped;
-use crate::dashboard::view::frame::{panel, window};
+use crate::dashboard::text::wrapped;
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::text::Row;
+use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
@@ -23,21 +21,23 @@ const SHARE: usize = 5;
 const SAMPLES: usize = 12;
 
 /// Draws the table of watched files. Draws nothing if the panel is hidden.
-pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let (Some(table), Some(area)) = (&model.watch, layout.outline) else { return };
     let Some((rows, details)) = model.watch_rows() else { return };
     let active = is_active(model, Focus::Outline);
-    panel(area, &title(&table.report), active, theme, buffer);
+    painter.panel(area, &title(&table.report), active);
     let head = Rect { y: rows.y - 1, height: 1, ..rows };
     let name = if table.report.complete.is_some() { " shard" } else { " file" };
-    let mut to = Row::new(buffer, head, 0);
+    let mut to = painter.row(head, 0);
     right(&mut to, [("written", AGE), ("", SHARE), ("samples", SAMPLES)], theme.heading());
     to.put(name, theme.heading());
     let shards = &table.report.shards;
-    for (row, i) in window(rows, table.scroll, shards.len(), theme.border(active), buffer) {
-        let (shard, mut to) = (&shards[i], Row::new(buffer, rows, row));
-        let (mark, style) = mark(&shard.state, theme);
-        let (plain, dim, style) = match i == table.cursor {
+    let border = theme.border(active);
+    for VisibleLine { row, index } in painter.window(rows, table.scroll, shards.len(), border) {
+        let (shard, mut to) = (&shards[index], painter.row(rows, row));
+        let (mark, style) = mark(&shard.state, &theme);
+        let (plain, dim, style) = match index == table.cursor {
             true => {
                 to.fill(theme.selected(active));
                 (theme.selected(active), theme.selected(active), theme.selected(active))
@@ -63,7 +63,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         to.put(&label(shard), plain);
     }
     if let Some(selected) = shards.get(table.cursor) {
-        explain(selected, details, theme, buffer);
+        explain(selected, details, painter);
     }
 }
 
@@ -77,12 +77,13 @@ fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) 
 
 /// Draws details below the table of watched files: the path and the state of one file, or the state
 /// of shards (parts of the render) that have no file.
-fn explain(shard: &WatchedShards, area: Rect, theme: &Theme, buffer: &mut Buffer) {
+fn explain(shard: &WatchedShards, area: Rect, painter: &mut Painter) {
+    let theme = painter.theme;
     if area.height == 0 {
         return;
     }
-    Row::new(buffer, area, 0).put(&"─".repeat(area.width.into()), theme.border(false));
-    let (_, style) = mark(&shard.state, theme);
+    painter.row(area, 0).put(&"─".repeat(area.width.into()), theme.border(false));
+    let (_, style) = mark(&shard.state, &theme);
     let width = area.width.saturating_sub(2);
     let path = shard.path.as_ref().map(|path| sanitized(&path.display().to_string()));
     let path = path.map_or(String::new(), |path| format!("{path}: "));
@@ -95,7 +96,7 @@ fn explain(shard: &WatchedShards, area: Rect, theme: &Theme, buffer: &mut Buffer
     };
     for (row, line) in (1..area.height).zip(wrapped(&text, width)) {
         let style = if row == 1 { style } else { theme.text() };
-        Row::new(buffer, area, row).skip(1).put(&line, style);
+        painter.row(area, row).skip(1).put(&line, style);
     }
 }
 

@@ -20,6 +20,11 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn new(x: L, y: L, z: L) -> Self {
         Self { x, y, z }
     }
+    /// Returns vectors whose three coordinates are `x`.
+    #[inline(always)]
+    pub fn gray(x: L) -> Self {
+        Self::new(x, x, x)
+    }
     /// Returns `v` in every lane.
     #[inline(always)]
     pub fn splat(v: [L::Scalar; 3]) -> Self {

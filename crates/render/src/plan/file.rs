@@ -2,9 +2,9 @@
 //! text with one setting or tile per line, in a fixed order, and a checksum at the end.
 //!
 //! The line of a tile has four fields. The first is its base: the number of samples per pixel that
-//! each replicate (half of the samples) had when the plan started. The second is this number in the
-//! merged picture, the third is the expected number of rays per sample. The fourth is `g` if a path
-//! in the tile has made a random choice, such as a direction of a glossy lobe, otherwise `-`.
+//! each replicate had when the plan started. The second is this number in the merged picture, the
+//! third is the expected number of rays per sample. The fourth is `g` if a path in the tile has
+//! made a random choice, otherwise `-`.
 
 use crate::film::{Display, Tone};
 use crate::plan::{MAX_SHARDS, Plan, PlanSettings, PlannedTile, tiles_of};

@@ -4,9 +4,8 @@
 //! communicate. A pilot is an adaptive render that ends when its noise is still above the target.
 //! Its noise estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of
 //! the plan, the start of the sample sequence of every tile. The shards trace the rest. The sum of
-//! base and all shards therefore holds the samples `0..end` of each tile in both replicates (halves
-//! of the samples). It equals, bit for bit, the film of a single process that has traced the same
-//! sample counts.
+//! base and all shards therefore holds the samples `0..end` of each tile in both replicates. It
+//! equals, bit for bit, the film of a single process that has traced the same sample counts.
 //!
 //! [`Schedule::predict`]: crate::schedule::Schedule::predict
 
@@ -55,8 +54,8 @@ pub struct PlanSettings {
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Largest number of samples per pixel in tiles in which a path makes a random choice (such as
-    /// a direction of a glossy lobe), over the whole render; 0 for no limit.
+    /// Largest number of samples per pixel in tiles in which a path makes a random choice, over the
+    /// whole render; 0 for no limit.
     pub rays_per_pixel: u32,
     /// Noise target: RMSE of the displayed picture in 8-bit levels.
     pub noise_levels: f64,
@@ -87,15 +86,15 @@ pub struct Plan {
 /// Sample counts of one tile in a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedTile {
-    /// Base of the tile: samples per pixel that it had before the plan in each replicate (half of
-    /// the samples), from a pilot render or an earlier plan.
+    /// Base of the tile: samples per pixel that it had before the plan in each replicate, from a
+    /// pilot render or an earlier plan.
     pub base: u32,
-    /// Samples per pixel in each replicate (half of the samples) of the merged film of all shards.
-    /// They include `base`, the samples that the plan started from.
+    /// Samples per pixel in each replicate of the merged film of all shards. They include `base`,
+    /// the samples that the plan started from.
     pub end: u32,
     /// Expected number of rays per sample in this tile.
     pub rays_per_sample: f32,
-    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
+    /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
 }
 
@@ -131,14 +130,14 @@ impl Plan {
         self.rays_of(self.ranges(shard).into_iter())
     }
 
-    /// Returns the expected number of rays of the whole merged picture: those of the base (the
-    /// samples that the plan started from) and of all shards.
+    /// Returns the expected number of rays of the whole merged picture: those of the base and of
+    /// all shards.
     pub fn all_rays(&self) -> f64 {
         self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
     }
 
     /// Returns the expected number of rays for the samples with the indices `ranges` in both
-    /// replicates (halves of the samples). `ranges` has a range of indices for each tile.
+    /// replicates. `ranges` has a range of indices for each tile.
     fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
         let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
             let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
@@ -148,7 +147,7 @@ impl Plan {
     }
 
     /// Returns the number of samples that the shard with the number `shard` traces, over all pixels
-    /// and both replicates (halves of the samples).
+    /// and both replicates.
     pub fn samples(&self, shard: u32) -> u64 {
         let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
             2 * range.len() as u64 * pixels_of(self.settings.size, tile)
@@ -156,8 +155,7 @@ impl Plan {
         self.ranges(shard).into_iter().enumerate().map(samples).sum()
     }
 
-    /// Returns the mean number of samples per pixel in the merged picture, over both replicates
-    /// (halves of the samples).
+    /// Returns the mean number of samples per pixel in the merged picture, over both replicates.
     pub fn spp(&self) -> f64 {
         let size = self.settings.size;
         let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Tag of the film file's chunk with the text of the plan.
 const PLAN_TAG: [u8; 4] = *b"PLAN";
-/// Tag of the film file's chunk that lists the shards (parts of a render) in the film. The chunk
-/// has a line `rays N`, then a line `shard K complete` or `shard K unfinished` for each shard.
+/// Tag of the film file's chunk that lists the shards in the film. The chunk has a line `rays N`,
+/// then a line `shard K complete` or `shard K unfinished` for each shard.
 const PART_TAG: [u8; 4] = *b"PART";
 
 /// Part of a planned render: the plan that a film file contains, and the shards that its film
@@ -24,7 +24,7 @@ pub struct Part {
     pub rays: u64,
 }
 
-/// State of one shard (one process's part of a planned render) in a film file: complete or not.
+/// State of one shard in a film file: complete or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PartShard {
     /// Number of the shard; [`BASE`] means the samples that the plan started from.
@@ -100,8 +100,8 @@ impl Part {
         self.plan.is_whole(&self.shards)
     }
 
-    /// Returns a list of the shards (parts of the render) that are missing or incomplete in the
-    /// film, by their numbers, such as `3, 5-7`. `None` if the film holds all.
+    /// Returns a list of the shards that are missing or incomplete in the film, by their numbers,
+    /// such as `3, 5-7`. `None` if the film holds all.
     pub fn missing(&self) -> Option<String> {
         let complete = self.shards.iter().filter(|shard| shard.complete);
         let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());

@@ -11,31 +11,30 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration in seconds of a step in the render of a shard (one process's part of a plan).
-/// The caller can save the film between two steps.
+/// Target duration in seconds of a step in the render of a shard. The caller can save the film
+/// between two steps.
 const STEP_SECONDS: f64 = 0.25;
-/// Target duration in seconds of one tracing job in a shard's render. A job traces samples of one
-/// tile. Jobs are short, so that all threads have work until the end of a step.
+/// Target duration in seconds of one tracing job in a shard's render. Jobs are short, so that all
+/// threads have work until the end of a step.
 const JOB_SECONDS: f64 = 0.01;
 /// Largest number of samples per pixel of a tracing job, even if [`JOB_SECONDS`] allows more. A job
-/// traces samples of one tile in one replicate (half of the samples).
+/// traces samples of one tile in one replicate.
 const LONGEST_JOB: u32 = 1 << 20;
 /// Number of samples, over all pixels, of the first step of a shard's render. The speed of tracing
 /// is measured in this step. The lengths of the next steps follow from it.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
-/// Render of the samples of one shard (one process's part of a plan), in steps of about a quarter
-/// of a second. After each step, both replicates (halves of the samples) of every tile hold equally
-/// many samples: the first ones of the shard's range in this tile. A film that was saved between
-/// two steps can therefore be continued.
+/// Render of the samples of one shard, in steps of about a quarter of a second. After each step,
+/// both replicates of every tile hold equally many samples: the first ones of the shard's range in
+/// this tile. A film that was saved between two steps can therefore be continued.
 pub struct ShardRender {
     /// Compiled scene and the film with the samples of the shard so far.
     pub state: RenderState,
     pool: rayon::ThreadPool,
-    /// Jobs that remain to be traced. Each is traced in both replicates (halves of the samples).
+    /// Jobs that remain to be traced. Each is traced in both replicates.
     remaining: VecDeque<Job>,
     /// `[samples of the complete shard, samples that the film holds so far]`, over all pixels and
-    /// both replicates (halves of the samples).
+    /// both replicates.
     samples: [u64; 2],
     rays: u64,
     /// `(samples traced, seconds of tracing)` in all steps so far, from which the speed of tracing

@@ -22,9 +22,8 @@ use std::collections::{BTreeMap, BinaryHeap};
 use zerkalo_scene::value::ascending;
 
 /// Number of rays that one round of adaptive sampling allocates, as a share of the rays traced so
-/// far. A round is one decision on the next samples of all tiles. The share is small enough that
-/// later noise estimates can correct a round, and large enough that threads rarely wait for each
-/// other between rounds.
+/// far. The share is small enough that later noise estimates can correct a round, and large enough
+/// that threads rarely wait for each other between rounds.
 const ROUND_SHARE: f64 = 0.1;
 /// Share of the rays of an allocation round that goes to the tiles with the fewest samples,
 /// whatever their noise estimates are. No estimate contains a feature that no sample has hit; this
@@ -37,21 +36,19 @@ const ROUND_SHARE: f64 = 0.1;
 /// million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
 /// Smallest number of sample blocks that an allocation round gives to tiles. A round gives fewer
-/// only if fewer tiles can get samples, or if fewer blocks suffice for the error target. A block is
-/// a run of samples of every pixel of a tile. So many blocks keep every thread busy until the end
-/// of the round.
+/// only if fewer tiles can get samples, or if fewer blocks suffice for the error target. So many
+/// blocks keep every thread busy until the end of the round.
 const MIN_BLOCKS: usize = 64;
 /// Fraction that decides whether an allocation round ends early. The round ends when the largest
-/// gain (error reduction per ray) of the remaining tiles is below this fraction of the largest gain
-/// of the tiles that were set aside. A tile is set aside for the rest of the round when its next
-/// block would more than double its sample count, because a noise estimate is reliable for one
-/// doubling only. The round gives at least [`MIN_BLOCKS`] blocks, whatever their gain is.
+/// gain of the remaining tiles is below this fraction of the largest gain of the tiles that were
+/// set aside. A tile is set aside for the rest of the round when its next block would more than
+/// double its sample count, because a noise estimate is reliable for one doubling only. The round
+/// gives at least [`MIN_BLOCKS`] blocks, whatever their gain is.
 const WORTHWHILE: f64 = 0.25;
 /// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
-/// estimates of all tiles of its class (tiles with similar estimates) have the weight 1 per pixel.
+/// estimates of all tiles of its class have the weight 1 per pixel.
 const OWN_WEIGHT: f64 = 0.25;
-/// Number of tiles below which a class (tiles with similar error estimates) is widened by the
-/// nearest classes.
+/// Number of tiles below which a class is widened by the nearest classes.
 ///
 /// In a small class, each tile's own validation estimate has a large weight in its expected error.
 /// Tiles whose estimate is low by chance would get no samples. The reported error, the sum of these
@@ -59,20 +56,18 @@ const OWN_WEIGHT: f64 = 0.25;
 /// balls as small as a pixel (`tests/error_estimates`, 48 to 64 seeds each): 1.02 to 1.55 without
 /// widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
-/// Largest distance between a class (tiles with similar error estimates) and a class that widens
-/// it. The distance is the sum of two numbers: the number of factors of sqrt(2) between the
-/// allocation estimates, and the number of such factors between the sample counts. For example, a
-/// factor of 4 between the sample counts is a distance of 4.
+/// Largest distance between a class and a class that widens it. The distance is the sum of two
+/// numbers: the number of factors of sqrt(2) between the allocation estimates, and the number of
+/// such factors between the sample counts. For example, a factor of 4 between the sample counts is
+/// a distance of 4.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
-/// Block of samples that an allocation round may give to a tile. A block is a run of samples of
-/// every pixel of the tile.
+/// Block of samples that an allocation round may give to a tile.
 pub(super) struct Candidate {
     /// Expected decrease of the picture's error per ray of the block. The error is the sum of the
     /// squared errors of all pixels.
     gain: f64,
-    /// Samples per pixel that the tile has in each replicate (half of the samples) without this
-    /// block of samples.
+    /// Samples per pixel that the tile has in each replicate without this block of samples.
     pub count: u32,
     /// Number of the tile that gets this block of samples.
     pub tile: usize,
@@ -100,7 +95,7 @@ impl Ord for Candidate {
 }
 
 /// Model of the decrease of a tile's mean squared error with the number n of samples per pixel in
-/// each replicate (half of the samples): `scale * n^(-2 slope)`.
+/// each replicate: `scale * n^(-2 slope)`.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorModel {
     scale: f64,
@@ -108,8 +103,8 @@ pub(super) struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// Returns the mean squared error of the tile after `count` samples per pixel in each of the
-    /// two replicates (halves of the samples).
+    /// Returns the mean squared error of the tile after `count` samples per pixel in each
+    /// replicate.
     pub fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
@@ -133,9 +128,8 @@ struct TileModels {
 /// if v is 0.
 type Class = (u32, Option<i32>);
 
-/// Returns the length of the next block of a tile with `count` samples per pixel in each of the two
-/// replicates (halves of the samples). A block is a run of samples that is allocated as a whole. If
-/// `count` is below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is
+/// Returns the length of the next block of a tile with `count` samples per pixel in each replicate.
+/// If `count` is below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is
 /// larger but no multiple of [`SAMPLE_ALIGNMENT`], the block ends at the next multiple. Otherwise
 /// the length is the largest power of two up to a quarter of `count`, at least
 /// [`SAMPLE_ALIGNMENT`], because such blocks of the sample sequence are well distributed.
@@ -149,12 +143,11 @@ fn block(count: u32) -> u32 {
     }
 }
 
-/// Allocation round in progress: the samples that each tile has got so far. A round is one decision
-/// on the next samples of all tiles.
+/// Allocation round in progress: the samples that each tile has got so far.
 pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
-    /// Samples per pixel of each tile in each of the two replicates (halves of the samples): those
-    /// traced so far and those allocated in this round.
+    /// Samples per pixel of each tile in each replicate: those traced so far and those allocated in
+    /// this round.
     pub counts: Vec<u32>,
     /// Expected number of rays of the samples that this round has allocated so far.
     pub spent: f64,
@@ -163,8 +156,8 @@ pub(super) struct Allocation<'a> {
 }
 
 impl<'a> Allocation<'a> {
-    /// Starts an allocation round, one decision on the next samples of all tiles. The round starts
-    /// with the samples that the tiles of `schedule` have.
+    /// Starts an allocation round. The round starts with the samples that the tiles of `schedule`
+    /// have.
     pub fn new(schedule: &'a Schedule) -> Self {
         Self {
             schedule,
@@ -175,11 +168,10 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the length of the next block of `tile`: its number of samples per pixel in each of
-    /// the two replicates (halves of the samples). A block is a run of samples that is allocated as
-    /// a whole. Returns 0 if the tile has reached its largest sample count ([`Schedule::cap`]), or
-    /// if one more sample per pixel of the tile would exceed the requested mean sample count of the
-    /// picture.
+    /// Returns the length of the next block of `tile`: its number of samples per pixel in each
+    /// replicate. Returns 0 if the tile has reached its largest sample count ([`Schedule::cap`]),
+    /// or if one more sample per pixel of the tile would exceed the requested mean sample count of
+    /// the picture.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -192,8 +184,7 @@ impl<'a> Allocation<'a> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    /// Allocates `samples` further samples per pixel in each of the two replicates (halves of the
-    /// samples) to `tile`.
+    /// Allocates `samples` further samples per pixel in each replicate to `tile`.
     pub fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
@@ -235,8 +226,8 @@ impl<'a> Allocation<'a> {
 
 impl Schedule {
     /// Returns the jobs of the next allocation round in the adaptive phase. The tiles with the
-    /// highest gain (error reduction per ray) get samples first. The phase starts when every tile
-    /// has [`Schedule::min_samples`] samples in each replicate (half of the samples).
+    /// highest gain get samples first. The phase starts when every tile has
+    /// [`Schedule::min_samples`] samples in each replicate.
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let models = self.tile_models([self.pooled_slope(false), self.pooled_slope(true)]);
@@ -291,11 +282,10 @@ impl Schedule {
 
     /// Returns the expected error of each tile as a function of its sample count. The error at the
     /// present count is a weighted mean of two kinds of estimates: the validation estimates of the
-    /// tile's class (tiles with similar error estimates), and the tile's own allocation estimate. A
-    /// class with few tiles also uses the estimates of the nearest classes. The weight of an
-    /// estimate is the number of pixels of its tile. The weight of the own estimate is multiplied
-    /// by [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the validation
-    /// estimates of the class are 0.
+    /// tile's class, and the tile's own allocation estimate. A class with few tiles also uses the
+    /// estimates of the nearest classes. The weight of an estimate is the number of pixels of its
+    /// tile. The weight of the own estimate is multiplied by [`OWN_WEIGHT`]. The own estimate keeps
+    /// the expected error above 0 if the validation estimates of the class are 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -319,10 +309,10 @@ impl Schedule {
     }
 }
 
-/// Returns the sum of the validation estimates over the tiles of `class` (tiles with similar error
-/// estimates) and of its nearest classes. Classes are added in the order of their distance, up to
-/// [`MAX_CLASS_DISTANCE`], until there are [`MIN_CLASS_TILES`] tiles. Their validation estimates
-/// are scaled to the allocation estimate of `class`. If that estimate is 0, no classes are added.
+/// Returns the sum of the validation estimates over the tiles of `class` and of its nearest
+/// classes. Classes are added in the order of their distance, up to [`MAX_CLASS_DISTANCE`], until
+/// there are [`MIN_CLASS_TILES`] tiles. Their validation estimates are scaled to the allocation
+/// estimate of `class`. If that estimate is 0, no classes are added.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };

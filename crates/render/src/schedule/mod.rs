@@ -26,29 +26,27 @@ pub use prediction::{Prediction, TilePrediction, TileSamples, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
-/// Samples per pixel that every tile gets in each replicate (half of the samples) before adaptive
-/// sampling and noise estimates start. Estimates from fewer samples would be unreliable, and their
-/// computation would take as long as the tracing of the samples. With a minimum of 16, tiles
-/// without noise would get a third of all samples of the mirror room scene, and two thirds of those
-/// of the reflecting tracks scene.
+/// Samples per pixel that every tile gets in each replicate before adaptive sampling and noise
+/// estimates start. Estimates from fewer samples would be unreliable, and their computation would
+/// take as long as the tracing of the samples. With a minimum of 16, tiles without noise would get
+/// a third of all samples of the mirror room scene, and two thirds of those of the reflecting
+/// tracks scene.
 const MIN_SAMPLES: u32 = 4;
 /// Value that replaces [`MIN_SAMPLES`] if the estimated error is concentrated in fewer than
-/// [`FEW_PIXELS`] effective pixels (see [`Noise::effective_pixels`]). Such a picture has either no
-/// noise, or a few noisy pixels; more samples are needed to find them.
+/// [`FEW_PIXELS`] effective pixels. Such a picture has either no noise, or a few noisy pixels; more
+/// samples are needed to find them.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of effective pixels (Kish's effective sample size, see [`Noise::effective_pixels`]) below
 /// which a noise estimate is unreliable. With k effective pixels the relative uncertainty of the
 /// RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Alignment of the sample counts of tiles. The number of samples per pixel in each of the two
-/// replicates (halves of the samples) is a multiple of this number. Exceptions are smaller counts,
-/// and the count after the last block of a tile. The alignment is the number of lanes of the widest
-/// SIMD packets of rays. It is the same for narrower packets, because the samples of a picture must
-/// not depend on the processor.
+/// Alignment of the sample counts of tiles. The number of samples per pixel in each replicate is a
+/// multiple of this number. Exceptions are smaller counts, and the count after the last block of a
+/// tile. The alignment is the number of lanes of the widest SIMD packets of rays. It is the same
+/// for narrower packets, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
-/// Samples per pixel in each replicate (half of the samples) at which a tile of the film is full.
-/// It is the largest multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits
-/// 32 bits.
+/// Samples per pixel in each replicate at which a tile of the film is full. It is the largest
+/// multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits 32 bits.
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
 /// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]. Returns
@@ -67,8 +65,7 @@ pub enum Step {
     Finished(StoppedBy),
 }
 
-/// Numbers of samples per pixel in the picture, summed over both replicates (halves of the
-/// samples).
+/// Numbers of samples per pixel in the picture, summed over both replicates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spp {
     /// Smallest number of samples in any pixel.
@@ -85,22 +82,20 @@ pub struct Spp {
 pub struct Schedule {
     settings: Settings,
     tiles: Vec<Tile>,
-    /// Jobs of the current allocation round (one decision on the next samples of all tiles). Each
-    /// job is traced twice, once in replicate A and once in replicate B (halves of the samples).
+    /// Jobs of the current allocation round. Each job is traced twice, once in replicate A and once
+    /// in replicate B.
     round: Vec<Job>,
     estimate: bool,
     replicate: usize,
-    /// Jobs of the current allocation round (one decision on the next samples of all tiles) that
-    /// are not traced yet in the current replicate (half of the samples).
+    /// Jobs of the current allocation round that are not traced yet in the current replicate.
     remaining: Vec<Job>,
     convergence: ConvergenceFit,
-    /// Number of samples traced, over all pixels and both replicates (halves of the samples).
+    /// Number of samples traced, over all pixels and both replicates.
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
-    /// Samples per pixel in each of the two replicates (halves of the samples) after the latest
-    /// uniform allocation round that ended with a noise estimate. A uniform round gives all tiles
-    /// equally many samples.
+    /// Samples per pixel in each replicate after the latest uniform allocation round that ended
+    /// with a noise estimate. A uniform round gives all tiles equally many samples.
     estimated_at: u32,
     /// Light period: the number of samples of a pixel that together trace a shadow ray to each
     /// light once; see [`Schedule::with_light_period`].
@@ -128,7 +123,7 @@ impl Schedule {
     }
 
     /// Returns the schedule with the light period `light_period`. So many samples of a pixel in a
-    /// replicate (half of the samples) together trace a shadow ray to each light once; see
+    /// replicate together trace a shadow ray to each light once; see
     /// [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
     ///
     /// The error falls steeply at this count. An error estimated from fewer samples does not
@@ -139,8 +134,7 @@ impl Schedule {
     }
 
     /// Returns the next step of the render. `seconds` is the time since the start of the render.
-    /// The caller reports the result of a wave (a set of concurrent jobs) to [`Schedule::complete`]
-    /// before the next call.
+    /// The caller reports the result of a wave to [`Schedule::complete`] before the next call.
     pub fn next(&mut self, seconds: f64) -> Step {
         if self.remaining.is_empty() {
             if self.replicate == 0 {
@@ -164,9 +158,9 @@ impl Schedule {
         })
     }
 
-    /// Records the report of a wave (a set of jobs that run concurrently). `wave` is the one that
-    /// [`Schedule::next`] returned, or the part of it that [`Wave::cut`] left. Jobs that were cut
-    /// off or cancelled are part of a later wave.
+    /// Records the report of a wave. `wave` is the one that [`Schedule::next`] returned, or the
+    /// part of it that [`Wave::cut`] left. Jobs that were cut off or cancelled are part of a later
+    /// wave.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
         let mut partial = Vec::new();
@@ -211,21 +205,13 @@ impl Schedule {
         self.noise
     }
 
-    /// Returns the latest estimate of each tile's RMSE as displayed, in 8-bit levels, in row order;
-    /// 0 before the first estimate.
-    pub fn tile_noise_levels(&self) -> Vec<f32> {
-        let levels = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().levels.sqrt() as f32);
-        self.tiles.iter().map(levels).collect()
-    }
-
     /// Returns the latest estimate of each tile's error, in row order; `None` before the first
     /// estimate.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
         self.tiles.iter().map(|tile| tile.error)
     }
 
-    /// Returns the number of samples traced so far, over all pixels and both replicates (halves of
-    /// the samples).
+    /// Returns the number of samples traced so far, over all pixels and both replicates.
     pub fn samples(&self) -> u64 {
         self.samples
     }
@@ -235,8 +221,7 @@ impl Schedule {
         self.rays
     }
 
-    /// Returns the numbers of samples per pixel in the picture, over both replicates (halves of the
-    /// samples).
+    /// Returns the numbers of samples per pixel in the picture, over both replicates.
     pub fn spp(&self) -> Spp {
         let counts = || self.tiles.iter().map(|t| 2 * t.done);
         let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
@@ -253,9 +238,8 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// Returns the largest number of samples per pixel that `tile` may have in each replicate (one
-    /// of two independent halves of the samples) at the end of the render. If a path in the tile
-    /// has made a random choice (such as a direction of a glossy lobe), it is half of
+    /// Returns the largest number of samples per pixel that `tile` may have in each replicate at
+    /// the end of the render. If a path in the tile has made a random choice, it is half of
     /// [`Settings::rays_per_pixel`], at least 1. For other tiles, or if that setting is 0, it is
     /// [`MAX_SAMPLES`].
     fn cap(&self, tile: &Tile) -> u32 {
@@ -276,18 +260,18 @@ impl Schedule {
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Returns the number of samples that each replicate (half of the samples) still needs, over
-    /// all pixels, until the picture has the requested mean number of samples per pixel. Returns
-    /// `u64::MAX` if no number is requested.
+    /// Returns the number of samples that each replicate still needs, over all pixels, until the
+    /// picture has the requested mean number of samples per pixel. Returns `u64::MAX` if no number
+    /// is requested.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
     }
 
-    /// Returns the jobs of the next allocation round, one decision on the next samples of all
-    /// tiles. Sets `self.estimate` to `true` if the round ends with noise estimates, otherwise to
-    /// `false`. Returns no jobs if nothing is left to trace.
+    /// Returns the jobs of the next allocation round. Sets `self.estimate` to `true` if the round
+    /// ends with noise estimates, otherwise to `false`. Returns no jobs if nothing is left to
+    /// trace.
     fn next_round(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
@@ -298,16 +282,15 @@ impl Schedule {
         }
     }
 
-    /// Returns the number of samples per pixel that every tile gets in each replicate (half of the
-    /// samples) before noise estimates are used.
+    /// Returns the number of samples per pixel that every tile gets in each replicate before noise
+    /// estimates are used.
     fn min_samples(&self) -> u32 {
         let sparse = |noise: Noise| self.settings.criterion.of(noise.effective_pixels) < FEW_PIXELS;
         if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Returns the smallest number of samples per pixel in each of the two replicates (halves of
-    /// the samples) among the tiles below their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all
-    /// tiles have reached their cap.
+    /// Returns the smallest number of samples per pixel in each replicate among the tiles below
+    /// their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all tiles have reached their cap.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
@@ -315,8 +298,7 @@ impl Schedule {
 
     /// Returns jobs that raise the sample counts of all tiles to the same number, or to the cap of
     /// a tile (see [`Schedule::cap`]) if that is lower. `common` is the smallest number of samples
-    /// per pixel in each of the two replicates (halves of the samples) among the tiles below their
-    /// cap.
+    /// per pixel in each replicate among the tiles below their cap.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
             // The count grows to the next power of two. It is between two powers if an earlier stop
@@ -344,11 +326,10 @@ impl Schedule {
     }
 
     /// Returns the number of samples, not yet rounded to [`SAMPLE_ALIGNMENT`], that each pixel gets
-    /// next in each of the two replicates (halves of the samples). `done` is the number of samples
-    /// of a pixel in each replicate so far. With an error target the result is half of the
-    /// estimated remaining samples, at most `done`. Without an error target it is an eighth of
-    /// `done`. With a time limit it is at most an eighth of `done`, because a larger step could
-    /// exceed the limit by much.
+    /// next in each replicate. `done` is the number of samples of a pixel in each replicate so far.
+    /// With an error target the result is half of the estimated remaining samples, at most `done`.
+    /// Without an error target it is an eighth of `done`. With a time limit it is at most an eighth
+    /// of `done`, because a larger step could exceed the limit by much.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };

@@ -31,15 +31,14 @@ pub struct Prediction {
 /// Sample counts of a tile: those traced so far, and those predicted for the end of the render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TilePrediction {
-    /// Samples per pixel that the tile has so far in each replicate (half of the samples).
+    /// Samples per pixel that the tile has so far in each replicate.
     pub done: u32,
-    /// Predicted samples per pixel of the tile in each replicate (half of the samples). They
-    /// include `done`, the samples so far.
+    /// Predicted samples per pixel of the tile in each replicate. They include `done`, the samples
+    /// so far.
     pub count: u32,
     /// Mean number of rays per sample in this tile.
     pub rays_per_sample: f64,
-    /// `true` if a path in this tile has made a random choice, such as a direction of a glossy
-    /// lobe.
+    /// `true` if a path in this tile has made a random choice.
     pub glossy: bool,
 }
 
@@ -48,11 +47,11 @@ pub struct TilePrediction {
 pub struct TileSamples {
     /// Number of the tile's pixels that are inside the picture.
     pub pixels: u32,
-    /// Samples per pixel that the film holds in each replicate (half of the samples) of the tile.
+    /// Samples per pixel that the film holds in each replicate of the tile.
     pub count: u32,
     /// Mean number of rays per sample in the tile.
     pub rays_per_sample: f64,
-    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
+    /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
     /// Estimated error of the tile.
     pub error: TileNoise,

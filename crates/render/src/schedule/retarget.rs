@@ -13,7 +13,7 @@ impl Schedule {
     }
 
     /// Sets the largest number of samples per pixel in tiles in which a path has made a random
-    /// choice, such as a direction of a glossy lobe; 0 for no limit. See
+    /// choice; 0 for no limit. See
     /// [`Settings::rays_per_pixel`](crate::schedule::Settings::rays_per_pixel).
     pub fn set_rays_per_pixel(&mut self, cap: u32) {
         self.settings.rays_per_pixel = cap;
@@ -30,7 +30,7 @@ impl Schedule {
     }
 
     /// Sets the noise estimates of all tiles, in row order. `None` means that the tile has too few
-    /// samples for an estimate. Must be called between two waves (sets of concurrent jobs).
+    /// samples for an estimate. Must be called between two waves.
     pub fn set_estimates(&mut self, estimates: &[Option<TileNoise>]) {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);

@@ -31,16 +31,15 @@ impl Criterion {
 /// does not end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
-    /// Target for the mean number of samples per pixel, over both replicates (halves of the
-    /// samples); rounded up to an even number. `None` for no target.
+    /// Target for the mean number of samples per pixel, over both replicates; rounded up to an even
+    /// number. `None` for no target.
     pub spp: Option<u32>,
     /// Target for the estimated RMSE of the whole picture as displayed, in 8-bit levels. `None` for
     /// no target.
     pub noise_levels: Option<f64>,
     /// Target for the estimated RMSE of the whole picture in linear radiance. `None` for no target.
     pub rmse_linear: Option<f64>,
-    /// Time limit of the render in seconds. It is tested between waves, sets of jobs that run
-    /// concurrently. `None` for no limit.
+    /// Time limit of the render in seconds. It is tested between waves. `None` for no limit.
     pub seconds: Option<f64>,
 }
 
@@ -86,9 +85,9 @@ pub struct Settings {
     pub adaptive: bool,
     /// Measure of the error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// Largest number of samples per pixel in tiles in which a path has made a random choice, such
-    /// as a direction of a glossy lobe. It is for the whole render and both replicates (halves of
-    /// the samples) together, and is rounded down to an even number, at least 2. 0 means no limit.
+    /// Largest number of samples per pixel in tiles in which a path has made a random choice. It is
+    /// for the whole render and both replicates together, and is rounded down to an even number, at
+    /// least 2. 0 means no limit.
     pub rays_per_pixel: u32,
     /// Stop criteria of the render.
     pub stop: Stop,

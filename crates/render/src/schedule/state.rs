@@ -54,9 +54,9 @@ impl Schedule {
     }
 
     /// Restores an encoded state into a new schedule of the same film. `counts` has two numbers of
-    /// samples per pixel for each tile of the film, one for each replicate (half of the samples).
-    /// The noise estimates are discarded if the criterion differs. Returns `None` if the state is
-    /// not valid or does not belong to the film; the schedule may then have changed.
+    /// samples per pixel for each tile of the film, one for each replicate. The noise estimates are
+    /// discarded if the criterion differs. Returns `None` if the state is not valid or does not
+    /// belong to the film; the schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
         let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Levels };

@@ -4,8 +4,7 @@ use crate::film::Noise;
 use crate::schedule::tile::{DOUBLINGS, Tile};
 use crate::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 
-/// Number of effective pixels (see [`Noise::effective_pixels`]) below which a single noise estimate
-/// does not end a render.
+/// Number of effective pixels below which a single noise estimate does not end a render.
 ///
 /// A render that ends with the first estimate below its target ends too early, and reports too
 /// small an error, if this estimate is too low by chance. Ratio of true to reported RMSE at the end
@@ -34,8 +33,8 @@ impl Schedule {
     }
 
     /// Returns a lower and an upper estimate of the seconds left until the RMSE of the displayed
-    /// picture falls to `levels` 8-bit levels, whatever the stop criteria are. `seconds` is the time
-    /// since the start of the render. Returns `None` before the first noise estimate.
+    /// picture falls to `levels` 8-bit levels, whatever the stop criteria are. `seconds` is the
+    /// time since the start of the render. Returns `None` before the first noise estimate.
     pub fn seconds_to_noise(&self, levels: f64, seconds: f64) -> Option<(f64, f64)> {
         let noise = self.noise?;
         if noise.rmse_levels <= levels {
@@ -118,8 +117,8 @@ impl Schedule {
     /// Returns `true` if the error target is met except in tiles that have reached their largest
     /// number of samples. This requires that there is at least one such tile, and that the pooled
     /// error of the other tiles meets the target. The largest number
-    /// ([`Settings::rays_per_pixel`](crate::schedule::Settings::rays_per_pixel)) is the
-    /// same for all tiles that it limits.
+    /// ([`Settings::rays_per_pixel`](crate::schedule::Settings::rays_per_pixel)) is the same for
+    /// all tiles that it limits.
     fn capped_at_target(&self) -> bool {
         let Some((criterion, target)) = self.target() else { return false };
         let is_open = |t: &Tile| t.done < self.cap(t);

@@ -18,7 +18,7 @@ pub(super) struct Tile {
     pub done: u32,
     /// Number of rays traced in the tile so far.
     pub rays: u64,
-    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
+    /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
     /// Latest noise estimate of the tile. `None` before the first estimate.
     pub error: Option<TileNoise>,
@@ -34,8 +34,7 @@ impl Tile {
     }
 
     /// Records the report of a job of this tile. If the report has an estimate from at least
-    /// `light_period` samples per replicate (half of the samples), earlier estimates from fewer
-    /// samples are discarded.
+    /// `light_period` samples per replicate, earlier estimates from fewer samples are discarded.
     pub fn record(&mut self, report: &JobReport, light_period: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;

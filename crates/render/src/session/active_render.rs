@@ -1,28 +1,24 @@
-//! Active render of a session (a handle of a background rendering thread). It traces one scene in
-//! pieces of a fraction of a second, estimates the noise of the picture, and publishes snapshots of
-//! the render.
+//! Active render of a session. It traces one scene in pieces of a fraction of a second, estimates
+//! the noise of the picture, and publishes snapshots of the render.
 
-use crate::checkpoint::{Checkpoint, EncodedCheckpoint};
-use crate::export::Provenance;
-use crate::film::{Film, IncrementalDownsample, TileNoise};
+use crate::checkpoint::Checkpoint;
+use crate::film::{Film, IncrementalDownsample};
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
 use crate::session::report::{QUALITIES, Report, State};
-use crate::session::snapshot::{Frame, Snapshot, View};
+use crate::session::snapshot::{Frame, Snapshot, View, tile_estimates};
 use crate::session::throughput::Throughput;
 use crate::wave::Wave;
 use crate::{Options, RenderState};
 use crossbeam_channel::Sender;
-use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use zerkalo_scene::Scene;
 
-/// Target durations in seconds of a piece of a wave (a set of jobs that run concurrently). The
-/// first applies while the client requests a picture or a pixel, the second while it requests
-/// neither.
+/// Target durations in seconds of a piece of a wave. The first applies while the client requests a
+/// picture or a pixel, the second while it requests neither.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
 /// Target duration in seconds of one tracing job. It is short, because a running job cannot be
 /// cancelled.
@@ -30,22 +26,21 @@ const JOB_SECONDS: f64 = 0.005;
 /// Number of pixels of a film tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
 /// Longest expected tracing time, in seconds, of a first-hit buffer that is traced before the first
-/// picture. A first-hit buffer holds the first hit of a camera ray in each cell of the dashboard's
 /// picture. A buffer with a longer tracing time is traced after the first picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of a first-hit buffer (first hits of camera rays) until one has been
-/// measured. It is the value of a small scene.
+/// Assumed seconds per ray of a first-hit buffer until one has been measured. It is the value of a
+/// small scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
-/// Resources that a render uses: the thread pool, the slot for its newest snapshot (state of the
-/// render at one moment), the channel that announces this snapshot, and the optional contents of
-/// snapshots that the client has requested.
+/// Resources that a render uses: the thread pool, the slot for its newest snapshot, the channel
+/// that announces this snapshot, and the optional contents of snapshots that the client has
+/// requested.
 pub(super) struct WorkContext {
     pub pool: rayon::ThreadPool,
     pub shared: Arc<Shared>,
     pub notify: Sender<()>,
     pub view: View,
-    /// Generation of the scene (the number of its version).
+    /// Generation of the scene.
     pub generation: u64,
 }
 
@@ -154,19 +149,6 @@ impl ActiveRender {
         Ok(render)
     }
 
-    /// Encodes the render as a checkpoint. Returns `None` before the first picture.
-    pub fn checkpoint(
-        &self,
-        provenance: &Provenance,
-        context: &WorkContext,
-        state: State,
-    ) -> Option<EncodedCheckpoint> {
-        self.first_picture_after?;
-        let report = self.report(context, state);
-        let Self { state, schedule, .. } = self;
-        Some(EncodedCheckpoint::new(state, schedule, &report, provenance, &context.pool))
-    }
-
     /// Returns the seconds that the render has spent on tracing rays.
     pub fn seconds(&self) -> f64 {
         self.traced_for.as_secs_f64()
@@ -201,15 +183,8 @@ impl ActiveRender {
     /// Estimates the errors of all tiles again. If `cancel_wave` becomes `true` before the end,
     /// returns `false` and changes nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
-        let (film, estimator) = (&self.state.film, self.state.estimator());
-        let estimate =
-            |tile: usize| -> Option<TileNoise> { estimator.tile_so_far(film.tile(tile)?) };
-        let estimates: Option<Vec<_>> = pool.install(|| {
-            let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
-            tiles
-                .map(|tile| (!cancel_wave.load(Ordering::Relaxed)).then(|| estimate(tile)))
-                .collect()
-        });
+        let RenderState { film, .. } = &self.state;
+        let estimates = tile_estimates(film, self.state.estimator(), pool, cancel_wave);
         if let Some(estimates) = &estimates {
             self.schedule.set_estimates(estimates);
             self.estimates_stale = false;
@@ -217,8 +192,7 @@ impl ActiveRender {
         estimates.is_some()
     }
 
-    /// Traces `wave` (a set of jobs that run concurrently), or only a piece of it, and adds the
-    /// samples to the film.
+    /// Traces `wave`, or only a piece of it, and adds the samples to the film.
     pub fn trace(&mut self, wave: Wave, context: &WorkContext) {
         let flags = &context.shared;
         if self.first_picture_after.is_some() {
@@ -240,7 +214,7 @@ impl ActiveRender {
                 return;
             }
             let report = coarse.clone();
-            context.put(frame.snapshot(film, Vec::new(), report, downsample, &context.pool));
+            context.put(frame.snapshot(film, &[], report, downsample, &context.pool));
         };
         let report = self.state.trace_first_pass(
             &wave,
@@ -261,8 +235,7 @@ impl ActiveRender {
         }
     }
 
-    /// Cuts `wave` (a set of jobs that run concurrently) to a piece of about [`PIECE_SECONDS`],
-    /// with jobs of about [`JOB_SECONDS`].
+    /// Cuts `wave` to a piece of about [`PIECE_SECONDS`], with jobs of about [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
         let Some(speed) = self.speed() else { return wave };
@@ -281,9 +254,8 @@ impl ActiveRender {
         self.throughput.samples_per_second().or_else(mean)
     }
 
-    /// Traces the first-hit buffer (first hits of camera rays) of the size that the client has
-    /// requested. Does nothing if it has been traced already, or if it would take longer than
-    /// `limit` seconds.
+    /// Traces the first-hit buffer of the size that the client has requested. Does nothing if it
+    /// has been traced already, or if it would take longer than `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
         if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
@@ -314,8 +286,7 @@ impl ActiveRender {
     }
 
     /// Publishes a snapshot of the render if one is wanted (see [`WorkContext::snapshot_wanted`]).
-    /// `state` is the state of the session. `is_final` is `true` after the last wave (set of
-    /// concurrent jobs) of the render.
+    /// `state` is the state of the session. `is_final` is `true` after the last wave of the render.
     pub fn publish(&mut self, context: &WorkContext, state: State, is_final: bool) {
         // After a cancelled first pass the film has been cleared and is empty. The coarse picture
         // of that pass has been published already.
@@ -324,12 +295,12 @@ impl ActiveRender {
         }
         self.update_first_hits(context, f64::INFINITY);
         let (frame, report) = (self.frame(context), self.report(context, state));
-        let noise = match report.noise {
-            Some(_) => self.schedule.tile_noise_levels(),
+        let estimates: Vec<_> = match report.noise {
+            Some(_) => self.schedule.tile_estimates().collect(),
             None => Vec::new(),
         };
-        let downsample = &mut self.downsample;
-        context.put(frame.snapshot(&self.state.film, noise, report, downsample, &context.pool));
+        let (film, downsample) = (&self.state.film, &mut self.downsample);
+        context.put(frame.snapshot(film, &estimates, report, downsample, &context.pool));
     }
 
     /// Returns the report on the progress of the render; `state` is the state of the session.

@@ -1,11 +1,11 @@
-//! Background rendering: a thread that receives scenes, traces them and publishes snapshots.
+//! Sessions: a thread of its own traces scenes, or reads film files that other processes write, and
+//! publishes snapshots.
 //!
-//! A client first sends a command and then raises the cancel flag of the running wave, a set of
-//! jobs that are traced concurrently. The worker (the rendering thread) first lowers the flag and
-//! then receives all commands. If the client or the worker reversed its two steps, the worker could
-//! lower the flag without receiving the command, which would then wait until the wave ends. If
-//! several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples: its
-//! remaining jobs are traced when the render resumes.
+//! A client first sends a command and then raises the cancel flag of the running wave. The
+//! rendering thread first lowers the flag and then receives all commands. In the reverse order, it
+//! could lower the flag without receiving the command, which would then wait until the wave ends.
+//! If several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples:
+//! its remaining jobs are traced when the render resumes.
 //!
 //! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
@@ -16,6 +16,7 @@
 //! [`Relighting`]: crate::Relighting
 
 mod active_render;
+mod picture;
 mod report;
 mod snapshot;
 #[cfg(test)]
@@ -26,10 +27,13 @@ mod worker;
 
 use crate::export::Provenance;
 use crate::film::Display;
+use crate::plan::WatchedFilms;
+pub use crate::plan::{WatchedShards, WatchedState};
 use crate::schedule::{Settings, Stop};
 use crate::{Checkpoint, EncodedCheckpoint, Options, RenderState, threads};
 use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
+pub use picture::Picture;
 pub use report::{QUALITIES, Report, State};
 use snapshot::Slot;
 pub use snapshot::{Snapshot, TileMaps, View};
@@ -38,16 +42,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
+pub use watch::WatchReport;
+use watch::Watcher;
 use worker::Worker;
 use zerkalo_scene::Scene;
 
-/// Function that a client queues to run on the rendering thread. It gets the state and the report
-/// of the render; `None` if there is no film.
-type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
-
-/// Function that gets an encoded checkpoint, or `None` if there is no picture yet.
-type CheckpointTask = Box<dyn FnOnce(Option<EncodedCheckpoint>) + Send>;
+/// Function that a client queues to run on the session's thread. It gets the picture, or `None` if
+/// there is no film.
+type Task = Box<dyn FnOnce(Option<Picture>) + Send>;
 
 enum Command {
     Scene(u64, Arc<Scene>),
@@ -59,16 +61,13 @@ enum Command {
     Display(Display),
     Pool(rayon::ThreadPool),
     Task(Task),
-    Checkpoint(Provenance, CheckpointTask),
     Quit,
 }
 
-/// State that the session's handle and its rendering thread share in addition to the command
-/// channel.
+/// State that the session's handle and its thread share in addition to the command channel.
 #[derive(Default)]
 struct Shared {
-    /// Flag that cancels the wave being traced (a set of concurrent jobs), because commands are
-    /// waiting.
+    /// Flag that cancels the wave being traced, because commands are waiting.
     cancel_wave: AtomicBool,
     /// Flag that cancels the first pass over the picture, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
@@ -78,12 +77,16 @@ struct Shared {
     compilations: std::sync::atomic::AtomicUsize,
 }
 
-/// Handle of a rendering thread with its own thread pool. Dropping the session ends the thread.
+/// Handle of a thread that renders scenes or watches film files, with a thread pool of its own.
+/// Dropping the handle ends the thread. A session that watches has no scene: it ignores commands
+/// that edit, pause or stop a render.
 pub struct Session {
     commands: Sender<Command>,
     shared: Arc<Shared>,
     wakeup: Receiver<()>,
     generations: u64,
+    /// Rendering thread, whose end the handle awaits. `None` for a thread that watches: it may be
+    /// reading from a slow disk.
     thread: Option<JoinHandle<()>>,
 }
 
@@ -94,6 +97,32 @@ impl Session {
     /// # Errors
     /// Returns an error for the user if a thread cannot be started.
     pub fn new(threads: usize, options: Options, settings: Settings) -> io::Result<Self> {
+        Self::start(threads, |inbox, context| {
+            move || Worker::new(inbox, context, options, settings).run()
+        })
+    }
+
+    /// Starts a thread that shows the sum of `films`, with `threads` threads for its computations.
+    /// The thread calls `on_report` with each report that differs from the previous one.
+    ///
+    /// # Errors
+    /// Returns an error for the user if a thread cannot be started.
+    pub fn watch(
+        films: WatchedFilms,
+        threads: usize,
+        on_report: impl Fn(WatchReport) + Send + 'static,
+    ) -> io::Result<Self> {
+        let mut session = Self::start(threads, |inbox, context| {
+            move || Watcher::new(films, context).run(&inbox, &on_report)
+        })?;
+        session.thread = None;
+        Ok(session)
+    }
+
+    fn start<F: FnOnce() + Send + 'static>(
+        threads: usize,
+        run: impl FnOnce(Receiver<Command>, WorkContext) -> F,
+    ) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
         // The channel holds one wake-up; a full channel means that one is pending.
@@ -102,8 +131,8 @@ impl Session {
         let view = View::default();
         let context =
             WorkContext { pool, shared: Arc::clone(&shared), notify, view, generation: 0 };
-        let worker = Worker::new(inbox, context, options, settings);
-        let thread = std::thread::Builder::new().name("session".into()).spawn(|| worker.run());
+        let thread = std::thread::Builder::new().name("session".into());
+        let thread = thread.spawn(run(inbox, context));
         let thread = thread.map_err(|error| threads::error_of(threads, error))?;
         Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
@@ -124,19 +153,20 @@ impl Session {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
 
-    /// Queues the encoding of the render as a checkpoint. The rendering thread encodes it between
-    /// two pieces of tracing work, and then calls `task` with it. The argument of `task` is `None`
-    /// if there is no picture yet.
+    /// Encodes the render as a checkpoint and calls `task` with it, as [`Session::submit`] does.
+    /// The argument of `task` is `None` if there is no picture yet.
     pub fn checkpoint(
         &self,
         provenance: Provenance,
         task: impl FnOnce(Option<EncodedCheckpoint>) + Send + 'static,
     ) {
-        self.send(Command::Checkpoint(provenance, Box::new(task)));
+        self.submit(move |picture| {
+            task(picture.and_then(|picture| picture.checkpoint(&provenance)));
+        });
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns a new generation
-    /// (number of a version of the scene), as [`Session::set_scene`] does.
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as
+    /// [`Session::set_scene`] does.
     pub fn restart(&mut self) -> u64 {
         self.begin(Command::Restart)
     }
@@ -179,25 +209,27 @@ impl Session {
         self.send(Command::View(view));
     }
 
-    /// Queues `task` and returns at once. The rendering thread runs the task between two pieces of
-    /// tracing work. The argument of the task is the state and the report of the render. It is
-    /// `None` if there is no film: no scene has been set yet, or the scene cannot be rendered.
-    /// Tasks that are still queued when the session ends are dropped.
-    pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
+    /// Queues `task` and returns at once. The session's thread runs the task between two pieces of
+    /// work, with the picture of the moment. The argument is `None` if there is no film: no scene
+    /// has been set yet, the scene cannot be rendered, or no watched file can be read. Tasks that
+    /// are still queued when the session ends are dropped.
+    pub fn submit(&self, task: impl FnOnce(Option<Picture>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
 
     /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` if there is
-    /// no film.
+    /// no render.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&RenderState, &Report) -> R + Send + 'static,
     ) -> Option<R> {
         let (sender, receiver) = bounded(1);
-        self.submit(move |film| {
-            if let Some((state, report)) = film {
+        self.submit(move |picture| {
+            if let Some(picture) = picture
+                && let Some(state) = picture.state()
+            {
                 // A closed channel means that the client has stopped waiting.
-                let _ = sender.send(task(state, report));
+                let _ = sender.send(task(state, picture.report));
             }
         });
         receiver.recv().ok()
@@ -237,8 +269,7 @@ impl Session {
     }
 
     /// Sends a command to the rendering thread and cancels the first pass over the picture.
-    /// `command` creates the command from a new generation (number of a version of the scene).
-    /// Returns the generation.
+    /// `command` creates the command from a new generation. Returns the generation.
     fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
         self.generations += 1;
         self.send(command(self.generations));

@@ -34,10 +34,10 @@ pub struct Report {
     /// State of the session that sends the report.
     pub state: State,
     /// Smallest, mean and largest number of samples per pixel in the picture. The samples of both
-    /// replicates (the two halves of the samples) count.
+    /// replicates count.
     pub spp: Spp,
     /// Number of samples traced for the picture so far. It is the sum over all pixels and over both
-    /// replicates (the two halves of the samples).
+    /// replicates.
     pub samples: u64,
     /// Number of rays traced for the picture so far: camera, shadow, reflected and transmitted.
     pub rays: u64,

@@ -1,12 +1,14 @@
 //! Snapshots: picture and progress of a render at one moment, published by the session.
 
 use crate::film::{
-    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail,
+    DirtyTile, Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe,
+    Thumbnail, TileNoise,
 };
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::relighting::Relighting;
 use crate::session::report::Report;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use zerkalo_scene::Scene;
 
@@ -27,8 +29,8 @@ pub struct Snapshot {
     /// Progress of the render.
     pub report: Report,
     /// Picture in the size that [`View::raster`] requests. It has the mean radiance of each light
-    /// group (lights that share one weight) in each pixel. The client applies the light weights.
-    /// `None` if no picture is requested, or without a film.
+    /// group in each pixel. The client applies the light weights. `None` if no picture is
+    /// requested, or without a film.
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene that the report describes; empty without a film.
     pub mix: LightWeights,
@@ -68,20 +70,40 @@ pub struct TileMaps {
     pub rows: usize,
     /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
     pub noise_levels: Vec<f32>,
-    /// Samples per pixel of each tile, over both replicates (halves of the samples).
+    /// Samples per pixel of each tile, over both replicates.
     pub spp: Vec<u32>,
 }
 
 impl TileMaps {
-    pub(super) fn of(film: &Film, noise_levels: Vec<f32>) -> Self {
+    fn of(film: &Film, estimates: &[Option<TileNoise>]) -> Self {
+        let levels =
+            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().levels.sqrt() as f32);
         let count = |tile: usize| {
             let [a, b] = film.counts(tile);
             a.saturating_add(b)
         };
         let columns = film.tile_columns();
-        let rows = film.tile_count() / columns;
-        Self { columns, rows, noise_levels, spp: (0..film.tile_count()).map(count).collect() }
+        Self {
+            columns,
+            rows: film.tile_count() / columns,
+            noise_levels: estimates.iter().map(levels).collect(),
+            spp: (0..film.tile_count()).map(count).collect(),
+        }
     }
+}
+
+/// Estimates the error of every tile on the threads of `pool`. The replicates of a tile may have
+/// different counts, as in a checkpoint. Returns `None` if `cancel` becomes `true` before the end.
+pub(super) fn tile_estimates(
+    film: &Film,
+    estimator: &Estimator,
+    pool: &rayon::ThreadPool,
+    cancel: &AtomicBool,
+) -> Option<Vec<Option<TileNoise>>> {
+    let estimate = |tile| film.tile(tile).and_then(|tile| estimator.tile_so_far(tile));
+    let unless_cancelled = |tile| (!cancel.load(Ordering::Relaxed)).then(|| estimate(tile));
+    let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
+    pool.install(|| tiles.map(unless_cancelled).collect())
 }
 
 /// Inputs of a snapshot besides the film: the contents that the client requests, light weights,
@@ -95,13 +117,13 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a snapshot of `film`. `noise_levels` has the RMSE of each tile in 8-bit levels.
-    /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
-    /// so that only changed tiles are read again.
+    /// Creates a snapshot of `film`. `estimates` has the error of each tile, or nothing before the
+    /// first estimate. `downsample` caches the contributions of the film's tiles to the picture
+    /// between snapshots, so that only changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,
-        noise_levels: Vec<f32>,
+        estimates: &[Option<TileNoise>],
         report: Report,
         downsample: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
@@ -117,7 +139,7 @@ impl Frame {
             downsample.thumbnail()
         });
         let tiles = match self.view.raster {
-            Some(_) => Arc::new(TileMaps::of(film, noise_levels)),
+            Some(_) => Arc::new(TileMaps::of(film, estimates)),
             None => Arc::default(),
         };
         let probe = self

@@ -1,13 +1,13 @@
 //! Worker: the rendering thread of a session, which receives commands and chooses the next piece of
 //! work.
 
-use crate::export::Provenance;
 use crate::film::Display;
 use crate::schedule::{Settings, Step, Stop};
 use crate::session::active_render::{ActiveRender, WorkContext};
+use crate::session::picture::{Picture, Source};
 use crate::session::report::{Report, State};
 use crate::session::snapshot::Snapshot;
-use crate::session::{CheckpointTask, Command, Task};
+use crate::session::{Command, Task};
 use crate::{Checkpoint, Options};
 use crossbeam_channel::Receiver;
 use std::ops::ControlFlow;
@@ -27,11 +27,10 @@ pub(super) struct Worker {
     /// `true` if the newest scene must start with an empty film, even if samples of the active
     /// render could be reused.
     restart: bool,
-    /// Scene to show, and the checkpoint from which its render continues. `None` if no
-    /// checkpoint is waiting to be continued.
+    /// Scene to show, and the checkpoint from which its render continues. `None` if no checkpoint
+    /// is waiting to be continued.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
-    checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
     /// Active render; `Ok(None)` if there is none. The error states why the newest scene cannot be
     /// rendered.
@@ -59,7 +58,6 @@ impl Worker {
             restart: false,
             resume: None,
             tasks: Vec::new(),
-            checkpoints: Vec::new(),
             paused: false,
             work: Ok(None),
             state: State::Idle,
@@ -124,7 +122,6 @@ impl Worker {
                 }
             }
             Command::Task(task) => self.tasks.push(task),
-            Command::Checkpoint(provenance, task) => self.checkpoints.push((provenance, task)),
             Command::Quit => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
@@ -171,27 +168,24 @@ impl Worker {
     }
 
     fn run_tasks(&mut self) {
-        for (provenance, task) in std::mem::take(&mut self.checkpoints) {
-            task(match &self.work {
-                Ok(Some(work)) => work.checkpoint(&provenance, &self.context, self.state.clone()),
-                _ => None,
-            });
-        }
-        if self.tasks.is_empty() {
+        let tasks = std::mem::take(&mut self.tasks);
+        if tasks.is_empty() {
             return;
         }
-        let tasks = std::mem::take(&mut self.tasks);
-        let film = match &self.work {
-            Ok(Some(work)) => Some((&work.state, work.report(&self.context, self.state.clone()))),
-            _ => None,
-        };
+        let work = self.work.as_ref().ok().and_then(Option::as_ref);
+        let film = work.map(|work| (work, work.report(&self.context, self.state.clone())));
         for task in tasks {
-            task(film.as_ref().map(|(state, report)| (*state, report)));
+            task(film.as_ref().map(|(work, report)| Picture {
+                film: &work.state.film,
+                mix: &work.state.mix,
+                report,
+                source: Source::Render(work, &self.context.pool),
+            }));
         }
     }
 
     /// Does the next piece of rendering work, if there is any: estimates the noise again if it is
-    /// out of date, traces a piece of a wave (set of concurrent jobs), and publishes a snapshot.
+    /// out of date, traces a piece of a wave, and publishes a snapshot.
     fn advance(&mut self) {
         let context = &self.context;
         self.idle = true;

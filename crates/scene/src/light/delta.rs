@@ -2,7 +2,7 @@
 //! of a light are applied to the film's sums, so that new colours and intensities need no new
 //! samples.
 
-use crate::light::{Falloff, Light, Spot};
+use crate::light::{Falloff, Light, LightSample, Spot};
 use crate::value::unit;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -99,18 +99,6 @@ pub fn spot_factor<L: SimdFloat>(wi: Vec3<L>, axis: Vec3<L>, outer: L, scale: L)
     t * t * (L::from_f64(3.0) - (t + t))
 }
 
-/// Light that arrives at surface points from a light of unit strength, one point per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSample<L> {
-    /// Unit vector from the surface point towards the light.
-    pub wi: Vec3<L>,
-    /// Distance from the surface point to the light; the largest finite number for a directional
-    /// light.
-    pub distance: L,
-    /// Irradiance that the light, with unit strength, causes on a surface that faces it.
-    pub irradiance: L,
-}
-
 impl<S: Float> DeltaLight<S> {
     /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
     /// if `light` has a size or is an environment, or if its direction is zero.
@@ -145,12 +133,8 @@ impl<S: Float> DeltaLight<S> {
     /// Returns the light that arrives at `point` if nothing occludes it.
     #[inline(always)]
     pub fn sample_li<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
-        match self {
-            Self::Directional { wi } => LightSample {
-                wi: Vec3::splat(*wi),
-                distance: L::from_f64(L::MAX),
-                irradiance: L::from_f64(PI),
-            },
+        let (wi, distance, irradiance) = match self {
+            Self::Directional { wi } => (Vec3::splat(*wi), L::from_f64(L::MAX), L::from_f64(PI)),
             Self::Point { position, inverse_square, cone } => {
                 let to_light = Vec3::splat(*position) - point;
                 let distance = to_light.length_squared().sqrt();
@@ -165,9 +149,11 @@ impl<S: Float> DeltaLight<S> {
                 if let Some(cone) = cone {
                     irradiance *= cone.factor(wi);
                 }
-                LightSample { wi, distance, irradiance }
+                (wi, distance, irradiance)
             }
-        }
+        };
+        let irradiance = Vec3::gray(irradiance);
+        LightSample { wi, distance, irradiance, density: L::from_f64(L::MAX) }
     }
 
     /// Returns the irradiance that the light, with unit strength, causes at normal incidence at the
@@ -227,7 +213,7 @@ mod tests {
                         Falloff::None => PI,
                         Falloff::InverseSquare => distance.powi(-2),
                     };
-                    let found = sample.irradiance.lane(0).to_f64();
+                    let found = sample.irradiance.x.lane(0).to_f64();
                     let slope = if low > high { angle.sin() / (low - high) } else { 0.0 };
                     let error = 16.0 * epsilon * (1.0 + slope);
                     assert!(
@@ -256,7 +242,7 @@ mod tests {
             let angle = f64::to_radians(degrees);
             let along = axis * angle.cos() + axis.any_orthonormal_vector() * angle.sin();
             let point = DVec3::from(position) + along;
-            let found = compiled.sample_li(Vec3::<f64>::of(point.to_array())).irradiance;
+            let found = compiled.sample_li(Vec3::<f64>::of(point.to_array())).irradiance.x;
             assert_eq!(found, expected, "{degrees}");
         }
     }

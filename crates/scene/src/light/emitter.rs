@@ -2,7 +2,7 @@
 //! densities.
 
 use crate::light::area::EmitterSurface;
-use crate::light::{Light, LightUnit};
+use crate::light::{Light, LightSample, LightUnit};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 use zerkalo_kernel::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
@@ -43,21 +43,6 @@ pub struct Emitter<S> {
     /// Radiance of the emitter for white colour and intensity 1, the same at every point and in
     /// every direction.
     pub radiance: S,
-}
-
-/// Light that arrives at surface points from sampled points of an emitter, one point per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct EmitterSample<L> {
-    /// Unit vector from the surface point towards the sampled point.
-    pub wi: Vec3<L>,
-    /// Distance from the surface point to the sampled point.
-    pub distance: L,
-    /// Probability density \[1/sr\] with which the direction `wi` is sampled; zero if no light
-    /// arrives.
-    pub density: L,
-    /// Estimate of the irradiance from one sample: the radiance of the emitter divided by
-    /// `density`. Zero if no light arrives.
-    pub irradiance: L,
 }
 
 impl<S: Float> Emitter<S> {
@@ -169,7 +154,7 @@ impl<S: Float> Emitter<S> {
         &self,
         origin: Vec3<L>,
         (u, v): (L, L),
-    ) -> EmitterSample<L> {
+    ) -> LightSample<L> {
         let to_center = Vec3::splat(self.center) - origin;
         match &self.surface {
             Surface::Sphere { radius } => {
@@ -236,10 +221,10 @@ impl<S: Float> Emitter<S> {
         wi: Vec3<L>,
         distance: L,
         density: L,
-    ) -> EmitterSample<L> {
+    ) -> LightSample<L> {
         let arrives = density.gt(L::zero());
         let irradiance = (L::splat(self.radiance) / density).min(L::from_f64(L::MAX));
-        EmitterSample { wi, distance, density, irradiance: irradiance.masked(arrives) }
+        LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
     }
 }
 

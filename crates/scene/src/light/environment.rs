@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::Light;
+use crate::light::{Light, LightSample};
 use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -77,18 +77,6 @@ pub struct EnvironmentLight {
     rotation: (f64, f64),
 }
 
-/// Light that arrives from sampled directions of an environment, one direction per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct EnvironmentSample<L> {
-    /// Unit vector towards the environment, from which the light arrives.
-    pub wi: Vec3<L>,
-    /// Probability density \[1/sr\] with which the direction `wi` is sampled.
-    pub density: L,
-    /// Estimate of the irradiance from one sample: the radiance of the environment divided by
-    /// `density`.
-    pub irradiance: Vec3<L>,
-}
-
 impl EnvironmentLight {
     /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
     /// its image is not loaded.
@@ -135,7 +123,7 @@ impl EnvironmentLight {
     /// Samples a direction for each of `lanes`, with a density in proportion to the environment's
     /// luminance. In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
     #[inline(never)]
-    pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> EnvironmentSample<L> {
+    pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> LightSample<L> {
         let (sin, cos) = self.rotation;
         let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
         let mut density = [1.0; MAX_WIDTH];
@@ -146,10 +134,11 @@ impl EnvironmentLight {
             irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
             density[lane] = p;
         });
-        EnvironmentSample {
+        LightSample {
             wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
-            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
+            distance: L::from_f64(L::MAX),
             irradiance: Vec3::from_fn(|lane| irradiance[lane].map(L::Scalar::from_f64)),
+            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
         }
     }
 }

@@ -5,12 +5,14 @@ mod delta;
 mod emitter;
 mod environment;
 mod object_emitter;
+mod sample;
 
 pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
-pub use delta::{DeltaLight, LightSample, SpotCone, spot_factor};
-pub use emitter::{Emitter, EmitterSample};
-pub use environment::{Environment, EnvironmentLight, EnvironmentSample};
+pub use delta::{DeltaLight, SpotCone, spot_factor};
+pub use emitter::Emitter;
+pub use environment::{Environment, EnvironmentLight};
 pub use object_emitter::{ObjectEmitter, ObjectSurface};
+pub use sample::LightSample;
 
 use glam::DVec3;
 

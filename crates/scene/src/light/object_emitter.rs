@@ -6,7 +6,7 @@
 //! not occlude its own points. The lift is along the normal and larger than the rounding errors of
 //! the surface. It therefore suffices for rays at any angle.
 
-use crate::light::EmitterSample;
+use crate::light::LightSample;
 use crate::light::emitter::{
     Cone, MIN_SOLID_ANGLE, SphericalRectangle, density_of_area, local_of, towards,
 };
@@ -180,7 +180,7 @@ impl<S: Float> ObjectEmitter<S> {
         &self,
         origin: Vec3<L>,
         (u, v): (L, L),
-    ) -> EmitterSample<L> {
+    ) -> LightSample<L> {
         let (wi, distance, density, pdf) = match &self.surface {
             CompiledSurface::Sphere { center, radius } => {
                 let to_center = Vec3::splat(*center) - origin;
@@ -247,7 +247,7 @@ impl<S: Float> ObjectEmitter<S> {
         };
         let arrives = pdf.gt(L::zero());
         let irradiance = (L::one() / pdf).min(L::from_f64(L::MAX)).masked(arrives);
-        EmitterSample { wi, distance, density, irradiance }
+        LightSample { wi, distance, irradiance: Vec3::gray(irradiance), density }
     }
 
     /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction of a
@@ -599,7 +599,7 @@ mod tests {
                         "{surface:?} from {point}, sample {i}: {found}, sampled {}",
                         sample.density
                     );
-                    assert!((sample.density * sample.irradiance - 1.0).abs() < 1e-9);
+                    assert!((sample.density * sample.irradiance.x - 1.0).abs() < 1e-9);
                 }
             }
         }
@@ -631,7 +631,7 @@ mod tests {
                 }
                 let count = 20_000;
                 let sum: f64 =
-                    (0..count).map(|i| emitter.sample(origin, numbers(i)).irradiance).sum();
+                    (0..count).map(|i| emitter.sample(origin, numbers(i)).irradiance.x).sum();
                 let mean = sum / f64::from(count);
                 let limit = if triangles.len() > MAX_FACES { 1e-2 } else { 1e-9 };
                 assert!(
@@ -648,13 +648,13 @@ mod tests {
         for surface in &surfaces()[1..3] {
             let emitter = ObjectEmitter::<f64>::new(surface, false, LIFT).unwrap();
             let irradiance = |point: DVec3| {
-                emitter.sample(Vec3::<f64>::of(point.to_array()), (0.3, 0.6)).irradiance
+                emitter.sample(Vec3::<f64>::of(point.to_array()), (0.3, 0.6)).irradiance.x
             };
             assert!(irradiance(front) > 0.0 && irradiance(back) == 0.0, "{surface:?}");
         }
         let ball = ObjectEmitter::<f64>::new(&surfaces()[0], false, LIFT).unwrap();
         let irradiance =
-            |x: f64| ball.sample(Vec3::<f64>::of([x, 0.0, 0.0]), (0.3, 0.6)).irradiance;
+            |x: f64| ball.sample(Vec3::<f64>::of([x, 0.0, 0.0]), (0.3, 0.6)).irradiance.x;
         assert!(irradiance(0.7) > 0.0 && irradiance(0.5) == 0.0);
     }
 

@@ -10,13 +10,13 @@ mod texture;
 mod texture_eval;
 
 pub use bsdf::{
-    Bsdf, BsdfSample, ReflectionLobe, SpecularModel, Transmission, one_minus_cos_of_tan,
+    Bsdf, BsdfQuery, BsdfSample, BsdfValue, ReflectionLobe, SpecularModel, Transmission,
 };
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
-pub use microfacet::{MicrofacetDistribution, SMOOTH_ALPHA};
+pub use microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
 pub use refraction::{FresnelSplit, Interface};
-pub use rough_interface::{InterfaceMedia, InterfaceSample};
+pub use rough_interface::{InterfaceQuery, InterfaceSample};
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,

@@ -11,12 +11,11 @@
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
 //! therefore adds nothing where it reaches an emitter or escapes to an environment.
 
-use crate::culling::tile::TileCandidates;
+use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::CoincidentState;
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::MediumStack;
-use crate::integrator::opaque::trace_opaque;
-use crate::integrator::path::{Counts, Path, Radiance};
+use crate::integrator::path::{Path, Radiance};
 use crate::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::World;
 use zerkalo_kernel::bvh::Ray;
@@ -152,54 +151,48 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     }
 }
 
-/// Traces camera rays in a scene with indirect diffuse light, and adds the radiance to `out`.
-/// `limits` are the limits of diffuse bounces.
-#[inline(never)]
-pub(crate) fn trace_generations<L: SimdFloat>(
-    world: &World<L>,
-    limits: DiffuseLimits,
-    ray: Ray<L>,
-    candidates: &TileCandidates,
-    sampler: &PacketSampler<'_, L>,
-    active: L::Mask,
-    out: &mut Radiance<L>,
-) -> Counts {
-    let mut counts = Counts::default();
-    let mut start = Branch::camera(ray, active);
-    if let Some(nested_dielectrics) = &world.nested_dielectrics {
-        nested_dielectrics.add_at_start(&ray, &mut start.media);
-    }
-    // Largest number of surfaces that a path of this generation can hit after its first surface.
-    let mut depth = world.depth;
-    for generation in 0..=limits.depth {
-        let sampler = sampler.generation(generation);
-        let candidates = if generation == 0 { candidates } else { &world.all_candidates };
-        let mut reservoir = (generation < limits.depth).then(DiffuseReservoir::new);
-        let traced = match &world.nested_dielectrics {
-            Some(nested_dielectrics) => {
-                TransmissionIntegrator { world, nested_dielectrics, sampler: &sampler }.trace(
-                    &mut start,
-                    depth,
-                    candidates,
-                    reservoir.as_mut(),
-                    out,
-                )
-            }
-            None => {
-                let reservoir = reservoir.as_mut();
-                let paths = (&mut start.path, start.lanes, depth);
-                trace_opaque::<_, false, true>(world, paths, candidates, &sampler, reservoir, out)
-            }
-        };
-        counts.rays += traced.rays;
-        counts.glossy |= traced.glossy;
-        let Some(reservoir) = reservoir else { break };
-        depth = if limits.caustics { world.depth } else { 0 };
-        start = reservoir.start(world, sampler.diffuse_2d(generation));
-        if start.lanes.none() {
-            break;
+impl<L: SimdFloat> Integrator<'_, L> {
+    /// Traces camera rays in a scene with indirect diffuse light, within `limits`, and adds the
+    /// radiance to `out`.
+    #[inline(never)]
+    pub fn trace_generations(
+        &self,
+        limits: DiffuseLimits,
+        ray: Ray<L>,
+        active: L::Mask,
+        out: &mut Radiance<L>,
+    ) {
+        let world = self.world;
+        let mut start = Branch::camera(ray, active);
+        if let Some(nested_dielectrics) = &world.nested_dielectrics {
+            nested_dielectrics.add_at_start(&ray, &mut start.media);
         }
-        counts.glossy = true;
+        let (mut candidates, mut depth) = (self.candidates, self.depth);
+        for generation in 0..=limits.depth {
+            let sampler = &self.sampler.generation(generation);
+            let integrator = Integrator { world, sampler, candidates, depth };
+            let mut reservoir = (generation < limits.depth).then(DiffuseReservoir::new);
+            match &world.nested_dielectrics {
+                Some(nested_dielectrics) => {
+                    TransmissionIntegrator { base: integrator, nested_dielectrics }.trace(
+                        &mut start,
+                        reservoir.as_mut(),
+                        out,
+                    );
+                }
+                None => {
+                    let (path, lanes) = (&mut start.path, start.lanes);
+                    integrator.trace_opaque::<false, true>(path, lanes, reservoir.as_mut(), out);
+                }
+            }
+            let Some(reservoir) = reservoir else { break };
+            start = reservoir.start(world, sampler.diffuse_2d(generation));
+            if start.lanes.none() {
+                break;
+            }
+            out.counts.glossy = true;
+            candidates = &world.all_candidates;
+            depth = if limits.caustics { world.depth } else { 0 };
+        }
     }
-    counts
 }

@@ -87,8 +87,14 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.shaded = self.shaded | lanes;
     }
 
-    /// Returns `direction`. In lanes in which it points into the geometric surface, it is mirrored
-    /// at the tangent plane of this surface.
+    /// Returns the mirror image of `direction` at the geometric surface.
+    #[inline(always)]
+    pub fn mirrored(&self, direction: Vec3<L>) -> Vec3<L> {
+        let height = direction.dot(self.geometric);
+        self.geometric.mul_add(height * L::from_f64(-2.0), direction)
+    }
+
+    /// Returns `direction`, mirrored at the geometric surface in lanes in which it points into it.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());

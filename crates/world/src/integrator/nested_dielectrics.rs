@@ -9,11 +9,12 @@
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::Contacts;
 use crate::integrator::interaction::SurfaceInteraction;
+use crate::integrator::vertex::Vertex;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
 use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId};
-use zerkalo_scene::material::Bsdf;
+use zerkalo_scene::material::{Bsdf, InterfaceQuery};
 
 /// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
 /// inside of more solids, the stack holds those listed last in the scene file.
@@ -166,6 +167,21 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub medium_reflected: MediumStack<L>,
     /// Media that the transmitted rays are inside of.
     pub medium_transmitted: MediumStack<L>,
+}
+
+impl<L: SimdFloat> InterfaceHit<L> {
+    /// Returns the query of BSDFs at the hit points of `vertex`.
+    #[inline(always)]
+    pub fn query(&self, vertex: &Vertex<'_, L>) -> InterfaceQuery<L> {
+        InterfaceQuery {
+            rays: vertex.query(),
+            n_i: self.n_i,
+            n_t: self.n_t,
+            outer: self.outer,
+            thin: self.thin,
+            reflecting: vertex.interaction.reflecting,
+        }
+    }
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {

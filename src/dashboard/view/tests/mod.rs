@@ -34,7 +34,7 @@ fn row_text(buffer: &Buffer, y: u16) -> String {
             continue;
         }
         let symbol = buffer[(x, y)].symbol();
-        hidden = crate::dashboard::view::text::columns(symbol).saturating_sub(1);
+        hidden = crate::dashboard::text::columns(symbol).saturating_sub(1);
         text += symbol;
     }
     text.trim_end().to_string()

@@ -256,7 +256,7 @@ pub const STATES: &[Named] = &[
         select_first(m);
         m.mode = Mode::Move;
     }),
-    ("turning", |m| {
+    ("rotating", |m| {
         select_first(m);
         m.mode = Mode::Rotate;
     }),

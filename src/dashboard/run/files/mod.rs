@@ -1,25 +1,28 @@
-//! Thread that reads and writes the scene file and checks it for changes by other programs. Because
-//! it is a separate thread, a slow disk does not block the dashboard. Another thread writes the
-//! recovery files, and never waits for the scene file.
+//! Scene file and recovery file, each read and written by a thread of its own, so that a slow disk
+//! does not block the dashboard.
+
+mod autosave;
+mod autosave_worker;
+mod file_worker;
+mod shared_file;
 
 use crate::dashboard::message::Message;
-use crate::dashboard::run::autosave::Autosave;
-use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
-use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
+use autosave::Autosave;
+pub use autosave_worker::AutosaveJob;
+use autosave_worker::AutosaveWorker;
+use crossbeam_channel::{Sender, bounded, unbounded};
+use file_worker::FileWorker;
+pub use file_worker::Job;
+pub use shared_file::SharedFile;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use zerkalo_scene::disk::FileStamp;
-use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
+use zerkalo_scene::{Recovery, Scene, SceneFile};
 
-/// Interval between checks of the scene file for changes by other programs.
-const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest time that a save waits for the update of the recovery file.
-const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for the recovery file when the program ends. If the file cannot be written beside
@@ -27,23 +30,6 @@ const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// Together, these two waits and [`SAVED_WITHIN`] are shorter than the grace period after a
 /// terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
-
-pub(super) enum Job {
-    Save {
-        scene: Arc<Scene>,
-        path: Option<PathBuf>,
-        overwrite: bool,
-        /// Receiver that is disconnected as soon as the recovery file is up to date; the scene may
-        /// be saved then.
-        prepared: Receiver<()>,
-    },
-    /// Read the scene file. The result is a [`Message::Loaded`].
-    Load,
-    /// Continue with this scene file. Its text was recovered because the scene file on disk is
-    /// unreadable.
-    Adopt(Box<SceneFile>),
-    End,
-}
 
 /// Handle of two threads: one that reads and writes the scene file, and one that writes the
 /// recovery file.
@@ -152,7 +138,7 @@ impl Files {
     // Sending fails only after a panic of the thread, which `finish` propagates.
 
     /// Gives `job` to the thread that reads and writes the scene file.
-    pub(super) fn give(&self, job: Job) {
+    pub fn give(&self, job: Job) {
         let _ = self.jobs.send(job);
     }
 
@@ -193,119 +179,14 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-struct FileWorker {
-    /// Path of the scene file; `None` for a scene without file.
-    path: Option<PathBuf>,
-    /// Scene file as last read or written; `None` if it has never been readable.
-    file: Option<SceneFile>,
-    /// Stamp of the scene file when it was last read, written or checked.
-    seen: Option<FileStamp>,
-    /// Folder for the program's state according to the XDG specification; `None` if the user has no
-    /// such folder.
-    state: Option<PathBuf>,
-    autosaves: Sender<AutosaveJob>,
-    shared: SharedFile,
-    results: Sender<Message>,
-}
-
-impl FileWorker {
-    /// Executes jobs of the thread that reads and writes scene files, until [`Job::End`].
-    fn run(mut self, inbox: &Receiver<Job>) {
-        let mut checked = Instant::now();
-        loop {
-            let next_check = checked + CHECK_INTERVAL;
-            match inbox.recv_deadline(next_check) {
-                Ok(Job::Save { scene, path, overwrite, prepared }) => {
-                    let _ = prepared.recv_timeout(PREPARED_WITHIN);
-                    let saved = self.save(&scene, path, overwrite);
-                    self.send(Message::Saved(scene, saved));
-                }
-                Ok(Job::Load) => {
-                    let loaded = self.load();
-                    self.send(Message::Loaded(Box::new(loaded)));
-                }
-                Ok(Job::Adopt(file)) => self.file = Some(*file),
-                Err(RecvTimeoutError::Timeout) => {}
-                Ok(Job::End) | Err(RecvTimeoutError::Disconnected) => break,
-            }
-            let now = Instant::now();
-            if next_check <= now {
-                checked = now;
-                if self.changed() {
-                    self.send(Message::ChangedOnDisk);
-                }
-            }
-        }
-    }
-
-    fn send(&self, message: Message) {
-        // Sending fails only at the end of the program, when the receiver is gone.
-        let _ = self.results.send(message);
-    }
-
-    /// Returns `true` if another program has changed the scene file since the last read, write or
-    /// check.
-    fn changed(&mut self) -> bool {
-        let Some(path) = &self.path else { return false };
-        let now = FileStamp::of(path);
-        if self.seen == now {
-            return false;
-        }
-        self.seen = now;
-        match &self.file {
-            Some(file) => file.on_disk() == DiskState::Changed,
-            None => now.is_some(),
-        }
-    }
-
-    fn save(
-        &mut self,
-        scene: &Arc<Scene>,
-        path: Option<PathBuf>,
-        overwrite: bool,
-    ) -> Result<PathBuf, SaveError> {
-        let Some(file) = &mut self.file else {
-            let what = "its contents are not a scene".to_string();
-            return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
-        };
-        match path {
-            Some(path) => file.save_as(&path, scene, overwrite)?,
-            None => file.save(scene, overwrite)?,
-        }
-        let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
-        self.seen = FileStamp::of(&path);
-        let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
-        self.shared.set_elsewhere(recovery.elsewhere());
-        self.shared.put(file);
-        let _ = self.autosaves.send(AutosaveJob::Saved(Arc::clone(scene), path.clone()));
-        self.path = Some(path.clone());
-        Ok(path)
-    }
-
-    fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // The stamp is taken before the file is read, so that a write during the read counts as a
-        // change.
-        self.seen = self.path.as_deref().and_then(FileStamp::of);
-        let file = match (self.file.take(), &self.path) {
-            (Some(file), _) => {
-                let file = self.file.insert(file);
-                file.reload()?;
-                file
-            }
-            (None, Some(path)) => self.file.insert(SceneFile::open(path)?),
-            (None, None) => return Ok(Arc::default()),
-        };
-        let scene = Arc::new(file.document().scene().clone());
-        self.shared.put(file);
-        Ok(scene)
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::file_worker::CHECK_INTERVAL;
     use super::*;
     use crate::dashboard::testing::STARTER;
+    use crossbeam_channel::Receiver;
     use std::fs;
+    use zerkalo_scene::{SaveError, SceneErrors};
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
     /// it.

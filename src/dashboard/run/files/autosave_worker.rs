@@ -2,9 +2,8 @@
 //! are kept even if an access to the scene file blocks.
 
 use crate::dashboard::message::Message;
-use crate::dashboard::run::autosave::Autosave;
-use crate::dashboard::run::file_worker::Job;
-use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::files::autosave::Autosave;
+use crate::dashboard::run::files::{Job, SharedFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,11 +1,16 @@
 //! Exports of image files: the current picture, or a separate render at a size of the user's
 //! choice.
 
+pub mod image_upload;
+pub mod image_viewer;
+pub mod paths;
+mod shrink;
+
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::export_paths::{numbered, scp};
-use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use crossbeam_channel::Sender;
+use crossbeam_channel::{Sender, bounded};
+use paths::{numbered, scp};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,11 +18,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::Film;
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{EncodedCheckpoint, Options, RenderState};
+use zerkalo_render::session::{Picture, Session, State};
+use zerkalo_render::{EncodedCheckpoint, Options};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::Existing;
 
@@ -29,8 +33,8 @@ const LOOK: Duration = Duration::from_millis(200);
 #[derive(Clone)]
 pub struct Exporter {
     /// Scene file as last read or written. The metadata of exported images contain its name and a
-    /// hash of the scene.
-    pub file: SharedFile,
+    /// hash of the scene. `None` for watched films, whose metadata name their scene file.
+    pub file: Option<SharedFile>,
     /// Path of a scene file that was unreadable at the start; `None` if it was readable.
     pub unreadable_path: Option<PathBuf>,
     /// Kind of random numbers with which the picture is rendered, for the metadata of the image.
@@ -41,21 +45,27 @@ pub struct Exporter {
 }
 
 impl Exporter {
-    /// Writes the picture of `rendering` to a file with the next free name.
-    pub fn write(
-        &self,
-        rendering: &RenderState,
-        report: &Report,
-        format: Format,
-    ) -> Result<Exported, String> {
-        let provenance = self.provenance(rendering.scene());
-        let display = rendering.display();
+    /// Creates the writer of pictures of watched films.
+    pub fn of_films() -> Self {
+        Self { file: None, unreadable_path: None, sampler: SamplerKind::Sobol, adaptive: true }
+    }
+
+    /// Writes `picture` to a file with the next free name.
+    pub fn write(&self, picture: &Picture, format: Format) -> Result<Exported, String> {
+        let header = picture.header(|scene| self.provenance(scene));
         let write = |path: &Path| {
-            let target = ImageOutput::from_path(path)?.create_new();
-            rendering.write(report, &provenance, display, Depth::Eight, &target)
+            let output = ImageOutput::from_path(path)?.create_new();
+            output.write_film(&header, picture.film, Depth::Eight)
         };
-        let path = numbered(&self.stem(), format.extension(), write)?;
-        Ok(exported(path, &rendering.film, report))
+        let stem = self.stem(header.source().unwrap_or_default());
+        let path = numbered(&stem, format.extension(), write)?;
+        Ok(Exported {
+            scp: scp(&path),
+            path,
+            size: [picture.film.width(), picture.film.height()],
+            spp: picture.report.spp.mean,
+            noise_levels: picture.report.noise.map(|noise| noise.rmse_levels),
+        })
     }
 
     /// Returns the provenance of a picture of `scene` for the metadata of the image: scene file,
@@ -76,28 +86,28 @@ impl Exporter {
         checkpoint: Option<EncodedCheckpoint>,
     ) -> Result<PathBuf, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
-        numbered(&self.stem(), "zk", |path| checkpoint.write(path, Existing::Refuse))
+        numbered(&self.stem(""), "zk", |path| checkpoint.write(path, Existing::Refuse))
     }
 
     /// Returns the beginning of the names of exported files: the name of the scene file without its
-    /// extension.
-    fn stem(&self) -> String {
-        match self.file.get() {
+    /// extension. `source` is the name of a scene file that this process has not read.
+    fn stem(&self, source: &str) -> String {
+        match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => stem(file.path(), file.document().name()),
-            None => stem(self.unreadable_path.as_deref(), ""),
+            None => stem(self.unreadable_path.as_deref(), source),
         }
     }
 
     /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
     /// to it.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.file.get() {
+        match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => {
                 let mut document = file.document().clone();
                 document.apply(scene);
                 (document.name().to_string(), document.text().to_string())
             }
-            None => (self.stem(), scene.to_text()),
+            None => (self.stem(""), scene.to_text()),
         }
     }
 }
@@ -185,27 +195,18 @@ fn render(
         }
     }
     let exporter = exporter.clone();
-    let written = session.with(move |rendering, report| exporter.write(rendering, report, format));
-    Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
-}
-
-/// Returns the description of an exported image, for the user. `path` is the path of the image
-/// file, `film` the film with the exported picture, and `report` the renderer's report on this
-/// film.
-pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
-    Exported {
-        scp: scp(&path),
-        path,
-        size: [film.width(), film.height()],
-        spp: report.spp.mean,
-        noise_levels: report.noise.map(|noise| noise.rmse_levels),
-    }
+    let (sender, receiver) = bounded(1);
+    session.submit(move |picture| {
+        let written = picture.map(|picture| exporter.write(&picture, format));
+        let _ = sender.send(written.unwrap_or(Err("the renderer has no picture".to_string())));
+    });
+    receiver.recv().ok()
 }
 
 /// Returns the beginning of the names of exported files, such as `room` in `room-2.png`. It is the
 /// name of the scene file at `path` without its extension. If `path` is `None`, `name` takes the
 /// place of the scene file's name.
-pub fn stem(path: Option<&Path>, name: &str) -> String {
+fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     stem.filter(|stem| !stem.is_empty()).unwrap_or("picture".to_string())

@@ -1,11 +1,8 @@
-//! Reading and encoding of exported images for the image viewer, and reports on their upload.
+//! Reading and encoding of exported images for the image viewer.
 
 use crate::dashboard::message::Message;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::run::exports::shrink::shrunk;
 use crate::dashboard::run::frames::FramePipeline;
-use crate::dashboard::run::image_upload::ImageUpload;
-use crate::dashboard::run::shrink::shrunk;
-use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
 use crossbeam_channel::Sender;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -70,20 +67,4 @@ fn viewer_image(
         let size = layout.shown.map(|n| n as u32);
         png_of_rgb(size, image.pixels.as_flattened()).map_err(|error| error.to_string())
     })
-}
-
-impl Dashboard {
-    /// Reports the progress of an image transfer to the model, at most once per
-    /// [`STATUS_INTERVAL`]. The end of the transfer is reported at once.
-    pub(super) fn report_upload(&mut self, now: Duration) {
-        let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
-        let known = match &self.model.overlay {
-            Some(Overlay::ViewerImage(viewed)) => viewed.sent,
-            _ => return,
-        };
-        if sent != known && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
-            self.status_sent_at = now;
-            self.dispatch(Message::ImageSent(sent));
-        }
-    }
 }
