@@ -1,6 +1,7 @@
 //! Hash of the contents of the files that a scene names. The text of a scene has only their names.
 
 use crate::Scene;
+use crate::light::Light;
 use crate::value::Fnv1a64;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -29,7 +30,7 @@ impl Scene {
         });
         let images = materials.values().flat_map(|material| material.images());
         add_each(&mut hash, images, |image, hash| image.hash_contents(hash));
-        let environments = lights.iter().filter_map(|light| light.environment.as_ref());
+        let environments = lights.iter().filter_map(Light::environment);
         let maps = environments.filter_map(|environment| environment.map());
         add_each(&mut hash, maps, |map, hash| map.hash_contents(hash));
         (hash != Fnv1a64::default()).then(|| hash.value())

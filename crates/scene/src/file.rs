@@ -184,8 +184,7 @@ impl SceneFile {
         let resolver = &scene.resolver;
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
-        let environments =
-            scene.lights.iter().filter_map(|light| light.environment.as_ref()?.file());
+        let environments = scene.lights.iter().filter_map(|light| light.environment()?.file());
         if let Some(file) = meshes
             .chain(images)
             .chain(environments)

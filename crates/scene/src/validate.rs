@@ -3,6 +3,7 @@
 use crate::Scene;
 use crate::diagnostic::MAX_REPORTED;
 use crate::format::suggest::did_you_mean;
+use crate::light::Light;
 use crate::material::Mapping;
 use crate::value::{Description, ValidationError, truncated};
 use std::borrow::Cow;
@@ -107,7 +108,7 @@ impl Scene {
         for object in &mut self.objects {
             object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }
-        for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
+        for environment in self.lights.iter_mut().filter_map(Light::environment_mut) {
             environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
         }
         for material in self.materials.values_mut() {

@@ -3,12 +3,11 @@
 #![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::edit::bounds::{BoundingSphere, scene_bounds};
-use crate::edit::convert::{LIGHT_KINDS, set_kind};
 use crate::edit::placement::place_for;
 use crate::edit::properties::{Word, words};
 use crate::edit::unique_name::{free_light, free_material, free_object};
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{Falloff, Light};
+use crate::light::{Falloff, Light, LightKind, Placement};
 use crate::material::Material;
 use crate::shape::{KINDS, Shape, compose};
 use crate::value::{
@@ -26,7 +25,7 @@ pub fn object_kinds() -> Vec<Word> {
 
 /// Returns the name and a description of each kind of light that can be added.
 pub fn light_kinds() -> Vec<Word> {
-    words(LIGHT_KINDS)
+    words(crate::light::KINDS)
 }
 
 /// Linear colours of new materials: the first that no other material has.
@@ -155,15 +154,15 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
     let toward = if lit > 0.0 { -right } else { right };
     let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
-    let mut light = Light::default();
     let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
-    set_kind(&mut light, kind, position, direction, radius / 5.0);
-    if light.kinds().is_empty() {
+    let placement = Placement { position, direction, radius: radius / 5.0 };
+    let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
-        let kinds = crate::light::KINDS.join(", ");
+        let kinds = names(crate::light::KINDS);
         return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
-    }
+    };
+    let mut light = Light::new(placed);
     let name = match kind {
         "directional" => "sun",
         "spot" => "spot",
@@ -278,7 +277,7 @@ mod tests {
                 (Some(position), _) => position[0],
                 (None, Some(direction)) => -direction[0],
                 (None, None) => {
-                    assert!(light.environment.is_some() && light.name == "sky");
+                    assert!(light.environment().is_some() && light.name == "sky");
                     continue;
                 }
             };

@@ -226,7 +226,7 @@ mod tests {
         assert_eq!(a.0.y, b.0.y);
         let lamp = duplicate(&scene, &Target::Light(0)).unwrap().scene;
         assert_eq!(lamp.lights[1].name, "lamp 2");
-        assert_ne!(lamp.lights[1].point, lamp.lights[0].point);
+        assert_ne!(lamp.lights[1].kind, lamp.lights[0].kind);
         let red = duplicate(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(red.subject, Target::Material("red 2".into()));
         assert!(duplicate(&scene, &Target::Film).is_err());

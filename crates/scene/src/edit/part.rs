@@ -25,7 +25,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
-        Target::Light(_) => light::KINDS,
+        Target::Light(_) => light::KIND_KEYS,
         Target::Material(_) => &["f0", "metal"],
         Target::Ambient
         | Target::Background

@@ -82,17 +82,15 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         | Target::IntegratorSettings => None,
     };
     let given = given_key(part, subject);
-    let has_size = match subject {
-        Target::Light(i) => scene.lights[*i].surface().is_some(),
-        _ => true,
+    let light = match subject {
+        Target::Light(i) => scene.lights.get(*i),
+        _ => None,
     };
+    let hidden_key = |name: &str| light.is_some_and(|light| !light.has_key(name));
     for field in fields(subject) {
-        let is_environment = given == Some("environment");
-        if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
-            // Only lights with a size have a unit; only they and environments are visible.
+        if hidden_key(field.name) {
             continue;
         }
-        let Some(node) = part.child(field.name) else { continue };
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {
@@ -100,12 +98,14 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
             if exclusive_keys(subject)[0] == field.name {
                 walk.kind(kind, given, kind.name.to_string(), 0);
             }
-            if given == Some(field.name) {
+            if given == Some(field.name)
+                && let Some(node) = part.child(field.name)
+            {
                 walk.field(field, node, field.name.to_string(), 1);
             }
-            continue;
+        } else if let Some(node) = part.child(field.name) {
+            walk.field(field, node, field.name.to_string(), 0);
         }
-        walk.field(field, node, field.name.to_string(), 0);
     }
     Ok(walk.rows)
 }

@@ -26,13 +26,11 @@ pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, Edi
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
-            if let Some(direction) = light.direction_mut() {
+            let handles = light.kind.handles();
+            for direction in [handles.direction, handles.up].into_iter().flatten() {
                 *direction = rotated_y(*direction, degrees);
             }
-            if let Some(rectangle) = &mut light.rectangle {
-                rectangle.up = rotated_y(rectangle.up, degrees);
-            }
-            if let Some(position) = light.position_mut() {
+            if let Some(position) = handles.position {
                 let pivot = scene_bounds(scene).center;
                 let offset = std::array::from_fn(|i| position[i] - pivot[i]);
                 let offset = rotated_y(offset, degrees);
@@ -155,7 +153,7 @@ mod tests {
         for _ in 0..72 {
             round = rotate(&round, &Target::Light(0), 5.0).unwrap().scene;
         }
-        let [a, b] = [&scene, &round].map(|s| DVec3::from(s.lights[0].point.unwrap().position));
+        let [a, b] = [&scene, &round].map(|s| s.lights[0].apex().unwrap());
         assert!((a - b).length() < 1e-4, "{a} {b}");
         assert!(rotate(&scene, &Target::Camera, 5.0).is_err());
         assert!(rotate(&scene, &Target::Light(0), f64::NAN).is_err());

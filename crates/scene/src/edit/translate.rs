@@ -2,7 +2,7 @@
 
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{Directional, Light};
+use crate::light::Light;
 use crate::value::{floor_log10, rounded_to, unit};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
@@ -70,10 +70,10 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
 }
 
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
-    if let Some(position) = light.position_mut() {
+    let handles = light.kind.handles();
+    if let Some(position) = handles.position {
         *position = moved(*position, by);
-    }
-    if let Some(Directional { direction }) = &mut light.directional {
+    } else if let Some(direction) = handles.direction {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
@@ -87,6 +87,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::Directional;
     use crate::shape::Shape;
     use crate::testing::mirror_room;
 
@@ -113,11 +114,10 @@ mod tests {
         let mut scene = mirror_room();
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
-        assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
-        scene.lights[0].point = None;
-        scene.lights[0].directional = Some(Directional { direction: [0.0, -2.0, 0.0] });
+        assert_eq!(edit.scene.lights[0].position(), Some([2.0, 4.1, 3.0]));
+        scene.lights[0].kind = Directional { direction: [0.0, -2.0, 0.0] }.into();
         let edit = move_by(&scene, &lamp, [1.0, 0.0, 0.0]).unwrap();
-        let [x, y, z] = edit.scene.lights[0].directional.unwrap().direction;
+        let [x, y, z] = edit.scene.lights[0].direction().unwrap();
         assert!(x < 0.0 && y < 0.0 && z == 0.0, "{x} {y} {z}");
     }
 

@@ -200,6 +200,22 @@ impl SchemaChecker<'_> {
         }
     }
 
+    /// Adds an error if the table of a light, whose byte range is `span`, has no kind or several.
+    fn kind_of_light(&mut self, table: &DeTable, span: ops::Range<usize>) {
+        let is_known = |key: &str| light::FIELDS.iter().any(|field| field.name == key);
+        let is_kind = |key: &str| light::KIND_KEYS.contains(&key);
+        let mut given: Vec<_> = table.keys().filter(|key| is_kind(key.get_ref())).collect();
+        sort_by_number(&mut given, |key| key.span().start as i64);
+        let names: Vec<&str> = given.iter().map(|key| key.get_ref().as_ref()).collect();
+        let may_be_mistyped = given.is_empty() && !table.keys().all(|key| is_known(key.get_ref()));
+        if let Err((found, expected)) = light::check_kinds(&names)
+            && !may_be_mistyped
+        {
+            let span = given.get(1).map_or(span, |second| second.span());
+            self.add(span, found, format!("Expected {expected}."));
+        }
+    }
+
     fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>) {
         self.path.push(field.name.to_string());
         self.value(field, value);
@@ -234,7 +250,12 @@ impl SchemaChecker<'_> {
                 self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
             }
             (ValueType::Tables(fields), DeValue::Array(list)) => {
-                self.entries(list, "a table", |w, t, s| w.table(t, s, fields()));
+                self.entries(list, "a table", |w, t, s| {
+                    w.table(t, s.clone(), fields());
+                    if field.name == "light" {
+                        w.kind_of_light(t, s);
+                    }
+                });
             }
             (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {
