@@ -107,7 +107,7 @@ fn a8_point_light() {
         &[
             ("falling off with distance", &|s| warm(s).falloff = Falloff::InverseSquare),
             ("a directional light", &|s| {
-                warm(s).kind = Directional { direction: [2.2, -2.0, -1.2] }.into();
+                warm(s).kind = Directional::along([2.2, -2.0, -1.2]).into();
             }),
             ("another place", &|s| warm(s).kind = Point { position: [-2.2, 2.1, 1.2] }.into()),
             ("half the intensity", &|s| warm(s).intensity *= 0.5),
@@ -294,7 +294,7 @@ fn c3_what_the_tracks_lacked() {
                 s.lights[0].kind = Point { position: [-100.0, 100.0, 50.0] }.into();
             }),
             ("from another side", &|s| {
-                s.lights[0].kind = Directional { direction: [1.0, -1.0, 0.5] }.into();
+                s.lights[0].kind = Directional::along([1.0, -1.0, 0.5]).into();
             }),
         ],
     );

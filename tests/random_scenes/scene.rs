@@ -261,7 +261,7 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
         let strength = log(numbers, 1.0 / strongest, strongest);
         let area = if falloff == Falloff::None { 1.0 } else { spots.radius * spots.radius };
         // The order of the draws determines the scenes of all seeds.
-        let sun = far.then(|| Directional { direction: direction(numbers).to_array() });
+        let sun = far.then(|| Directional::along(direction(numbers).to_array()));
         let color = Color([(); 3].map(|()| numbers.unit()));
         let on = chance(numbers, 9, 10);
         let kind = match sun {

@@ -176,7 +176,7 @@ fn light() -> impl Strategy<Value = Light> {
             on,
             ..Light::new(match is_point {
                 true => LightKind::from(Point { position }),
-                false => Directional { direction }.into(),
+                false => Directional::along(direction).into(),
             })
         },
     )

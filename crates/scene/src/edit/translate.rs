@@ -115,7 +115,7 @@ mod tests {
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
         assert_eq!(edit.scene.lights[0].position(), Some([2.0, 4.1, 3.0]));
-        scene.lights[0].kind = Directional { direction: [0.0, -2.0, 0.0] }.into();
+        scene.lights[0].kind = Directional::along([0.0, -2.0, 0.0]).into();
         let edit = move_by(&scene, &lamp, [1.0, 0.0, 0.0]).unwrap();
         let [x, y, z] = edit.scene.lights[0].direction().unwrap();
         assert!(x < 0.0 && y < 0.0 && z == 0.0, "{x} {y} {z}");

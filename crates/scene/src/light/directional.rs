@@ -12,6 +12,13 @@ description! {
     }
 }
 
+impl Directional {
+    /// Creates parallel rays in the given direction.
+    pub fn along(direction: [f64; 3]) -> Self {
+        Self { direction }
+    }
+}
+
 impl LightDesc for Directional {
     fn form(&self) -> LightForm<'_> {
         LightForm::Distant { wi: -unit(self.direction).unwrap_or(DVec3::NEG_Y) }
@@ -22,6 +29,6 @@ impl LightDesc for Directional {
     }
 
     fn placed(placement: &Placement) -> Self {
-        Self { direction: placement.direction }
+        Self::along(placement.direction)
     }
 }

@@ -25,6 +25,16 @@ pub enum LightForm<'a> {
     Environment(&'a Environment),
 }
 
+impl LightForm<'_> {
+    /// Returns `true` if the camera and mirrors can see the light.
+    pub fn is_visible(&self) -> bool {
+        match self {
+            Self::Surface(_) | Self::Environment(_) => true,
+            Self::Point { .. } | Self::Distant { .. } => false,
+        }
+    }
+}
+
 /// Surface that emits light.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EmissiveSurface {

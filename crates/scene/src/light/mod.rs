@@ -100,12 +100,9 @@ impl Light {
         }
     }
 
-    /// Returns `true` if the camera and mirrors can see lights of this form.
+    /// Returns `true` if the camera and mirrors can see the light, unless `visible` is `false`.
     pub fn has_radiance(&self) -> bool {
-        match self.form() {
-            LightForm::Surface(_) | LightForm::Environment(_) => true,
-            LightForm::Point { .. } | LightForm::Distant { .. } => false,
-        }
+        self.form().is_visible()
     }
 
     /// Returns `true` if the key `name` has an effect on a light of this kind.
@@ -178,7 +175,7 @@ impl Light {
             Some(ValidationError::new(
                 "visible",
                 "visible is false, but no light of this kind is visible",
-                "visible = true, or a sphere, rectangle, disk or environment",
+                "visible = true, or a light with a size or an environment",
             ))
         } else {
             None
@@ -214,7 +211,7 @@ mod tests {
     fn falloff_belongs_to_point_and_spot_lights() {
         for (kind, has_falloff) in [
             (LightKind::from(Point { position: [0.0; 3] }), true),
-            (LightKind::from(Directional { direction: [0.0, -1.0, 0.0] }), false),
+            (LightKind::from(Directional::along([0.0, -1.0, 0.0])), false),
             (LightKind::from(SPOT), true),
         ] {
             let mut light = Light::new(kind);
@@ -250,7 +247,7 @@ mod tests {
             ..Light::new(Point { position: [f64::NAN, 0.0, 0.0] })
         };
         assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
-        let light = Light::new(Directional { direction: [0.0; 3] });
+        let light = Light::new(Directional::along([0.0; 3]));
         assert_eq!(keys(&light), ["directional.direction"]);
     }
 }

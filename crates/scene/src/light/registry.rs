@@ -152,8 +152,8 @@ macro_rules! kinds {
                 unit: LightUnit = "radiance";
                 /// Falloff of a point or spot light with the distance.
                 falloff: Falloff = "none";
-                /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from
-                /// the camera and from mirrors. It still lights diffuse surfaces and makes highlights.
+                /// `false` hides a light with a size, or an environment, from the camera and from
+                /// mirrors. It still lights diffuse surfaces and makes highlights.
                 visible: bool = true;
                 /// `false` switches the light off.
                 on: bool = true;
