@@ -2,6 +2,7 @@
 
 use crate::camera::{Camera, ViewAngle};
 use glam::DVec3;
+use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
 /// Perspective camera compiled for a film size. The direction to the corner of a pixel is computed
@@ -46,15 +47,10 @@ impl PerspectiveCamera {
         let [u, v, w] = camera.frame();
         let (width, height) = (f64::from(width), f64::from(height));
         // Half the width and half the height of the picture plane at unit distance from the eye.
+        let half = (0.5 * camera.view_angle.key_degrees().1).to_radians().tan();
         let (half_width, half_height) = match camera.view_angle {
-            ViewAngle::Vertical(degrees) => {
-                let half = (0.5 * degrees).to_radians().tan();
-                (half * width / height, half)
-            }
-            ViewAngle::Horizontal(degrees) => {
-                let half = (0.5 * degrees).to_radians().tan();
-                (half, half * height / width)
-            }
+            ViewAngle::Vertical(_) => (half * width / height, half),
+            ViewAngle::Horizontal(_) => (half, half * height / width),
         };
         Self {
             eye: DVec3::from(camera.eye) - origin,
@@ -128,11 +124,11 @@ impl PerspectiveCamera {
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns origin and unit direction of the rays through points of a pixel. The origins are on
-    /// the near plane. `base` is the pixel's [`PerspectiveCamera::pixel_corner_direction`]; `(dx,
-    /// dy)` is the offset from it, to the right and downward \[pixels\].
+    /// Returns the rays through points of a pixel, from the near plane. `base` is the pixel's
+    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from it, to the
+    /// right and downward \[pixels\].
     #[inline(always)]
-    pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
+    pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> Ray<L> {
         let dx_axis = Vec3::of(self.dx_axis.to_array());
         let dy_axis = Vec3::of(self.dy_axis.to_array());
         let direction = dx_axis.mul_add(dx, dy_axis.mul_add(dy, base));
@@ -140,12 +136,11 @@ impl PerspectiveCamera {
         // The component of `direction` along `w` is 1.
         let origin =
             if self.near > 0.0 { direction.mul_add(L::from_f64(self.near), eye) } else { eye };
-        (origin, direction.normalize())
+        Ray { origin, direction: direction.normalize() }
     }
 
-    /// Returns origin and unit direction of the rays through the points `(x, y)` of the lens, in
-    /// the unit disk, to the right and upward. The other arguments are those of
-    /// [`PerspectiveCamera::rays`].
+    /// Returns the rays through the points `(x, y)` of the lens, in the unit disk, to the right and
+    /// upward. The other arguments are those of [`PerspectiveCamera::rays`].
     ///
     /// The ray starts at eye + o, where o is the vector to the point of the lens, in the direction
     /// d - o / f. It crosses the ray through the eye in the plane in focus (Cook, Porter and
@@ -157,7 +152,7 @@ impl PerspectiveCamera {
         base: Vec3<L>,
         (dx, dy): (L, L),
         (x, y): (L, L),
-    ) -> (Vec3<L>, Vec3<L>) {
+    ) -> Ray<L> {
         let axis = |v: DVec3| Vec3::of(v.to_array());
         let (u, v) = (axis(self.u), axis(self.v));
         let across = u.mul_add(x, v * y);
@@ -168,6 +163,6 @@ impl PerspectiveCamera {
         if self.near > 0.0 {
             origin = direction.mul_add(L::from_f64(self.near), origin);
         }
-        (origin, direction.normalize())
+        Ray { origin, direction: direction.normalize() }
     }
 }

@@ -277,20 +277,16 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Mantissas of coarse steps, in hundredths. Successive ones differ by about a tenth.
+/// Mantissas of coarse steps, in thousandths. Successive ones differ by about a tenth.
 const RUNGS: [i64; 23] = [
-    100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
-    650, 700, 800, 900,
+    1000, 1100, 1200, 1300, 1400, 1600, 1800, 2000, 2200, 2500, 2800, 3000, 3300, 3600, 4000, 4500,
+    5000, 5500, 6000, 6500, 7000, 8000, 9000,
 ];
 
-/// Returns the width of a fine step at the mantissa `hundredths`: 1.00, 1.01 ... 2.00, 2.02 ...
-/// 5.00, 5.05 ... 9.95.
-fn fine_width(hundredths: i64) -> i64 {
-    match hundredths {
-        ..200 => 1,
-        200..500 => 2,
-        _ => 5,
-    }
+/// Returns the mantissas of fine steps: 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
+fn fine_rungs() -> Vec<i64> {
+    let parts = [(1000..2000).step_by(10), (2000..5000).step_by(20), (5000..10_000).step_by(50)];
+    parts.into_iter().flatten().collect()
 }
 
 /// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is a rung or
@@ -313,34 +309,17 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
 /// Returns the next rung above or below `x`, which is greater than 0.
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
-    let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
-    let mantissa = x * scale;
+    let mantissa = x * format!("1e{}", 3 - e).parse().unwrap_or(1.0);
+    let rungs = if fine { fine_rungs() } else { RUNGS.to_vec() };
     // Rounding errors may move a number slightly off its rung.
-    let nearest = mantissa.round();
-    let on_rung = (mantissa - nearest).abs() < 1e-6;
-    let below = if on_rung { nearest as i64 } else { mantissa.floor() as i64 };
-    let hundredths = match (up, fine) {
-        (true, true) => {
-            let width = fine_width(below);
-            (below / width + 1) * width
-        }
-        (false, true) => {
-            let reach = if on_rung { below - 1 } else { below };
-            let width = fine_width(reach.max(100));
-            // Below 1.00, the next fine rung is 9.95 of the next lower power of ten.
-            if reach < 100 {
-                return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
-            } else {
-                reach / width * width
-            }
-        }
-        (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
-        (false, false) => {
-            let under = |r: &i64| if on_rung { *r < below } else { *r <= below };
-            RUNGS.iter().rev().copied().find(under).unwrap_or(90)
+    let next = match up {
+        true => rungs.into_iter().find(|r| *r as f64 > mantissa + 1e-5).unwrap_or(10_000),
+        false => {
+            let below = if fine { 995 } else { 900 };
+            rungs.into_iter().rfind(|r| (*r as f64) < mantissa - 1e-5).unwrap_or(below)
         }
     };
-    format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
+    format!("{next}e{}", e - 3).parse().unwrap_or(x)
 }
 
 /// Returns a colour with its brightness changed; black becomes a dark grey.

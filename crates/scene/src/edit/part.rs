@@ -35,20 +35,27 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     }
 }
 
+/// Expands to the part of `$scene` that `$subject` names.
+macro_rules! part {
+    ($scene:ident, $subject:ident, $get:ident, $($reference:tt)+) => {{
+        let part: Option<$($reference)+ dyn KeyNode> = match $subject {
+            Target::Camera => Some($($reference)+ $scene.camera),
+            Target::View(name) => $scene.cameras.$get(name).map(|camera| camera as _),
+            Target::Ambient => Some($($reference)+ $scene.ambient),
+            Target::Background => Some($($reference)+ $scene.background),
+            Target::Light(i) => $scene.lights.$get(*i).map(|light| light as _),
+            Target::Object(i) => $scene.objects.$get(*i).map(|object| object as _),
+            Target::Material(name) => $scene.materials.$get(name).map(|material| material as _),
+            Target::Film => Some($($reference)+ $scene.film),
+            Target::IntegratorSettings => Some($($reference)+ $scene.trace),
+        };
+        part.ok_or_else(|| EditError::gone($subject))
+    }};
+}
+
 /// Returns the part of `scene` that `subject` names.
 pub(super) fn part<'a>(scene: &'a Scene, subject: &Target) -> Result<&'a dyn KeyNode, EditError> {
-    let part: Option<&dyn KeyNode> = match subject {
-        Target::Camera => Some(&scene.camera),
-        Target::View(name) => scene.cameras.get(name).map(|camera| camera as _),
-        Target::Ambient => Some(&scene.ambient),
-        Target::Background => Some(&scene.background),
-        Target::Light(i) => scene.lights.get(*i).map(|light| light as _),
-        Target::Object(i) => scene.objects.get(*i).map(|object| object as _),
-        Target::Material(name) => scene.materials.get(name).map(|material| material as _),
-        Target::Film => Some(&scene.film),
-        Target::IntegratorSettings => Some(&scene.trace),
-    };
-    part.ok_or_else(|| EditError::gone(subject))
+    part!(scene, subject, get, &)
 }
 
 /// Returns [`part`] as a mutable reference.
@@ -56,18 +63,7 @@ pub(super) fn part_mut<'a>(
     scene: &'a mut Scene,
     subject: &Target,
 ) -> Result<&'a mut dyn KeyNode, EditError> {
-    let part: Option<&mut dyn KeyNode> = match subject {
-        Target::Camera => Some(&mut scene.camera),
-        Target::View(name) => scene.cameras.get_mut(name).map(|camera| camera as _),
-        Target::Ambient => Some(&mut scene.ambient),
-        Target::Background => Some(&mut scene.background),
-        Target::Light(i) => scene.lights.get_mut(*i).map(|light| light as _),
-        Target::Object(i) => scene.objects.get_mut(*i).map(|object| object as _),
-        Target::Material(name) => scene.materials.get_mut(name).map(|material| material as _),
-        Target::Film => Some(&mut scene.film),
-        Target::IntegratorSettings => Some(&mut scene.trace),
-    };
-    part.ok_or_else(|| EditError::gone(subject))
+    part!(scene, subject, get_mut, &mut)
 }
 
 /// Returns the given one of the [`exclusive_keys`].

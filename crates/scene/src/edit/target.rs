@@ -1,5 +1,6 @@
 //! Edit targets: parts of a scene that can be selected and edited.
 
+use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
 
@@ -88,17 +89,7 @@ pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
 impl Target {
     /// Returns `true` if `scene` has the target.
     pub fn exists(&self, scene: &Scene) -> bool {
-        match self {
-            Self::View(name) => scene.cameras.contains_key(name),
-            Self::Light(i) => *i < scene.lights.len(),
-            Self::Object(i) => *i < scene.objects.len(),
-            Self::Material(name) => scene.materials.contains_key(name),
-            Self::Camera
-            | Self::Ambient
-            | Self::Background
-            | Self::Film
-            | Self::IntegratorSettings => true,
-        }
+        part(scene, self).is_ok()
     }
 
     /// Returns the path in a scene file: keys and list indices, such as `object`, `3`.
