@@ -6,7 +6,7 @@ use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo_scene::light::{Light, LightUnit};
+use zerkalo_scene::light::{Light, LightKind, LightUnit};
 
 /// Lamp: a light with a size.
 pub enum Lamp {
@@ -22,26 +22,33 @@ pub type Arrival = (DVec3, f64, f64);
 impl Lamp {
     /// Creates the lamp of a light with a size. Returns `None` for a light without a size.
     pub fn new(light: &Light) -> Option<Self> {
-        if let Some(sphere) = &light.sphere {
-            return Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius });
+        match &light.kind {
+            LightKind::Sphere(sphere) => {
+                Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius })
+            }
+            LightKind::Rectangle(rectangle) => {
+                let normal = DVec3::from(rectangle.normal).normalize();
+                let given = DVec3::from(rectangle.up);
+                let parallel = given.cross(normal).length() < 1e-6;
+                let given = if parallel { DVec3::Z } else { given };
+                let across = given.cross(normal).normalize();
+                let up = normal.cross(across);
+                Some(Self::Rectangle {
+                    center: rectangle.center.into(),
+                    across: across * rectangle.size[0],
+                    up: up * rectangle.size[1],
+                    normal,
+                })
+            }
+            LightKind::Disk(disk) => {
+                let normal = DVec3::from(disk.normal).normalize();
+                Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
+            }
+            LightKind::Point(_)
+            | LightKind::Directional(_)
+            | LightKind::Spot(_)
+            | LightKind::Environment(_) => None,
         }
-        if let Some(rectangle) = &light.rectangle {
-            let normal = DVec3::from(rectangle.normal).normalize();
-            let given = DVec3::from(rectangle.up);
-            let parallel = given.cross(normal).length() < 1e-6;
-            let given = if parallel { DVec3::Z } else { given };
-            let across = given.cross(normal).normalize();
-            let up = normal.cross(across);
-            return Some(Self::Rectangle {
-                center: rectangle.center.into(),
-                across: across * rectangle.size[0],
-                up: up * rectangle.size[1],
-                normal,
-            });
-        }
-        let disk = light.disk.as_ref()?;
-        let normal = DVec3::from(disk.normal).normalize();
-        Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
     }
 
     fn area(&self) -> f64 {
