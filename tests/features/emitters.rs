@@ -6,7 +6,7 @@ use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
 use crate::support::{parsed, shipped};
 use zerkalo_scene::light::{
-    Environment, Falloff, Light, LightKind, LightUnit, Point, RectangleLight,
+    Directional, Environment, Falloff, Light, LightKind, LightUnit, Point, RectangleLight,
 };
 use zerkalo_scene::{RayTypes, Scene};
 
@@ -98,6 +98,26 @@ fn d8_disk_light() {
             ("facing the wall", &|s| *lamp(s).direction_mut().unwrap() = [0.0, 0.0, -1.0]),
             ("radiance for power", &|s| lamp(s).unit = LightUnit::Radiance),
             ("another place", &|s| lamp(s).position_mut().unwrap()[1] += 0.2),
+        ],
+    );
+}
+
+#[test]
+fn d12_sun() {
+    fn sun(scene: &mut Scene) -> &mut Directional {
+        match &mut lamp(scene).kind {
+            LightKind::Directional(sun) => sun,
+            kind => panic!("a {} light is no sun", kind.key()),
+        }
+    }
+    alike(
+        "sun.toml",
+        &[
+            ("parallel rays", &|s| sun(s).angle = 0.0),
+            ("half the angle", &|s| sun(s).angle *= 0.5),
+            ("another direction", &|s| sun(s).direction[0] = 0.7),
+            ("invisible", &|s| lamp(s).visible = false),
+            ("half the intensity", &|s| lamp(s).intensity *= 0.5),
         ],
     );
 }
