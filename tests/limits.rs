@@ -2,8 +2,8 @@
 //! with the true bias, the difference between pictures with and without these limits.
 
 use crate::common;
-use crate::common::shape_examples::EXAMPLES;
 use crate::support;
+use zerkalo_scene::shape::EXAMPLES;
 
 use common::Numbers;
 use std::fmt::Write;

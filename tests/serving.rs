@@ -3,9 +3,9 @@
 //! every key of the scene format, from the tables of keys.
 
 use crate::common;
-use crate::common::shape_examples::EXAMPLES;
 use crate::common::tables;
 use crate::support;
+use zerkalo_scene::shape::EXAMPLES;
 
 use common::Numbers;
 use std::collections::BTreeSet;

@@ -4,10 +4,12 @@
 pub mod normal;
 pub mod rays;
 pub mod report;
-pub mod shape_examples;
 pub mod tables;
 
 use glam::DVec3;
+
+/// Text of `scenes/mirror-room.toml`.
+pub const MIRROR_ROOM: &str = include_str!("../../scenes/mirror-room.toml");
 
 /// Name of scenes that come from no file. Paths in them are relative to the workspace.
 pub const NAME: &str = concat!(env!("ZERKALO_ROOT"), "test");

@@ -3,13 +3,13 @@
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use crate::common::Numbers;
-use crate::common::shape_examples::EXAMPLES;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo_kernel::bvh::{Hit, Ray};
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::{Aggregate, Form, SurfacePoint};
 use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
+use zerkalo_scene::shape::EXAMPLES;
 use zerkalo_world::{AnyWorld, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.

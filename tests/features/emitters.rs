@@ -66,7 +66,7 @@ fn d5_rectangle_light() {
             ("the wrong side", &|s| lamp(s).direction_mut().unwrap()[1] = 1.0),
             ("sides exchanged", &|s| rectangle(s).size.reverse()),
             ("power for radiance", &|s| lamp(s).unit = LightUnit::Power),
-            ("a matt floor", &|s| material(s, "floor").reflection = 0.0),
+            ("a diffuse floor", &|s| material(s, "floor").reflection = 0.0),
         ],
     );
     let filled = |height: f64| {

@@ -37,12 +37,12 @@ fn a7_material() {
             agrees(&close_up(&original), &close_up(tested), 128)
         },
         &[
-            ("another colour", &|s| material(s, "matt").color = Color([0.7, 0.2, 0.15])),
+            ("another colour", &|s| material(s, "diffuse").color = Color([0.7, 0.2, 0.15])),
             ("no specularity", &|s| material(s, "shiny").specular = 0.0),
             ("no reflection", &|s| material(s, "reflecting").reflection = 0.0),
             ("a reflection coefficient of 0.8", &|s| material(s, "reflecting").reflection = 0.8),
             ("no roughness", &|s| material(s, "blurred").roughness = 0.0),
-            ("materials exchanged", &|s| object(s, "matt").material = "shiny".into()),
+            ("materials exchanged", &|s| object(s, "diffuse").material = "shiny".into()),
         ],
     );
 }

@@ -82,7 +82,7 @@ fn a6_flat_mirror() {
         "roughness-0.toml",
         |tested| shows_the_mirrored_room(&sharp, tested),
         &[
-            ("matt", &|s| material(s, "mirror").reflection = 0.0),
+            ("diffuse", &|s| material(s, "mirror").reflection = 0.0),
             ("rough", &|s| material(s, "mirror").roughness = 0.01),
             ("a mirror ball", &|s| {
                 object(s, "mirror").shape =

@@ -155,9 +155,9 @@ fn b5_tapered_cylinder() {
     shapes(
         "shape-tapered-cylinder.toml",
         &[
-            ("s of 1", "squeezed", "unit_cylinder = { s = 1.0 }"),
-            ("s of 0", "squeezed", "unit_cylinder = { s = 0.0 }"),
-            ("widening for narrowing", "squeezed", "unit_cylinder = { s = 1.4 }"),
+            ("s of 1", "squeezed", "unit_frustum = { s = 1.0 }"),
+            ("s of 0", "squeezed", "unit_frustum = { s = 0.0 }"),
+            ("widening for narrowing", "squeezed", "unit_frustum = { s = 1.4 }"),
             ("a sphere", "cylinder", "sphere = { center = [-1.5, 0.5, 0.0], radius = 0.35 }"),
             (
                 "a cylinder for a cone",

@@ -257,7 +257,7 @@ fn submitted_tasks_always_run_without_waiting() {
     let (answer, answers) = channel();
     let samples = |session: &Session| {
         let answer = answer.clone();
-        session.submit(move |film| answer.send(film.map(|(_, r)| r.generation)).unwrap());
+        session.submit(move |picture| answer.send(picture.map(|p| p.report.generation)).unwrap());
     };
     samples(&session);
     assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), None);
@@ -271,13 +271,10 @@ fn submitted_tasks_always_run_without_waiting() {
     session.set_stop(spp(16));
     let end = resting(&session, generation);
     let (keep, kept) = channel();
-    session.submit(move |film| {
-        keep.send(
-            film.map(|(r, _)| {
-                (LinearImage::of_film(&r.film, &r.mix), r.film.pixel(50, 40, &r.mix))
-            }),
-        )
-        .unwrap();
+    session.submit(move |picture| {
+        let kept =
+            picture.map(|p| (LinearImage::of_film(p.film, p.mix), p.film.pixel(50, 40, p.mix)));
+        keep.send(kept).unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
     for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {

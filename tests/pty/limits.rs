@@ -1,14 +1,14 @@
 //! Limits of the dashboard's memory and number of threads.
 
 use super::*;
-use zerkalo_scene::BUILT_IN;
+use crate::common::MIRROR_ROOM;
 
 /// Checks the refusal of a film of 4.4 GB under a limit of 1.5 GB of address space.
 #[test]
 #[cfg(target_os = "linux")]
 fn film_that_does_not_fit_is_refused_in_the_dashboard() {
     let fixture = Fixture::new();
-    let scene = BUILT_IN.replace("size = [640, 480]", "size = [16384, 4096]");
+    let scene = MIRROR_ROOM.replace("size = [640, 480]", "size = [16384, 4096]");
     fs::write(fixture.path("large.toml"), scene).unwrap();
     let script = "ulimit -v 1500000; exec \"$0\" large.toml --threads 2";
     let mut terminal = Terminal::start(&Start {

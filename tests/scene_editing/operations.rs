@@ -1,12 +1,13 @@
 //! Random sequences of all operations that edit a scene.
 
 use super::LAYOUTS;
+use crate::common::MIRROR_ROOM;
 use proptest::prelude::*;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use zerkalo_scene::edit::{self, Edit, EditError, Target, Widget};
-use zerkalo_scene::{BUILT_IN, Document, History, Scene};
+use zerkalo_scene::{Document, History, Scene};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 
@@ -61,7 +62,7 @@ fn perform(
             ("add light", edit::add_light(scene, kind))
         }
         8 => ("move", edit::move_by(scene, &subject, by)),
-        9 => ("turn", edit::turn(scene, &subject, amount)),
+        9 => ("rotate", edit::rotate(scene, &subject, amount)),
         10 => ("drop", edit::snap_to_ground(scene, &subject)),
         11 if subjects.len() < 30 => ("duplicate", edit::duplicate(scene, &subject)),
         12 => ("delete", edit::delete(scene, &subject)),
@@ -126,7 +127,7 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
     });
     let sequences = (0..3usize, prop::collection::vec(act(), 1..60));
     let result = runner.run(&sequences, |(which, acts)| {
-        let text = [BUILT_IN, LAYOUTS[1], TRANSFORMS][which];
+        let text = [MIRROR_ROOM, LAYOUTS[1], TRANSFORMS][which];
         check_sequence(text, &acts, &mut tally.borrow_mut())
     });
     result.unwrap_or_else(|e| panic!("{e}"));
@@ -142,7 +143,7 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
         "add object",
         "add light",
         "move",
-        "turn",
+        "rotate",
         "drop",
         "duplicate",
         "delete",

@@ -230,13 +230,13 @@ fn object_stories() -> Vec<Story> {
         story("move nearer, fine", BALL, "m Up Shift-Down", |_, d| ball(d.scene())[2] < 0.0),
         story("raise, fine", BALL, "m PageDown Shift-PageUp", |_, d| ball(d.scene())[1] < 1.0),
         story("lower, fine", BALL, "m PageUp Shift-PageDown", |_, d| ball(d.scene())[1] > 1.0),
-        story("turn the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
-        story("turn left", GLASS, "r Left", |_, d| normal(d.scene())[0] < -0.2),
-        story("turn right", GLASS, "r Right", |_, d| normal(d.scene())[0] > 0.2),
-        story("turn left, fine", GLASS, "r Shift-Left", |_, d| {
+        story("rotate the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
+        story("rotate left", GLASS, "r Left", |_, d| normal(d.scene())[0] < -0.2),
+        story("rotate right", GLASS, "r Right", |_, d| normal(d.scene())[0] > 0.2),
+        story("rotate left, fine", GLASS, "r Shift-Left", |_, d| {
             (-0.02..-0.01).contains(&normal(d.scene())[0])
         }),
-        story("turn right, fine", GLASS, "r Shift-Right", |_, d| {
+        story("rotate right, fine", GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
         story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),

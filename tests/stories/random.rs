@@ -1,13 +1,13 @@
 //! Ten thousand random key and mouse events on three scenes. The model must stay valid, and it must
 //! be possible to undo every edit.
 
+use crate::common::MIRROR_ROOM;
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::collections::HashSet;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo_scene::BUILT_IN;
 use zerkalo_terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
@@ -126,7 +126,7 @@ fn random_events_keep_model_valid() {
     let physical = include_str!("../../scenes/mirror-room-physical.toml");
     let mut fired = HashSet::new();
     play("room", ROOM, 1, &mut fired);
-    play("built in", BUILT_IN, 2, &mut fired);
+    play("built in", MIRROR_ROOM, 2, &mut fired);
     play("physical", physical, 3, &mut fired);
     let labels: Vec<_> = COMMANDS.iter().map(|c| c.label).filter(|label| *label != QUIT).collect();
     let missed: Vec<_> = labels.iter().filter(|label| !fired.contains(*label)).collect();

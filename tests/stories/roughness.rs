@@ -1,12 +1,13 @@
 //! Keys that change the roughness of a mirror: they must change the pixels that show the mirror and
 //! leave all others equal in every bit.
 
+use crate::common::MIRROR_ROOM;
 use crate::stories::simulated_dashboard::Desk;
 use crate::support::{pool, rendered, sized};
 use zerkalo_render::film::testing::TestFilm;
 use zerkalo_render::{FirstHitBuffer, RenderState};
+use zerkalo_scene::Scene;
 use zerkalo_scene::value::Color;
-use zerkalo_scene::{BUILT_IN, Scene};
 use zerkalo_world::{FirstHit, Precision};
 
 const SIZE: [u32; 2] = [96, 72];
@@ -38,7 +39,7 @@ fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
 
 #[test]
 fn roughness_changes_only_pixels_of_the_mirror() {
-    let mut desk = Desk::new(BUILT_IN);
+    let mut desk = Desk::new(MIRROR_ROOM);
     let smooth = desk.scene().clone();
     // The roughness grows from 0.04 to about 0.1. Such a small blur leaves the centres of shadows
     // unchanged, because they are evenly lit.

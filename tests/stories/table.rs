@@ -1,5 +1,6 @@
 //! Consistency of the command table.
 
+use crate::stories::watch;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
@@ -62,9 +63,10 @@ fn keys_manual() -> String {
             page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
         }
     }
+    let watching = watch::watching(1);
     page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
              | keys | action |\n|---|---|\n";
-    for command in COMMANDS.iter().filter(|command| command.while_watching) {
+    for command in COMMANDS.iter().filter(|command| command.is_listed(&watching.model)) {
         page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
     }
     page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";

@@ -1,6 +1,7 @@
 //! Stories (user input and expected state) of `zerkalo watch`. Reports must change the table of
 //! files, and no key may edit the scene or start a render.
 
+use crate::common::MIRROR_ROOM;
 use crate::stories::simulated_dashboard::Desk;
 use std::time::Duration;
 use zerkalo::dashboard::hints::{HelpLine, help};
@@ -9,7 +10,6 @@ use zerkalo::dashboard::message::{DisplayChannel, Effect, Message};
 use zerkalo::dashboard::update::commands::COMMANDS;
 use zerkalo_render::film::Display;
 use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
-use zerkalo_scene::BUILT_IN;
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 fn shard(number: usize, state: WatchedState) -> WatchedShards {
@@ -35,8 +35,8 @@ fn report(shards: Vec<WatchedShards>) -> WatchReport {
     }
 }
 
-fn watching(rows: usize) -> Desk {
-    let mut desk = Desk::new(BUILT_IN);
+pub fn watching(rows: usize) -> Desk {
+    let mut desk = Desk::new(MIRROR_ROOM);
     let rows = (0..rows).map(|number| shard(number, WatchedState::Running)).collect();
     desk.send(Message::Watched(Box::new(report(rows))));
     desk.effects.clear();
@@ -92,7 +92,7 @@ fn every_key_edits_and_renders_nothing() {
 
 #[test]
 fn help_and_palette_have_the_keys_that_work() {
-    let listed: Vec<_> = help(true)
+    let listed: Vec<_> = help(&watching(3).model)
         .into_iter()
         .filter_map(|line| match line {
             HelpLine::Keys(keys, label) => Some((keys, label)),

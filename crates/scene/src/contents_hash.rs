@@ -7,9 +7,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Scene {
-    /// Returns the hash of the contents of the scene's meshes and images, in the order in which the
-    /// scene names them. Returns `None` if there are none. It covers the data as they were read;
-    /// later changes of the files have no influence.
+    /// Returns the hash of the contents of the scene's files, as they were read; `None` if there
+    /// are none.
     pub fn contents_hash(&self) -> Option<u64> {
         // A new field that may name files has to be added here.
         let Self {
@@ -38,8 +37,7 @@ impl Scene {
     }
 }
 
-/// Adds the hash of each file's contents, which `add_contents` computes, to `hash`. A file that the
-/// scene names repeatedly is hashed once.
+/// Adds the hash of each file's contents. A file that the scene names repeatedly is hashed once.
 fn add_each<'a, T: 'a>(
     hash: &mut Fnv1a64,
     files: impl Iterator<Item = &'a Arc<T>>,

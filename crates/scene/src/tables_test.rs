@@ -55,7 +55,8 @@ fn same_defaults<T: TomlValue>(what: &str, fields: &[Field], needed: &str) {
 
 fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     match fields.iter().find(|f| f.name == name).unwrap().takes {
-        ValueType::Table(fields) | ValueType::OneOf(fields) | ValueType::Tables(fields) => fields,
+        ValueType::Table(fields) | ValueType::OneOf(fields) => fields,
+        ValueType::Tables(fields) => fields(),
         other => panic!("{name} takes {other:?}"),
     }
 }

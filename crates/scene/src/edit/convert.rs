@@ -1,23 +1,23 @@
-//! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
-//! brightness are kept where possible.
+//! Conversion between kinds of shapes, lights, textures and cameras, which keeps position, size,
+//! direction and brightness where possible.
+
+#![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::Scene;
 use crate::camera::{Camera, Focus, ViewAngle};
 use crate::edit::bounds::scene_bounds;
 use crate::edit::lens;
-use crate::edit::set::{finish, replace};
-use crate::edit::toml_view::{insert_value, read};
+use crate::edit::set::{label, replace};
 use crate::edit::{Edit, EditError, Target};
 use crate::light::{EmissiveSurface, Falloff, Light, LightKind, LightUnit, Placement};
 use crate::material::{Bump, Material, Texture};
 use crate::shape::Shape;
 use crate::value::{
-    Field, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
-    unit,
+    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant,
+    rounded_to, unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
-use toml::{Table, Value};
 
 const fn kind(name: &'static str, doc: &'static str) -> Field {
     Field::required(name, ValueType::Text, "", doc)
@@ -28,8 +28,7 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
 pub(super) const KIND: Field =
     Field::required("kind", ValueType::OneOf(crate::light::KINDS), "", "Kind of light source.");
 
-/// Field for the choice between `target` and `direction` of a camera. The inspector shows it as a
-/// row, but it is not a key of scene files.
+/// Choice between `target` and `direction` of a camera, a row of the inspector but no key of files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -40,18 +39,7 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Returns the key in `values` that is one of the mutually exclusive keys of the edit target
-/// `subject`, such as the kind `point` of a light. Returns `None` if `values` has none of these
-/// keys.
-pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
-    crate::edit::toml_view::exclusive_keys(subject)
-        .iter()
-        .copied()
-        .find(|key| values.contains_key(*key))
-}
-
-/// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
-/// another shape or light. Nothing changes if it has this kind already.
+/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -83,22 +71,20 @@ pub(super) fn switch(
                 next.materials.get_mut(material).ok_or_else(|| EditError::gone(subject))?;
             switch_texture(material, key, name);
         }
-        _ => {}
+        Target::Ambient | Target::Background | Target::Film | Target::IntegratorSettings => {}
     }
-    let values = read(&next, subject)?;
-    Ok(finish(&next, subject, key, values)?.with_note(note))
+    let label = label(&next, subject, key);
+    Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
 }
 
-/// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
-/// there is no such kind.
+/// Returns a shape of the kind `name` with the place, size and rotation of `shape`.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The size is that of the bounding box before rotation, because the bounding box of a
-            // rotated shape is larger than the shape.
+            // The bounding box of a rotated shape is larger than the shape.
             let mut straight = shape.clone();
-            straight.rotate_y(-rotation(shape));
+            straight.rotate_y(-shape.rotation());
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
             let size = h - l;
             let usual = size.max_element();
@@ -113,19 +99,8 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let base = base.map(|x| round_nice(x, scale));
     let size = size.map(|x| round_significant(x, 6));
     let mut next = Shape::fitted_to(name, base, size)?;
-    next.rotate_y(rotation(shape));
+    next.rotate_y(shape.rotation());
     Some(next)
-}
-
-/// Returns the rotation of a shape about the vertical [degrees]; 0 for a kind without the key
-/// `rotation`.
-fn rotation(shape: &Shape) -> f64 {
-    match shape {
-        Shape::Cube(cube) => cube.rotation,
-        Shape::Pyramid(pyramid) => pyramid.rotation,
-        Shape::Prism(prism) => prism.rotation,
-        _ => 0.0,
-    }
 }
 
 /// Converts a light to the kind `name`. The light keeps its position, direction and size where the
@@ -192,16 +167,14 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
 }
 
 /// Changes the falloff of the light at `index`, a point or spot light. The intensity is changed so
-/// that the irradiance at the centre of the scene is kept. `values` has the present values of the
-/// light's keys.
+/// that the irradiance at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
-    values: Table,
-    falloff: Value,
+    falloff: KeyValue,
 ) -> Result<Edit, EditError> {
     let subject = Target::Light(index);
-    let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
+    let mut edit = replace(scene, &subject, "falloff", falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
     if let Some(position) = light.position().filter(|_| light.falloff != old.falloff) {
@@ -228,8 +201,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Sets the kind of a material's texture or bump map to `name`. `key` is `texture` or `bump`. The
-/// placement of a texture on the shape is kept.
+/// Sets the kind of `texture` or `bump`. The placement of a texture is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -241,8 +213,8 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts the value of the camera's `key` to the kind `name`, such as `target` to `direction`.
-/// The picture stays the same, except for rounding.
+/// Converts the value of `key`, such as `target` to `direction`. The picture stays the same, except
+/// for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -269,8 +241,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
             if camera.lens_radius() > 0.0 && camera.focus.is_none() {
-                // So far the target was in focus. A focus distance keeps it in focus without a
-                // target.
+                // The target was in focus; a focus distance keeps it so.
                 let distance = round_significant(camera.focus_depth(), 5);
                 camera.focus = Some(Focus::Distance(distance));
             }
@@ -290,39 +261,16 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Appends a transform step of the kind `name` to the list `key`, with the value that changes
-/// nothing: the vector 0, the angle 0 or the factor 1.
-pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
-    let zero = || Value::Array(vec![Value::Float(0.0); 3]);
-    let value = match name {
-        "translate" => zero(),
-        "scale" => Value::Float(1.0),
-        "rotate" => {
-            let axis = [0.0, 1.0, 0.0].map(Value::Float).to_vec();
-            let turn = [("axis".into(), Value::Array(axis)), ("degrees".into(), 0.0.into())];
-            Value::Table(Table::from_iter(turn))
-        }
-        _ => Value::Float(0.0),
-    };
-    let step = Value::Table(Table::from_iter([(name.to_string(), value)]));
-    match object.get_mut(key).and_then(Value::as_array_mut) {
-        Some(steps) => steps.push(step),
-        None => {
-            insert_value(object, key, Some(Value::Array(vec![step])));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::edit::{rows, set};
     use crate::shape::KINDS;
+    use crate::testing::mirror_room;
 
     #[test]
     fn converted_shapes_keep_place_and_size() {
-        let scene = built_in();
+        let scene = mirror_room();
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
@@ -350,7 +298,7 @@ mod tests {
 
     #[test]
     fn lights_of_every_kind_become_each_other() {
-        let scene = built_in();
+        let scene = mirror_room();
         let lamp = Target::Light(0);
         let center = DVec3::from_array(scene_bounds(&scene).center);
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
@@ -369,7 +317,7 @@ mod tests {
 
     #[test]
     fn converted_lights_keep_side_and_brightness() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
         let lamp = Target::Light(0);
@@ -416,7 +364,7 @@ mod tests {
 
     #[test]
     fn converted_cameras_keep_the_picture() {
-        let scene = built_in();
+        let scene = mirror_room();
         let camera = |scene: &Scene| scene.camera.clone();
         let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;
         let angle = camera(&free).view().unwrap().angle_between(scene.camera.view().unwrap());

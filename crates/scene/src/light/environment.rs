@@ -44,22 +44,12 @@ impl Environment {
     /// Returns the image of the environment; `None` for a gradient, or if no readable file has been
     /// loaded.
     pub fn map(&self) -> Option<&Arc<RadianceMap>> {
-        self.file().and(self.map.content())
+        self.map.content()
     }
 
-    /// Calls `load` with the name of the image and stores the result. Does nothing for a gradient,
-    /// or if an image or an error is stored already.
+    /// Reads the image by `load`, unless it is loaded already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
-        if !self.file.is_empty() {
-            self.map.resolve(|| load(&self.file));
-        }
-    }
-
-    /// Copies the image from `other` if both name the same file.
-    pub fn resolve_as(&mut self, other: &Self) {
-        if self.file == other.file {
-            self.map = other.map.clone();
-        }
+        self.map.resolve(&self.file, load);
     }
 
     /// Returns an image of the gradient, with a single column, because the radiance depends on the

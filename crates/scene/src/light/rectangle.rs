@@ -15,12 +15,8 @@ description! {
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`. If the two are parallel, the
         /// height is along z.
-        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
     }
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
 }
 
 /// Returns the unit vectors of the frame of a flat light: across, up and along `normal`. `up` is
@@ -51,6 +47,6 @@ impl LightDesc for RectangleLight {
 
     fn placed(placement: &Placement) -> Self {
         let (center, radius) = registry::rounded_ball(placement);
-        Self { center, size: [2.0 * radius; 2], normal: placement.direction, up: up() }
+        Self { center, size: [2.0 * radius; 2], normal: placement.direction, up: [0.0, 1.0, 0.0] }
     }
 }

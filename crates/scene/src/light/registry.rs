@@ -5,8 +5,8 @@ use crate::light::{
     RectangleLight, SphereLight, Spot,
 };
 use crate::value::{
-    Color, Description, Field, TomlError, TomlValue, ValidationError, ValueType, description,
-    doc_text, round_nice, round_significant,
+    Color, Description, Field, KeyNode, TomlError, TomlValue, ValidationError, ValueType,
+    description, doc_text, round_nice, round_significant,
 };
 use glam::DVec3;
 use toml::Spanned;
@@ -88,6 +88,18 @@ macro_rules! kinds {
                 match key {
                     $(stringify!($key) => Some(Self::$variant($kind::placed(placement))),)+
                     _ => None,
+                }
+            }
+
+            fn node(&self) -> &dyn KeyNode {
+                match self {
+                    $(Self::$variant(kind) => kind,)+
+                }
+            }
+
+            fn node_mut(&mut self) -> &mut dyn KeyNode {
+                match self {
+                    $(Self::$variant(kind) => kind,)+
                 }
             }
 
@@ -204,6 +216,35 @@ impl Light {
     /// Creates a white light of intensity 1, without a name.
     pub fn new(kind: impl Into<LightKind>) -> Self {
         LightTable::default().with_kind(kind.into())
+    }
+}
+
+/// Keys of the table of a light: its kind stands beside the other keys.
+impl KeyNode for Light {
+    fn child(&self, key: &str) -> Option<&dyn KeyNode> {
+        match key {
+            "name" => Some(&self.name),
+            "color" => Some(&self.color),
+            "intensity" => Some(&self.intensity),
+            "unit" => Some(&self.unit),
+            "falloff" => Some(&self.falloff),
+            "visible" => Some(&self.visible),
+            "on" => Some(&self.on),
+            key => (key == self.kind.key()).then(|| self.kind.node()),
+        }
+    }
+
+    fn child_mut(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        match key {
+            "name" => Some(&mut self.name),
+            "color" => Some(&mut self.color),
+            "intensity" => Some(&mut self.intensity),
+            "unit" => Some(&mut self.unit),
+            "falloff" => Some(&mut self.falloff),
+            "visible" => Some(&mut self.visible),
+            "on" => Some(&mut self.on),
+            key => (key == self.kind.key()).then(|| self.kind.node_mut()),
+        }
     }
 }
 

@@ -1,11 +1,15 @@
-//! Exports of image files: the current picture, or a separate render at a size of the user's
-//! choice.
+//! Exports of image files: the current picture, or a render at a size of the user's choice.
 
-use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::export_paths::{numbered, scp};
-use crate::dashboard::run::shared_file::SharedFile;
+pub mod image_upload;
+pub mod image_viewer;
+pub mod paths;
+mod shrink;
+
+use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use crossbeam_channel::Sender;
+use crate::dashboard::{Exported, Format, Message};
+use crossbeam_channel::{Sender, bounded};
+use paths::{numbered, scp};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,53 +17,55 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::film::Film;
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{EncodedCheckpoint, Options, RenderState};
+use zerkalo_render::session::{Picture, Session, State};
+use zerkalo_render::{EncodedCheckpoint, Options};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::Existing;
 
-/// Interval at which the progress of a render for an exported image is polled.
+/// Interval at which the progress of a render is polled.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Writer of exported images and checkpoints. It holds the settings that all exports of a scene
-/// share.
+/// Writer of exported images and checkpoints.
 #[derive(Clone)]
 pub struct Exporter {
-    /// Scene file as last read or written. The metadata of exported images contain its name and a
-    /// hash of the scene.
-    pub file: SharedFile,
-    /// Path of a scene file that was unreadable at the start; `None` if it was readable.
+    /// Scene file as last read or written; `None` for watched films, whose metadata name their
+    /// scene file.
+    pub file: Option<SharedFile>,
+    /// Path of a scene file that was unreadable at the start.
     pub unreadable_path: Option<PathBuf>,
-    /// Kind of random numbers with which the picture is rendered, for the metadata of the image.
+    /// Kind of random numbers, for the metadata.
     pub sampler: SamplerKind,
-    /// `true` if noisy pixels get more samples than others (adaptive sample allocation), for the
-    /// metadata of the image.
+    /// `true` if sample allocation is adaptive, for the metadata.
     pub adaptive: bool,
 }
 
 impl Exporter {
-    /// Writes the picture of `rendering` to a file with the next free name.
-    pub fn write(
-        &self,
-        rendering: &RenderState,
-        report: &Report,
-        format: Format,
-    ) -> Result<Exported, String> {
-        let provenance = self.provenance(rendering.scene());
-        let display = rendering.display();
-        let write = |path: &Path| {
-            let target = ImageOutput::from_path(path)?.create_new();
-            rendering.write(report, &provenance, display, Depth::Eight, &target)
-        };
-        let path = numbered(&self.stem(), format.extension(), write)?;
-        Ok(exported(path, &rendering.film, report))
+    /// Creates the writer of pictures of watched films.
+    pub fn of_films() -> Self {
+        Self { file: None, unreadable_path: None, sampler: SamplerKind::Sobol, adaptive: true }
     }
 
-    /// Returns the provenance of a picture of `scene` for the metadata of the image: scene file,
-    /// random numbers and sample allocation.
+    /// Writes `picture` to a file with the next free name.
+    pub fn write(&self, picture: &Picture, format: Format) -> Result<Exported, String> {
+        let header = picture.header(|scene| self.provenance(scene));
+        let write = |path: &Path| {
+            let output = ImageOutput::from_path(path)?.create_new();
+            output.write_film(&header, picture.film, Depth::Eight)
+        };
+        let stem = self.stem(header.source().unwrap_or_default());
+        let path = numbered(&stem, format.extension(), write)?;
+        Ok(Exported {
+            scp: scp(&path),
+            path,
+            size: [picture.film.width(), picture.film.height()],
+            spp: picture.report.spp.mean,
+            noise_levels: picture.report.noise.map(|noise| noise.rmse_levels),
+        })
+    }
+
+    /// Returns the metadata on the origin of a picture of `scene`.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
         let (source, text) = self.source(scene);
         Provenance {
@@ -76,28 +82,27 @@ impl Exporter {
         checkpoint: Option<EncodedCheckpoint>,
     ) -> Result<PathBuf, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
-        numbered(&self.stem(), "zk", |path| checkpoint.write(path, Existing::Refuse))
+        numbered(&self.stem(""), "zk", |path| checkpoint.write(path, Existing::Refuse))
     }
 
-    /// Returns the beginning of the names of exported files: the name of the scene file without its
-    /// extension.
-    fn stem(&self) -> String {
-        match self.file.get() {
+    /// Returns the beginning of file names. `source` is the name of a scene file that this process
+    /// has not read.
+    fn stem(&self, source: &str) -> String {
+        match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => stem(file.path(), file.document().name()),
-            None => stem(self.unreadable_path.as_deref(), ""),
+            None => stem(self.unreadable_path.as_deref(), source),
         }
     }
 
-    /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
-    /// to it.
+    /// Returns the name of the scene file, and the text that saving `scene` would write to it.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.file.get() {
+        match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => {
                 let mut document = file.document().clone();
                 document.apply(scene);
                 (document.name().to_string(), document.text().to_string())
             }
-            None => (self.stem(), scene.to_text()),
+            None => (self.stem(""), scene.to_text()),
         }
     }
 }
@@ -108,25 +113,18 @@ pub struct ResizedExport {
     worker: Worker,
 }
 
-/// Request for an export at a size of the user's choice.
 pub struct ExportRequest {
     /// Scene with the requested film size.
     pub scene: Arc<Scene>,
-    /// File format of the image.
     pub format: Format,
-    /// Options of scene compilation and sampling. They include the exposure and tone curve of the
-    /// image.
     pub options: Options,
-    /// Settings of sample allocation (the distribution of samples over the picture), and the stop
-    /// criteria of the render.
     pub settings: Settings,
-    /// Number of threads that trace rays.
     pub threads: usize,
 }
 
 impl ResizedExport {
     /// Starts the thread that renders and writes the image. It sends [`Message::ExportProgress`]
-    /// and finally [`Message::Exported`] to `results`. A cancelled render sends no result.
+    /// and finally [`Message::Exported`], unless it is cancelled.
     pub fn start(
         request: ExportRequest,
         exporter: Exporter,
@@ -146,12 +144,12 @@ impl ResizedExport {
         Ok(Self { cancelled, worker })
     }
 
-    /// Cancels the render of the export. A file that is already being written is completed.
+    /// Cancels the render. A file that is being written is completed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Cancels the render of the export and waits until its thread has ended.
+    /// Cancels the render and waits for the end of its thread.
     pub fn end(self) {
         self.cancel();
         self.worker.join_within(Duration::MAX);
@@ -185,27 +183,17 @@ fn render(
         }
     }
     let exporter = exporter.clone();
-    let written = session.with(move |rendering, report| exporter.write(rendering, report, format));
-    Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
+    let (sender, receiver) = bounded(1);
+    session.submit(move |picture| {
+        let written = picture.map(|picture| exporter.write(&picture, format));
+        let _ = sender.send(written.unwrap_or(Err("the renderer has no picture".to_string())));
+    });
+    receiver.recv().ok()
 }
 
-/// Returns the description of an exported image, for the user. `path` is the path of the image
-/// file, `film` the film with the exported picture, and `report` the renderer's report on this
-/// film.
-pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
-    Exported {
-        scp: scp(&path),
-        path,
-        size: [film.width(), film.height()],
-        spp: report.spp.mean,
-        noise_levels: report.noise.map(|noise| noise.rmse_levels),
-    }
-}
-
-/// Returns the beginning of the names of exported files, such as `room` in `room-2.png`. It is the
-/// name of the scene file at `path` without its extension. If `path` is `None`, `name` takes the
-/// place of the scene file's name.
-pub fn stem(path: Option<&Path>, name: &str) -> String {
+/// Returns the beginning of file names, such as `room` in `room-2.png`: the name of the scene file
+/// without its extension, or `name` without a path.
+fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     stem.filter(|stem| !stem.is_empty()).unwrap_or("picture".to_string())
