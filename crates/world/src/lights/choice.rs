@@ -89,11 +89,10 @@ pub(crate) struct ChosenSets<'a, S> {
 
 impl<S: Float> LightChoice<S> {
     /// Removes from `sources` the lights among which paths choose: point and spot lights that are
-    /// not on a surface, except for those that are much brighter than the others. Lights of a kind
-    /// (point or spot) remain if the scene does not have `many` of this kind, or if fewer than
-    /// `MIN_LIGHTS` of them are not on a surface. Returns `None`, and removes nothing, if no lights
-    /// are left to choose from. `extent` is the largest absolute coordinate of the scene's shapes
-    /// and camera.
+    /// not on a surface, except for bright ones. Lights of a kind remain if the scene does not have
+    /// `many` of it, or if fewer than `MIN_LIGHTS` of them are not on a surface. Returns `None`,
+    /// and removes nothing, if no lights are left to choose from. `extent` is the largest absolute
+    /// coordinate of the scene's shapes and camera.
     pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
         let of_kind = |is_spot: bool, is_many: bool| {
             let is_kind = |source: &DeltaSource<S>| match &source.light.light {
@@ -112,7 +111,7 @@ impl<S: Float> LightChoice<S> {
         candidates.sort_unstable();
         let shares = candidates.iter().map(|i| match &sources[*i].light.light {
             DeltaLight::Point { cone: Some(cone), .. } => share(cone.outer.to_f64()),
-            _ => 1.0,
+            DeltaLight::Point { cone: None, .. } | DeltaLight::Directional { .. } => 1.0,
         });
         let sets = 1 << (shares.sum::<f64>() as usize / MIN_SET).max(1).ilog2();
         let powers = powers(candidates.iter().map(|i| &sources[*i]), extent);
@@ -188,28 +187,25 @@ impl<S: Float> Table<S> {
 
 impl<S: Float> Stratum<S> {
     fn new(lights: &[DeltaSource<S>], sets: usize) -> Self {
-        let coordinate = |axis: usize| {
-            let coordinate = move |light: &DeltaSource<S>| match light.light.light {
-                DeltaLight::Point { position, .. } => position[axis],
-                DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
-            };
-            Table::new(lights.iter().map(coordinate), f64::NAN, sets)
+        let table = |absent: f64, value: &dyn Fn(&DeltaSource<S>) -> S| {
+            Table::new(lights.iter().map(value), absent, sets)
         };
-        let constant = |light: &DeltaSource<S>| match light.light.light {
-            DeltaLight::Point { inverse_square: false, .. } => S::from_f64(PI),
-            _ => S::default(),
+        let coordinate = |light: &DeltaSource<S>, axis: usize| match light.light.light {
+            DeltaLight::Point { position, .. } => position[axis],
+            DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
         };
-        let emission = |channel: usize| {
-            let emission = move |light: &DeltaSource<S>| {
-                light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
-            };
-            Table::new(lights.iter().map(emission), 1.0, sets)
+        let constant = |light: &DeltaSource<S>| match light.light.light.is_inverse_square() {
+            true => S::default(),
+            false => S::from_f64(PI),
+        };
+        let emission = |light: &DeltaSource<S>, channel: usize| {
+            light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
         };
         Self {
             ball: ball(lights.iter().map(place)),
-            positions: [0, 1, 2].map(coordinate),
-            constant: Table::new(lights.iter().map(constant), 0.0, sets),
-            emission: [0, 1, 2].map(emission),
+            positions: [0, 1, 2].map(|axis| table(f64::NAN, &|light| coordinate(light, axis))),
+            constant: table(0.0, &constant),
+            emission: [0, 1, 2].map(|channel| table(1.0, &|light| emission(light, channel))),
             cones: Cones::new(lights, sets),
         }
     }
@@ -290,7 +286,6 @@ pub(crate) struct ManyLights {
 }
 
 impl ManyLights {
-    /// Counts `lights`, which are those that change the picture.
     pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
         let (mut points, mut spots) = (0, 0.0);
         for light in lights {
@@ -305,7 +300,6 @@ impl ManyLights {
         Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
     }
 
-    /// Returns `true` if the scene has many lights of the kind of `light`.
     pub fn includes(&self, light: &Light) -> bool {
         match light.form() {
             LightForm::Point { cone: None, .. } => self.points,
@@ -315,8 +309,8 @@ impl ManyLights {
     }
 }
 
-/// Returns the solid angle of a cone in hemispheres, at most 1. It is approximately the share of
-/// the surfaces that a spot light with this cone illuminates. `outer` is [`SpotCone::outer`].
+/// Returns the solid angle of a cone in hemispheres, at most 1: roughly the share of the surfaces
+/// that it contains. `outer` is [`SpotCone::outer`].
 fn share(outer: f64) -> f64 {
     outer.min(1.0)
 }
@@ -326,9 +320,9 @@ fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
     source.light.light.position().unwrap_or_default()
 }
 
-/// Returns the power of each light in arbitrary units: red, green and blue. Lights whose irradiance
-/// does not depend on the distance are compared with the others at the mean distance of the lights
-/// from the scene's centre, which is the origin. This distance is at least `extent`.
+/// Returns the power of each light in arbitrary units: red, green and blue. Lights without falloff
+/// are compared with the others at the mean distance of the lights from the scene's centre, or at
+/// `extent` if it is larger.
 fn powers<'a, S: Float>(
     lights: impl Iterator<Item = &'a DeltaSource<S>> + Clone,
     extent: f64,
@@ -345,9 +339,8 @@ fn powers<'a, S: Float>(
     lights.map(power).collect()
 }
 
-/// Returns the indices of the bright lights: those to which every path traces shadow rays at each
-/// surface. The other lights are divided into `sets`, of which a path chooses one per surface.
-/// `powers` are the powers of all lights: red, green and blue.
+/// Returns the indices of the bright lights, to which every path traces shadow rays at each
+/// surface. The others are divided into `sets`.
 ///
 /// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
 /// smallest product of variance and cost. The cost is the number of rays per surface: one that
@@ -358,7 +351,6 @@ fn powers<'a, S: Float>(
 /// sets, because a path reaches only one of the sets.
 ///
 /// If all lights have similar powers, none is bright, because the squared sum outweighs the rest.
-/// Among one strong light and many weak ones, the strong light is bright.
 fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
     let largest = powers.iter().map(|power| power.max_element()).fold(0.0, f64::max);
     if !(largest > 0.0 && largest.is_finite()) {
@@ -382,13 +374,12 @@ fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
     order
 }
 
-/// Returns the value that all `items` have. Returns `None` if they differ or if there are none.
 fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
     let first = items.next()?;
     items.all(|item| item == first).then_some(first)
 }
 
-/// Returns a sphere that contains `points`, centred on their bounding box.
+/// Returns a sphere around `points`, centred on their bounding box.
 fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     let low = points.clone().reduce(DVec3::min).unwrap_or_default();
     let high = points.clone().reduce(DVec3::max).unwrap_or_default();
@@ -398,7 +389,7 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
 }
 
-/// Returns the position of `point` on a Morton curve through the box from `low` to `high`.
+/// Returns the position of `point` on a Morton curve through the box.
 fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
     let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
     morton_code(((point - low) / extent).to_array())
