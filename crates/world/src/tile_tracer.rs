@@ -6,7 +6,6 @@ use crate::integrator::path::{Counts, Path, Radiance};
 use crate::pixel_block::PixelBlock;
 use crate::world::World;
 use std::ops::Range;
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp::disk;
 use zerkalo_kernel::sampling::{PacketSampler, SampleSettings, Sampler};
@@ -126,13 +125,11 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let center = L::from_f64(0.5);
         let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
         let camera = world.camera();
-        let (origin, direction) = camera.rays(corner_directions, offset);
-        let mut path = Path::new(Ray { origin, direction });
+        let mut path = Path::new(camera.rays(corner_directions, offset));
         if let Some(lens) = camera.lens() {
             let (u, v) = sampler.lens();
             let (x, y, _) = disk(u, v);
-            let (origin, direction) = camera.lens_rays(lens, corner_directions, offset, (x, y));
-            path.ray = Ray { origin, direction };
+            path.ray = camera.lens_rays(lens, corner_directions, offset, (x, y));
         }
         let candidates = self.candidates.as_ref();
         world.trace(&mut path, candidates, sampler, active, &mut self.radiance);

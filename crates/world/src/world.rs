@@ -5,16 +5,16 @@ use crate::culling::tile::{CullingMode, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::light_choice::LightChoice;
-use crate::light_groups::LightGroups;
-use crate::lights_on_surfaces::OnSurface;
-use crate::surface_emission::SurfaceEmission;
+use crate::lights::choice::LightChoice;
+use crate::lights::emitters::Emitters;
+use crate::lights::groups::LightGroups;
+use crate::lights::on_surfaces::OnSurface;
 use crate::tile_tracer::CameraTracer;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
 use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings};
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{DeltaLight, Emitter, EnvironmentLight};
+use zerkalo_scene::light::{DeltaLight, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
 
 /// Compiled light of type `T`, with its light group. `S` is the scalar type.
@@ -56,8 +56,6 @@ pub(super) struct ShadowRayTarget<S> {
 
 pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
 
-pub(super) type EmitterSource<S> = LightSource<Emitter<S>, S>;
-
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 
 /// Scene compiled for the SIMD type `L`. Fields of features that the scene does not use are empty
@@ -75,10 +73,9 @@ pub struct World<L: SimdFloat> {
     /// Point and spot lights of which paths choose a few at each hit. `None` if shadow rays go to
     /// all lights.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
-    /// Lights with a size.
-    pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
+    /// Lights with a size and emissive objects.
+    pub(super) emitters: Emitters<L::Scalar>,
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
-    pub(super) emission: SurfaceEmission<L::Scalar>,
     /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Index of the light group of the background. `None` if the background is black.
@@ -170,20 +167,20 @@ impl<L: SimdFloat> World<L> {
     /// Returns the index of the first stratum in the lists of possible occluders.
     #[inline(always)]
     pub(super) fn first_stratum(&self) -> usize {
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
+        self.sources.len() + self.emitters.sampled()
     }
 
     /// Returns `true` if the world has lights with a size, environment lights or emissive objects.
     #[inline(always)]
     pub(super) fn has_emitters(&self) -> bool {
-        !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
+        !self.emitters.is_empty() || !self.environments.is_empty()
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()
-            && !self.emitters.iter().any(|source| source.visible)
+            && self.emitters.visible_lights().next().is_none()
             && !self.environments.iter().any(|source| source.visible)
     }
 

@@ -10,7 +10,6 @@
 
 mod cache;
 mod error;
-mod exif;
 mod file;
 mod hdr;
 mod image;

@@ -1,7 +1,6 @@
 //! First hits of camera rays, for picking objects with a pointer and for auxiliary images.
 
 use crate::world::World;
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 
 /// Object, distance and normal at the first hit of a camera ray.
@@ -44,8 +43,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     let offset = |axis: usize| {
         L::from_fn(|lane| L::Scalar::from_f64(point(lane)[axis] - point(lane)[axis].floor()))
     };
-    let (origin, direction) = world.camera.rays(corner_directions, (offset(0), offset(1)));
-    let ray = Ray { origin, direction };
+    let ray = world.camera.rays(corner_directions, (offset(0), offset(1)));
     let hit = world.geometry.closest(&ray, world.geometry.all());
     let hit_points = ray.at(hit.t);
     let from_eye = hit_points - Vec3::of(world.camera.eye().to_array());
@@ -58,7 +56,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
         let lanes = hit.primitive.id_eq(primitive).bits() & remaining;
         remaining &= !lanes;
         let normal = world.geometry.surface(primitive, hit.triangle, hit_points).normal;
-        let facing = normal.dot(direction);
+        let facing = normal.dot(ray.direction);
         let bsdf = &world.bsdfs[world.bsdf_of[primitive as usize] as usize];
         for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes >> l & 1 != 0) {
             let front = facing.lane(lane).to_f64() < 0.0;

@@ -62,7 +62,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         rays: impl FnOnce(&Self) -> ReflectedRays<L>,
     ) {
         let world = self.world;
-        if emitters && !world.emission.is_empty() {
+        if emitters && world.emitters.has_objects() {
             self.surface_emission(hit);
         }
         self.ambient_light::<SIMPLE>(bouncing);
