@@ -4,7 +4,7 @@ use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
 use zerkalo_scene::material::{
-    Bsdf, BsdfQuery, InterfaceQuery, Lobe, Masking, Material, ReflectionLobe,
+    Bsdf, BsdfQuery, InterfaceMedia, InterfaceQuery, Lobe, Masking, Material, ReflectionLobe,
 };
 use zerkalo_world::{Path, Radiance, World};
 
@@ -165,10 +165,12 @@ impl Sides {
     pub fn query<L: SimdFloat>(self, at: (Vector, Vector), fold: bool) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: query(at, fold),
-            n_i: L::from_f64(self.n_i),
-            n_t: L::from_f64(self.n_t),
-            outer: L::mask(self.n_i <= self.n_t),
-            thin: L::mask(self.thin),
+            media: InterfaceMedia {
+                n_i: L::from_f64(self.n_i),
+                n_t: L::from_f64(self.n_t),
+                outer: L::mask(self.n_i <= self.n_t),
+                thin: L::mask(self.thin),
+            },
             reflecting: L::mask(true),
         }
     }
