@@ -1,5 +1,4 @@
-//! `zerkalo measure`: measures the cost of accuracy on a scene. The result is a table, data files
-//! and a plot.
+//! `zerkalo measure`: measures the cost of accuracy on a scene.
 
 mod data;
 mod table;
@@ -16,7 +15,7 @@ use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
 use zerkalo_world::{self as world, AnyWorld};
 
-/// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
+/// Experiments without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
@@ -89,7 +88,6 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// File format of the plot: SVG or PNG.
 enum Drawing {
     Svg,
     Png,
@@ -116,7 +114,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
     Ok(disk::write(path, &bytes)?)
 }
 
-/// Reads the reference picture at `path`, an EXR file that must have the given size.
+/// Reads the reference picture, an EXR file of the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = image_file::read_exr(path).map_err(failed)?;

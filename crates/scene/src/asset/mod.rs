@@ -15,7 +15,6 @@ mod hdr;
 mod image;
 mod loaded;
 mod mesh;
-mod radiance_distribution;
 mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};

@@ -8,7 +8,6 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::hdr::HdrFile;
 use crate::asset::image::{Image, ImageFormat, check_size};
-use crate::asset::radiance_distribution::{PixelSample, RadianceDistribution};
 use crate::value::Fnv1a64;
 use exr::image::RgbChannels;
 use exr::math::Vec2;
@@ -17,6 +16,7 @@ use exr::meta::header::Header;
 use exr::prelude::traits::*;
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
+use zerkalo_kernel::sampling::{PiecewiseConstant2D, PixelSample};
 
 /// Largest number of pixels in a row or column of an environment image.
 const MAX_MAP_SIDE: u32 = 16_384;
@@ -33,7 +33,7 @@ pub struct RadianceMap {
     size: [u32; 2],
     /// Radiance (red, green, blue) of the image's pixels, row by row from the top.
     pixels: Vec<[f32; 3]>,
-    distribution: RadianceDistribution,
+    distribution: PiecewiseConstant2D,
     mean: [f64; 3],
 }
 
@@ -54,7 +54,7 @@ impl RadianceMap {
     pub fn new(size: [u32; 2], pixels: Vec<[f32; 3]>) -> Self {
         assert_eq!(pixels.len(), size[0] as usize * size[1] as usize);
         assert!(!pixels.is_empty());
-        let distribution = RadianceDistribution::new(size.map(|n| n as usize), &pixels);
+        let distribution = PiecewiseConstant2D::new(size.map(|n| n as usize), &pixels);
         let mean = distribution.mean(&pixels);
         Self { size, pixels, distribution, mean }
     }
@@ -402,5 +402,25 @@ FORMAT=32-bit_rle_rgbe
         let found_in_wide = found(wide);
         assert!(found_in_wide.contains("1048576 x 5"), "{found_in_wide}");
         assert!(found(b"no image".to_vec()).contains("known format"));
+    }
+
+    /// Checks that the weight of a sample, also beside a bright pixel, is at most 17 times the mean
+    /// weight. A weight is the interpolated radiance divided by the sampling density; the mean
+    /// weight is 4 pi times the mean radiance. The factor follows from the distribution's floor.
+    #[test]
+    fn weights_are_bounded_beside_a_bright_pixel() {
+        const SIZE: [usize; 2] = [24, 12];
+        let dark = [0.01f32; 3];
+        let mut pixels_of_image = vec![dark; SIZE[0] * SIZE[1]];
+        pixels_of_image[5 * SIZE[0] + 9] = [1e6; 3];
+        let map = RadianceMap::new(SIZE.map(|n| n as u32), pixels_of_image);
+        let [mean, ..] = map.mean();
+        for i in 0..200_000u32 {
+            let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
+            let DirectionSample { direction, density } =
+                map.sample((f64::from(i) + 0.5) / 200_000.0, v);
+            let weight = map.radiance(direction)[0] / density;
+            assert!(weight <= 17.0 * 4.0 * PI * mean, "{weight}, {mean}");
+        }
     }
 }

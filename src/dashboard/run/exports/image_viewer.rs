@@ -1,6 +1,6 @@
 //! Reading and encoding of exported images for the image viewer.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::exports::shrink::shrunk;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::Sender;
@@ -14,16 +14,13 @@ use zerkalo_terminal::cells::Raster;
 use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
 use zerkalo_terminal::{Capabilities, cell_px};
 
-/// Longest time in which an image may be sent to the terminal. On slow connections the image is
-/// downscaled to keep within this time.
+/// Longest time in which an image may be sent. For slow connections the image is downscaled.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the viewport of the image viewer: the image protocol, the size of the screen, and the
-/// largest number of bytes of an image. `screen` is the number of columns and rows of the terminal,
-/// to which `frames` are sent.
+/// Returns the viewport of the image viewer on a screen of these columns and rows.
 pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
     let terminal = &frames.terminal;
-    // The user may have changed the font size, and thereby the cell size, since the start.
+    // The user may have changed the size of cells since the start.
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
     // A local terminal has no limit.
@@ -32,9 +29,8 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
     ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
 }
 
-/// Reads the image at `path` and encodes it for `viewport` in a separate thread. The result is a
-/// [`Message::ViewerImage`], sent to `results`. `display` is the display transform for linear
-/// images.
+/// Reads and encodes the image at `path` in a separate thread, which sends a
+/// [`Message::ViewerImage`] to `results`.
 pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
     let (requested, failed) = (path.clone(), results.clone());
     let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
@@ -47,8 +43,8 @@ pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results
     }
 }
 
-/// Reads the image at `path`, then scales and encodes it for `viewport`. `display` converts the
-/// linear light of an EXR file to 8-bit levels.
+/// Reads, scales and encodes the image at `path`. `display` converts the linear light of an EXR
+/// file.
 fn viewer_image(
     path: &Path,
     display: &Display,
