@@ -24,7 +24,7 @@ use zerkalo_scene::process_memory::resident_memory;
 use zerkalo_terminal::Signals;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
-const DEFAULT_NOISE_CODES: f64 = 0.5;
+const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 
 /// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
@@ -317,7 +317,7 @@ fn options(args: &RenderArgs) -> Options {
 fn schedule_settings(args: &RenderArgs) -> Settings {
     let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
-    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
+    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
