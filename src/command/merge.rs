@@ -11,7 +11,7 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let output = FilmOutput::new(&args.output, args.bits)?;
     let mut merged = Merged::of_files(&args.parts, args.partial)?;
     let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
-    update_metadata(&mut merged.header.metadata, &report);
+    update_metadata(&mut merged.header, &report);
     output.write(&merged.film, &merged.header)?;
     let plan = &merged.part.plan;
     let path = args.output.display();

@@ -1,6 +1,5 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
@@ -239,8 +238,7 @@ pub fn trace<L: SimdFloat>(
     let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
     let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let (origin, direction) = world.camera().rays(corner, jitter);
-    let mut path = Path::new(Ray { origin, direction });
+    let mut path = Path::new(world.camera().rays(corner, jitter));
     let mut radiance = Radiance::black();
     world.trace(&mut path, None, &draws, active, &mut radiance);
     let groups = &radiance.groups[..world.groups()];

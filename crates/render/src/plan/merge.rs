@@ -1,5 +1,4 @@
-//! Merging: adds the partial films of a distributed render. Each film holds one or more shards of
-//! the same plan.
+//! Merging: adds the films of the parts of a plan.
 
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
@@ -8,24 +7,18 @@ use crate::plan::part::{Part, ranges};
 use crate::plan::{BASE, WatchedFilms};
 use std::path::{Path, PathBuf};
 
-/// Sum of the partial films of a distributed render.
+/// Sum of the films of the parts of a plan.
 pub struct Merged {
-    /// Film with the samples of all merged files.
     pub film: Film,
     /// Header of the file with the lowest shard number, with `part` in place of its own.
     pub header: FilmFileHeader,
-    /// Plan of the film, and the shards that are in it.
     pub part: Part,
 }
 
 impl Merged {
-    /// Adds the films of the files at `paths`, in any order. If `partial` is `true`, shards may be
-    /// missing or unfinished.
-    ///
-    /// # Errors
-    /// Fails if a file cannot be read or has no shards of a plan, if the files belong to different
-    /// plans, if two files hold the same shard, or if shards are missing or unfinished without
-    /// `partial`.
+    /// Adds the films of the files at `paths`, in any order. Fails if a file cannot be read or has
+    /// no shards of a plan, if the files belong to different plans, if two files hold the same
+    /// shard, or, without `partial`, if shards are missing or unfinished.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
         let mut films = WatchedFilms::parts(paths)?;
         let part = films.part().ok_or("no parts are named")?;
@@ -47,7 +40,6 @@ impl Merged {
     }
 }
 
-/// Returns the error message about the film file at `path`, which belongs to no plan.
 pub(super) fn without_plan(path: &Path) -> String {
     format!(
         "cannot add {} to other films: it belongs to no plan; name files that `zerkalo render \

@@ -1,8 +1,5 @@
-//! Watched films: film files that other processes write, and the sum of their films. A file is read
-//! again when it is replaced.
-//!
-//! After a change all films are added again, which takes the memory of one film, whatever the
-//! number of files.
+//! Watched films: film files that other processes write, and their sum. After a change all films
+//! are added again, which takes the memory of one film.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
@@ -20,8 +17,8 @@ use std::time::{Duration, SystemTime};
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
-/// Time since its last replacement after which an unfinished film file counts as late. `zerkalo
-/// render` replaces its files every minute.
+/// Age from which on an unfinished file counts as late. `zerkalo render` replaces its files every
+/// minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -29,14 +26,12 @@ const LATE: Duration = Duration::from_secs(180);
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
     plans: Plans,
-    /// Plan file that the user named, as an input without shards. `None` if the user named film
-    /// files.
+    /// Plan file that the user named, as an input without shards.
     named: Option<MergeInput>,
-    /// Plan that all film files share. `None` before the first file, and for a checkpoint of a
-    /// render without a plan.
+    /// Plan that all files share. `None` before the first file, and for a checkpoint without a
+    /// plan.
     plan: Option<Arc<Plan>>,
-    /// Header and film of the file that would hold the sum of all films. `None` if no file can be
-    /// read.
+    /// Header and film of the sum. `None` if no file can be read.
     sum: Option<(FilmFileHeader, Film)>,
 }
 
@@ -44,66 +39,59 @@ pub struct WatchedFilms {
 #[derive(Debug)]
 struct WatchedFile {
     path: PathBuf,
-    /// Shard that the plan file names for this path. `None` if the user named film files.
+    /// Shard that a named plan expects in this file.
     shard: Option<u32>,
-    /// Stamp of the file when it was last read. `None` for a missing file.
+    /// Stamp when the file was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
-    /// Number of samples, over all pixels, that the file contributes to the sum.
+    /// Samples, over all pixels, that the file contributes to the sum.
     samples: u64,
-    /// Number of samples of the file's shards when they are complete. `None` before the file is
-    /// added, and without a plan.
+    /// Samples of the file's shards when they are complete. `None` before the file is added, and
+    /// without a plan.
     total: Option<u64>,
 }
 
 #[derive(Debug)]
 enum Contents {
     Missing,
-    /// Unusable file, with the reason.
     Refused(String),
     Part(MergeInput),
-    /// Checkpoint of a render without a plan, with its seconds of rendering.
+    /// Checkpoint without a plan, with its seconds of rendering.
     Checkpoint(f64),
 }
 
-/// State of a watched film file, or of shards that no file holds.
+/// State of a watched film file, or of shards without a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WatchedState {
-    /// The file holds all samples of its shards.
     Complete,
-    /// The file is unfinished, and was replaced in the last three minutes.
+    /// Unfinished, and replaced in the last three minutes.
     Running,
-    /// The file is unfinished, and has not been replaced for three minutes.
+    /// Unfinished, and not replaced for three minutes.
     Late,
-    /// No file holds these shards.
     Missing,
-    /// The file cannot be used, for the given reason.
+    /// Unusable, for the given reason.
     Refused(String),
 }
 
-/// Row in the list of watched files: a film file, or shards that no file holds.
+/// Watched film file, or shards without a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WatchedShards {
     /// Numbers of the shards, such as `3` or `5-7`; empty if they are unknown.
     pub shards: String,
-    /// Path of the film file. `None` for shards that no file holds.
     pub path: Option<PathBuf>,
-    /// State of the file.
     pub state: WatchedState,
-    /// Number of samples in the file, over all pixels and both replicates.
+    /// Samples in the file, over all pixels and both replicates.
     pub samples: u64,
-    /// Value of `samples` for a complete file; `None` if it is unknown.
+    /// Value of `samples` for a complete file, if it is known.
     pub total: Option<u64>,
-    /// Time since the last modification of the file. `None` if there is no file.
+    /// Time since the last modification.
     pub age: Option<Duration>,
 }
 
 impl WatchedFilms {
     /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
-    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on.
-    ///
-    /// # Errors
-    /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
+    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Fails if a plan file cannot
+    /// be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
         let mut films = Self::default();
         for path in paths {
@@ -121,10 +109,8 @@ impl WatchedFilms {
         Ok(films)
     }
 
-    /// Reads the headers of the film files at `paths`, which belong to one plan.
-    ///
-    /// # Errors
-    /// Fails if a file cannot be read or has no plan, or if the films of two files cannot be added.
+    /// Reads the headers of the parts at `paths`. Fails if one cannot be used, or if two films
+    /// cannot be added.
     pub(super) fn parts(paths: &[PathBuf]) -> Result<Self, String> {
         let files = paths.iter().map(|path| WatchedFile::new(path.clone(), None)).collect();
         let mut films = Self { files, ..Self::default() };
@@ -157,8 +143,7 @@ impl WatchedFilms {
         }
     }
 
-    /// Reads the film files that were replaced since the last call. Returns `true` if there were
-    /// any.
+    /// Reads the files that were replaced since the last call. Returns `true` if there were any.
     pub fn poll(&mut self) -> bool {
         let changed = self.read_changed();
         if !changed.is_empty() {
@@ -168,13 +153,11 @@ impl WatchedFilms {
         !changed.is_empty()
     }
 
-    /// Returns the sum of all films. Returns `None` if no file can be read.
     pub fn film(&self) -> Option<&Film> {
         self.sum.as_ref().map(|(_, film)| film)
     }
 
-    /// Returns the header of a film file for the sum of all films, with the plan and the list of
-    /// shards. Returns `None` if no file can be read.
+    /// Returns the header of the sum, with the plan and all shards.
     pub fn header(&self) -> Option<&FilmFileHeader> {
         self.sum.as_ref().map(|(header, _)| header)
     }
@@ -183,19 +166,16 @@ impl WatchedFilms {
         self.sum
     }
 
-    /// Returns the plan that all files share. Returns `None` before the first file, and for a
-    /// checkpoint of a render without a plan.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_deref()
     }
 
-    /// Returns the number of rays of all samples in the films.
     pub fn rays(&self) -> u64 {
         self.inputs().map(|input| input.rays).sum()
     }
 
-    /// Returns the seconds of rendering. For a checkpoint they are those of its render. For the
-    /// files of a plan they are the time from the earliest to the latest modification of a file.
+    /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
+    /// the latest modification of a part.
     pub fn seconds(&self) -> f64 {
         if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;
@@ -206,27 +186,25 @@ impl WatchedFilms {
         between.unwrap_or_default().as_secs_f64()
     }
 
-    /// Returns the share of the plan's samples that the films hold, 0..=1. Returns `None` without a
-    /// plan or a film.
+    /// Returns the share of the plan's samples that the films hold, 0..=1.
     pub fn progress(&self) -> Option<f64> {
         let (film, plan) = (self.film()?, self.plan()?);
         let pixels = (film.width() * film.height()) as f64;
         Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
     }
 
-    /// Returns `[number of complete shards, number of all shards]`; the base counts as a shard.
-    /// Returns `None` without a plan.
+    /// Returns the numbers of complete shards and of all shards, including the base.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
         let all = self.plan.as_ref()?.settings.shards as usize + 1;
         Some([self.shards_held().filter(|shard| shard.complete).count(), all])
     }
 
-    /// Returns the state at the time `now` of all files, and of the shards without a file. The most
-    /// urgent states are first: refused, missing, late, running, complete. Late files are in
-    /// ascending order of the share of their samples that is traced; so are running files.
+    /// Returns the state at the time `now` of all files, and of shards without a file. The most
+    /// urgent states are first: refused, missing, late, running, complete. Unfinished files are in
+    /// ascending order of the share of their samples that is traced.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
-        // Missing shards of a plan file that the user named have rows already.
+        // A named plan has a file for each missing shard.
         if let Some(plan) = self.plan.as_ref().filter(|_| self.named.is_none()) {
             let mut held: Vec<u32> = self.shards_held().map(|shard| shard.number).collect();
             held.sort_unstable();
@@ -269,12 +247,11 @@ impl WatchedFilms {
         self.inputs().flat_map(|input| &input.shards)
     }
 
-    /// Reads the film files whose stamps have changed. Returns their indices.
+    /// Reads the headers of the files whose stamps have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
-            // The stamp is taken before the file is read. If the file is replaced in the meantime,
-            // the stamps differ at the next call, and the file is read again.
+            // If the file is replaced while it is read, the stamps differ at the next call.
             let stamp = FileStamp::of(&file.path);
             if stamp != file.stamp {
                 let contents = match stamp {
@@ -290,9 +267,8 @@ impl WatchedFilms {
         changed
     }
 
-    /// Refuses those of the `changed` files whose films cannot be added to the films of the
-    /// unchanged files and of the accepted files before them. Returns the first reason, or `None`
-    /// if all films can be added.
+    /// Refuses those of the `changed` files whose films cannot be added to the unchanged files and
+    /// to the accepted ones before them. Returns the first reason.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
         let reason = self.try_join().err()?;
         let new: Vec<Contents> = changed
@@ -308,7 +284,6 @@ impl WatchedFilms {
         Some(reason)
     }
 
-    /// Checks that the films of all usable files can be added, and stores their common plan.
     fn try_join(&mut self) -> Result<(), String> {
         let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
         let mut inputs: Vec<&mut MergeInput> = self.named.iter_mut().collect();
@@ -325,17 +300,14 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Computes the sum of all usable films. A file whose film cannot be added is refused.
     fn add(&mut self) {
         while let Err((i, reason)) = self.try_add() {
             self.files[i].contents = Contents::Refused(reason);
         }
     }
 
-    /// Computes the sum of all usable films.
-    ///
-    /// # Errors
-    /// Returns the index of the file that cannot be added, and the reason.
+    /// Computes the sum of all usable films, or returns the file that cannot be added, with the
+    /// reason.
     pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
         self.sum = None;
         let mut order: Vec<(u32, usize)> = Vec::new();
@@ -356,10 +328,6 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Adds the film of the file with the index `i` to `film`.
-    ///
-    /// # Errors
-    /// Returns `i` and the reason why the film cannot be added.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
@@ -382,8 +350,7 @@ impl WatchedFilms {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns the plan that all files share, with all shards in the files. Returns `None` without
-    /// a shard.
+    /// Returns the common plan with all shards in the files.
     pub(super) fn part(&self) -> Option<Part> {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
@@ -392,10 +359,7 @@ impl WatchedFilms {
     }
 }
 
-/// Creates an empty film with the size, scales, seed and precision of `header`.
-///
-/// # Errors
-/// Fails if there is not enough memory.
+/// Creates an empty film for `header`. Fails if there is not enough memory.
 fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
     let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
@@ -426,8 +390,7 @@ impl WatchedFile {
         }
     }
 
-    /// Returns the number of the first shard, [`BASE`] for a checkpoint, by which usable files are
-    /// ordered. Returns `None` for a file that is missing or refused.
+    /// Returns the shard by which usable files are ordered.
     fn first_shard(&self) -> Option<u32> {
         match &self.contents {
             Contents::Part(input) => Some(input.shards[0].number),

@@ -64,15 +64,15 @@ enum Command {
     Quit,
 }
 
-/// State that the session's handle and its thread share in addition to the command channel.
+/// State that the handle and the thread share in addition to the command channel.
 #[derive(Default)]
 struct Shared {
-    /// Flag that cancels the wave being traced, because commands are waiting.
+    /// Cancels the wave being traced, because commands are waiting.
     cancel_wave: AtomicBool,
-    /// Flag that cancels the first pass over the picture, because a newer scene is waiting.
+    /// Cancels the first pass over the picture, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     slot: Slot,
-    /// Number of scenes compiled so far. Tests read it to see which scenes were skipped.
+    /// Number of scenes compiled so far.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
 }
@@ -91,22 +91,16 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts a rendering thread that traces with a pool of `threads` threads (0: one per
-    /// processor).
-    ///
-    /// # Errors
-    /// Returns an error for the user if a thread cannot be started.
+    /// Starts a thread that traces with a pool of `threads` threads (0: one per processor). Returns
+    /// an error for the user if a thread cannot be started.
     pub fn new(threads: usize, options: Options, settings: Settings) -> io::Result<Self> {
         Self::start(threads, |inbox, context| {
             move || Worker::new(inbox, context, options, settings).run()
         })
     }
 
-    /// Starts a thread that shows the sum of `films`, with `threads` threads for its computations.
-    /// The thread calls `on_report` with each report that differs from the previous one.
-    ///
-    /// # Errors
-    /// Returns an error for the user if a thread cannot be started.
+    /// Starts a thread that shows the sum of `films`. It calls `on_report` with each report that
+    /// differs from the previous one. Returns an error for the user if a thread cannot be started.
     pub fn watch(
         films: WatchedFilms,
         threads: usize,
@@ -137,18 +131,17 @@ impl Session {
         Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
 
-    /// Renders `scene` from now on. Returns the generation of the scene, a number that its reports
-    /// contain; later scenes have larger generations. Samples are kept if they are valid for the
-    /// new scene (see [`Relighting::mix`]).
+    /// Renders `scene` from now on, with the present samples if they are valid for it (see
+    /// [`Relighting::mix`]). Returns the generation of the scene, a number that its reports
+    /// contain; it increases with each scene.
     ///
     /// [`Relighting::mix`]: crate::Relighting::mix
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.begin(|generation| Command::Scene(generation, scene))
     }
 
-    /// Continues the render of `checkpoint`, whose samples are shown as a picture of `scene`.
-    /// Returns the generation of the scene as [`Session::set_scene`] does. If the checkpoint cannot
-    /// be used for this scene, reports have the state [`State::Failed`].
+    /// Continues the render of `checkpoint` as a picture of `scene`, and returns its generation. If
+    /// this is not possible, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
@@ -165,60 +158,51 @@ impl Session {
         });
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as
-    /// [`Session::set_scene`] does.
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation.
     pub fn restart(&mut self) -> u64 {
         self.begin(Command::Restart)
     }
 
-    /// Sets the stop criteria of the render. A finished render resumes if the new criteria are not
-    /// reached yet.
+    /// Sets the stop criteria. A finished render resumes if the new ones are not reached yet.
     pub fn set_stop(&self, stop: Stop) {
         self.send(Command::Stop(stop));
     }
 
-    /// Sets the display transform for the noise estimate, which is the RMSE of the displayed
-    /// picture. Samples are kept.
+    /// Sets the display transform of the picture whose noise is estimated.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
 
-    /// Sets the number of tracing threads (0: one per processor) and their priority. `niceness` 0
-    /// is the priority of the calling thread; 1 to 19 are lower priorities (on Linux).
-    ///
-    /// # Errors
-    /// Returns the operating system's error if a thread cannot be started. The old threads are then
-    /// kept.
+    /// Sets the number of tracing threads (0: one per processor) and their niceness, 0 to 19 (on
+    /// Linux). If a thread cannot be started, returns the error, and the old threads are kept.
     pub fn set_threads(&self, threads: usize, niceness: i32) -> io::Result<()> {
         self.send(Command::Pool(threads::pool(threads, niceness)?));
         Ok(())
     }
 
-    /// Pauses the render until [`Session::resume`].
     pub fn pause(&self) {
         self.send(Command::Pause(true));
     }
 
-    /// Resumes the render after a pause.
     pub fn resume(&self) {
         self.send(Command::Pause(false));
     }
 
-    /// Sets the contents of snapshots. Initially they contain neither picture nor pixel probe.
+    /// Sets the contents of snapshots; initially neither picture nor probe.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
-    /// Queues `task` and returns at once. The session's thread runs the task between two pieces of
-    /// work, with the picture of the moment. The argument is `None` if there is no film: no scene
-    /// has been set yet, the scene cannot be rendered, or no watched file can be read. Tasks that
-    /// are still queued when the session ends are dropped.
+    /// Queues `task` and returns at once. The session's thread runs it between two pieces of work.
+    /// The argument is `None` if there is no film: no scene has been set yet, the scene cannot be
+    /// rendered, or no watched file can be read. Tasks that are queued when the session ends are
+    /// dropped.
     pub fn submit(&self, task: impl FnOnce(Option<Picture>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
 
-    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` if there is
-    /// no render.
+    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` without a
+    /// render.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&RenderState, &Report) -> R + Send + 'static,
@@ -228,30 +212,25 @@ impl Session {
             if let Some(picture) = picture
                 && let Some(state) = picture.state()
             {
-                // A closed channel means that the client has stopped waiting.
                 let _ = sender.send(task(state, picture.report));
             }
         });
         receiver.recv().ok()
     }
 
-    /// Returns the channel that receives a message whenever a new snapshot is published.
+    /// Returns the channel that receives a message for each new snapshot.
     pub fn wakeup(&self) -> &Receiver<()> {
         &self.wakeup
     }
 
-    /// Waits at most `limit` for a snapshot that has not been taken yet. Returns `None` if there is
-    /// none after this time.
-    ///
-    /// # Panics
-    /// Panics if the rendering thread has panicked.
+    /// Waits at most `limit` for a snapshot that has not been taken yet. Panics if the rendering
+    /// thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
         let deadline = Instant::now() + limit;
         loop {
             match self.wakeup.recv_deadline(deadline) {
-                // After the message of one snapshot is received, a second snapshot may replace the
-                // first one before `take`. The message of the second snapshot then finds no
-                // snapshot.
+                // A second snapshot may replace the first one between its message and `take`. The
+                // message of the second then finds no snapshot.
                 Ok(()) => match self.take() {
                     Some(snapshot) => return Some(snapshot),
                     None => continue,
@@ -262,14 +241,12 @@ impl Session {
         }
     }
 
-    /// Takes the latest snapshot. Returns `None` if it has been taken already, or if there is none
-    /// yet.
+    /// Takes the latest snapshot. Returns `None` if it has been taken already.
     pub fn take(&self) -> Option<Snapshot> {
         self.shared.slot.take()
     }
 
-    /// Sends a command to the rendering thread and cancels the first pass over the picture.
-    /// `command` creates the command from a new generation. Returns the generation.
+    /// Sends a command with a new generation, cancels the first pass, and returns the generation.
     fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
         self.generations += 1;
         self.send(command(self.generations));
@@ -278,8 +255,7 @@ impl Session {
     }
 
     fn send(&self, command: Command) {
-        // Sending fails only after the worker has ended: by `Quit`, or by a panic, which `drop`
-        // propagates.
+        // Sending fails after `Quit`, or after a panic, which `drop` propagates.
         let _ = self.commands.send(command);
         self.shared.cancel_wave.store(true, Ordering::Release);
     }

@@ -1,7 +1,7 @@
 //! Worker of a session that shows films of other processes: it reads film files when they are
 //! replaced, and publishes snapshots of the sum of all films.
 
-use crate::export::{update_display, update_metadata};
+use crate::export::update_metadata;
 use crate::film::file::FilmFileHeader;
 use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
 use crate::plan::{WatchedFilms, WatchedShards};
@@ -132,8 +132,7 @@ impl Watcher {
                 threads: pool.current_num_threads(),
                 ..Report::of_samples(film)
             };
-            update_metadata(&mut header.metadata, &report);
-            update_display(&mut header.metadata, &header.display);
+            update_metadata(&mut header, &report);
             Some(Shown { header, report, tiles })
         });
     }

@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::{Light, LightSample};
+use crate::light::{Handles, LightDesc, LightForm, LightSample, Placement};
 use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -52,11 +52,6 @@ impl Environment {
         self.map.resolve(&self.file, load);
     }
 
-    /// Returns the error of reading the environment image; `None` if there was none.
-    pub(super) fn fault(&self) -> Option<ValidationError> {
-        self.map.fault()
-    }
-
     /// Returns an image of the gradient, with a single column, because the radiance depends on the
     /// elevation alone.
     fn gradient(&self) -> RadianceMap {
@@ -70,6 +65,25 @@ impl Environment {
     }
 }
 
+impl LightDesc for Environment {
+    fn form(&self) -> LightForm<'_> {
+        LightForm::Environment(self)
+    }
+
+    /// Returns the error of reading the image, if there was one.
+    fn faults(&self) -> Vec<ValidationError> {
+        self.file().and_then(|_| self.map.fault()).into_iter().collect()
+    }
+
+    fn handles(&mut self) -> Handles<'_> {
+        Handles::default()
+    }
+
+    fn placed(_: &Placement) -> Self {
+        Self::default()
+    }
+}
+
 /// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
@@ -78,10 +92,8 @@ pub struct EnvironmentLight {
 }
 
 impl EnvironmentLight {
-    /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
-    /// its image is not loaded.
-    pub fn new(light: &Light) -> Option<Self> {
-        let environment = light.environment.as_ref()?;
+    /// Compiles `environment`. Returns `None` if its image is not loaded.
+    pub fn new(environment: &Environment) -> Option<Self> {
         let map = match environment.file() {
             Some(_) => environment.map()?.clone(),
             None => Arc::new(environment.gradient()),
@@ -159,8 +171,7 @@ mod tests {
     use zerkalo_kernel::lanes::Double;
 
     fn light(environment: Environment) -> EnvironmentLight {
-        let light = Light { environment: Some(environment), ..Light::default() };
-        EnvironmentLight::new(&light).expect("an environment")
+        EnvironmentLight::new(&environment).expect("an environment")
     }
 
     fn radiance(light: &EnvironmentLight, direction: [f64; 3]) -> [f64; 3] {

@@ -2,8 +2,7 @@
 //!
 //! Each microfacet reflects and refracts like clear glass, about its own normal (Walter et al.
 //! 2007, *Microfacet Models for Refraction through Rough Surfaces*). The lobes `cone` and `square`
-//! have no microfacets. They distribute transmitted rays about the refracted direction as they
-//! distribute reflected rays about the mirror direction.
+//! distribute transmitted rays about the refracted direction.
 
 use crate::material::bsdf::{Bsdf, BsdfQuery, BsdfValue, ReflectionLobe, along_tan2, spread};
 use crate::material::microfacet::MicrofacetDistribution;
@@ -12,8 +11,7 @@ use zerkalo_kernel::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
 
 /// Relative difference of the indices of refraction below which transmitted rays count as parallel
-/// to the incident ones. Below it, the half vector of a microfacet has at most three valid digits
-/// in single precision.
+/// to the incident ones: the half vector then has at most three valid digits in single precision.
 const MIN_REFRACTION: f64 = 1e-3;
 
 /// Incident rays at interfaces, for which a BSDF is sampled or evaluated.
@@ -54,11 +52,11 @@ impl<L: SimdFloat> InterfaceQuery<L> {
 pub struct InterfaceSample<L> {
     /// Unit direction of the reflected ray.
     pub reflected: Vec3<L>,
-    /// Factor by which the radiance that arrives from the direction `reflected` is multiplied.
+    /// Factor of the radiance from there.
     pub reflected_weight: Vec3<L>,
     /// Unit direction of the transmitted ray.
     pub transmitted: Vec3<L>,
-    /// Factor by which the radiance that arrives from the direction `transmitted` is multiplied.
+    /// Factor of the radiance from there.
     pub transmitted_weight: L,
 }
 
@@ -264,7 +262,7 @@ impl<S: Float> Bsdf<S> {
         query: &InterfaceQuery<L>,
     ) -> FresnelSplit<L> {
         match &self.transmission {
-            Some(transmission) => interface.split_at(transmission, query.outer, query.thin),
+            Some(transmission) => interface.split(transmission, query.outer, query.thin),
             None => FresnelSplit { reflected: L::one(), transmitted: L::zero(), tir: L::zero() },
         }
     }
@@ -274,20 +272,16 @@ impl<S: Float> Bsdf<S> {
 struct Facet<L> {
     /// Unit normal of the microfacet, on the viewer's side.
     normal: Vec3<L>,
-    /// Cosine of the angle between microfacet normal and surface normal.
+    /// Cosines N.H, N.V and V.H of the surface normal N, the microfacet normal H and the direction V
+    /// to the viewer.
     nh: L,
-    /// Cosine of the angle between the direction to the viewer and the surface normal.
     nv: L,
-    /// Cosine of the angle between the direction to the viewer and the microfacet normal.
     vh: L,
-    /// Cosine of the angle between the outgoing direction and the surface normal. For transmitted
-    /// rays the normal is reversed.
+    /// Cosines N.O and O.H of the outgoing direction O, with both normals reversed for transmitted
+    /// rays.
     no: L,
-    /// Cosine of the angle between the outgoing direction and the microfacet normal. For
-    /// transmitted rays the normal is reversed.
     oh: L,
-    /// Density [1/sr] with which the outgoing direction is drawn if visible microfacets are
-    /// sampled.
+    /// Density [1/sr] with which O is drawn if visible microfacets are sampled.
     density: L,
 }
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 use zerkalo_render::film::Display;
-use zerkalo_render::image_file::{png_of_rgb, read_exr, read_png};
+use zerkalo_render::image_file::{ReadPicture, png_of_rgb, read_exr, read_png};
 use zerkalo_terminal::cells::Raster;
 use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
 use zerkalo_terminal::{Capabilities, cell_px};
@@ -50,14 +50,16 @@ fn viewer_image(
     display: &Display,
     viewport: &ImageViewport,
 ) -> Result<ViewerImage, String> {
-    let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
-        let picture = read_exr(path)?;
-        (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
+    let image = if path.extension().is_some_and(|e| e == "exr") {
+        let ReadPicture { size: [width, height], pixels, .. } = read_exr(path)?;
+        Raster { width, height, pixels: pixels.into_iter().map(display.to_8()).collect() }
     } else {
-        read_png(path)?
+        let image = read_png(path)?;
+        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        Raster { width, height, pixels: image.as_raw().as_chunks::<3>().0.to_vec() }
     };
-    let layout = viewport.layout(size)?;
-    let shown = shrunk(&Raster { width: size[0], height: size[1], pixels }, layout.shown);
+    let layout = viewport.layout([image.width, image.height])?;
+    let shown = shrunk(&image, layout.shown);
     let halves = shrunk(&shown, layout.halves);
     ViewerImage::encode(viewport, layout, &shown, halves, |image| {
         let size = layout.shown.map(|n| n as u32);

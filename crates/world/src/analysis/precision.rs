@@ -8,13 +8,13 @@
 //! largest permitted ratio of the scene extent to the size of the detail.
 //! `tests/extremes/precision.rs` measures the errors of single precision at each ratio.
 
-use crate::clearance::clearance;
+use crate::analysis::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::EmitterSurface;
+use zerkalo_scene::light::EmissiveSurface;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
 /// Limit of single precision: the largest permitted ratio of scene extent to the thickness of an
@@ -56,7 +56,7 @@ const MOST_PAIRS: usize = 1 << 20;
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
 /// `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude
 /// of a coordinate of the objects and the lens, relative to `origin`.
-pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
+pub(crate) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
@@ -76,12 +76,12 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let lights = || scene.lights.iter().filter(|light| light.on);
     let lamps = lights().filter_map(|light| light.apex());
-    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp) - origin));
+    let mut distances = lamps.map(|lamp| clearance(forms, lamp - origin));
     if distances.any(|distance| extent > MAX_EXTENT_PER_LIGHT_DISTANCE * distance) {
         return false;
     }
     let mut surfaces = lights().filter_map(|light| light.surface());
-    let is_fine = |surface: EmitterSurface| {
+    let is_fine = |surface: EmissiveSurface| {
         // Rounding of the coordinates may displace a part of the surface, so the largest coordinate
         // of the surface counts as well.
         let largest = (surface.center() - origin).abs().max_element() + surface.radius();

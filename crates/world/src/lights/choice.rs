@@ -21,13 +21,13 @@ use std::f64::consts::PI;
 use zerkalo_kernel::bvh::morton_code;
 use zerkalo_kernel::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use zerkalo_kernel::primitive::BoundingSphere;
-use zerkalo_scene::light::{DeltaLight, Light, SpotCone, spot_factor};
+use zerkalo_scene::light::{DeltaLight, Light, LightForm, SpotCone, spot_factor};
 use zerkalo_scene::value::sort_by_number;
 
 /// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
 /// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
 /// methods. A spot light counts as a part of a light; see [`ManyLights`].
-pub(super) const MIN_LIGHTS: usize = 16;
+pub(crate) const MIN_LIGHTS: usize = 16;
 
 /// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
 /// path traces shadow rays at one surface.
@@ -88,7 +88,7 @@ struct Cones<S> {
 }
 
 /// Point and spot lights of a scene, of which each path chooses a few at each surface.
-pub(super) struct LightChoice<S> {
+pub(crate) struct LightChoice<S> {
     /// Index of the light group that all lights of this choice share.
     pub group: usize,
     /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
@@ -97,7 +97,7 @@ pub(super) struct LightChoice<S> {
 }
 
 /// For each lane of a packet, the set of lights to which it traces shadow rays.
-pub(super) struct ChosenSets<'a, S> {
+pub(crate) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
     /// Index of the chosen set of lights in each lane.
     sets: [u32; MAX_WIDTH],
@@ -310,7 +310,7 @@ impl<S: Float> ChosenSets<'_, S> {
 /// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
 /// of such a kind share one light group.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ManyLights {
+pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.
     points: bool,
     /// `true` if the cones of the scene's spot lights have together at least the solid angle of
@@ -324,9 +324,12 @@ impl ManyLights {
     pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
         let (mut points, mut spots) = (0, 0.0);
         for light in lights {
-            points += usize::from(light.point.is_some());
-            if let Some(spot) = &light.spot {
-                spots += share(1.0 - spot.outer_angle.to_radians().cos());
+            match light.form() {
+                LightForm::Point { cone: None, .. } => points += 1,
+                LightForm::Point { cone: Some(spot), .. } => {
+                    spots += share(1.0 - spot.outer_angle.to_radians().cos());
+                }
+                LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => {}
             }
         }
         Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
@@ -334,7 +337,11 @@ impl ManyLights {
 
     /// Returns `true` if the scene has many lights of the kind of `light`.
     pub fn includes(&self, light: &Light) -> bool {
-        self.points && light.point.is_some() || self.spots && light.spot.is_some()
+        match light.form() {
+            LightForm::Point { cone: None, .. } => self.points,
+            LightForm::Point { cone: Some(_), .. } => self.spots,
+            LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => false,
+        }
     }
 }
 

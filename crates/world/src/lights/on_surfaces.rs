@@ -25,7 +25,7 @@ const LIFT: f64 = 16.0;
 const SHARPEST: f64 = 4.0;
 
 /// Surfaces on which a point light is located.
-pub(super) struct OnSurface<S> {
+pub(crate) struct OnSurface<S> {
     position: [S; 3],
     /// Unit normals of the surfaces at the light, one list for each convex solid, flat shape or
     /// mesh.

@@ -5,7 +5,7 @@
 //! to equal values before the comparison, or are named in a pattern without `..`. A field that is
 //! added to a description later is therefore compared by default, or causes a compile error here.
 
-use crate::light_groups::{LightGroupSource, LightGroups, contributes};
+use crate::lights::groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 use zerkalo_scene::light::Light;
 use zerkalo_scene::material::Material;

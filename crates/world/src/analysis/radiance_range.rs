@@ -22,7 +22,7 @@
 //! spots narrower than a quarter of a pixel, and light amplified by mirrors. Such samples may
 //! saturate; the film counts saturated samples.
 
-use crate::clearance::clearance;
+use crate::analysis::clearance::clearance;
 use crate::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -30,7 +30,7 @@ use zerkalo_kernel::lanes::Float;
 use zerkalo_kernel::primitive::{Bounds, Form, box_distance};
 use zerkalo_scene::asset::RadianceMap;
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{DeltaLight, Emitter};
+use zerkalo_scene::light::{CompiledLight, DeltaLight, Emitter};
 use zerkalo_scene::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use zerkalo_scene::{RayTypes, Scene};
 
@@ -54,7 +54,7 @@ const SPOT_BITS: f64 = 12.0;
 /// Estimates of the radiance of a light group's samples at several places of the scene. The integer
 /// scale of the film is chosen for this range.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RadianceRange {
+pub(crate) struct RadianceRange {
     /// Radiance of a white surface in the middle of the scene, lit by the light group.
     pub typical: f64,
     /// Radiance of the brightest spot of the dimmest surface: the minimum, over all surfaces, of
@@ -177,7 +177,7 @@ fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
 
 /// Distances and reflection factors of a scene without its lights, from which the
 /// [`RadianceRange`] of each light group is computed.
-pub(super) struct SceneDistances<'a> {
+pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// Factors by which each object reflects direct light, over all its parts. `None` if it
     /// reflects none.
@@ -266,9 +266,19 @@ impl<'a> SceneDistances<'a> {
         self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
+    /// Returns the range of the radiance that `light` causes at intensity 1. `visible` is `true` if
+    /// the camera and mirrors see it.
+    pub fn light<S: Float>(&self, light: &CompiledLight<S>, visible: bool) -> RadianceRange {
+        match light {
+            CompiledLight::Delta(delta) => self.delta(delta),
+            CompiledLight::Emitter(emitter) => self.emitter(emitter, visible),
+            CompiledLight::Environment(sky) => self.environment(sky.map(), visible),
+        }
+    }
+
     /// Returns the range of the radiance that surfaces reflect in the light of `light` alone, at
     /// intensity 1.
-    pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
+    fn delta<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
             let Response { least, most, peak } = self.response();
@@ -310,9 +320,31 @@ impl<'a> SceneDistances<'a> {
 
     /// Returns the range of the radiance that a light with a size causes at intensity 1. `visible`
     /// is `true` if the camera and mirrors see it.
-    pub fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
-        let ball = (emitter.center(), emitter.radius());
-        self.emitting_surface(ball, emitter.area(), emitter.radiance.to_f64(), visible)
+    fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
+        if emitter.is_distant() {
+            return self.distant_disk(emitter.radiance.to_f64(), visible);
+        }
+        let ball = (emitter.center, emitter.radius);
+        self.emitting_surface(ball, emitter.area, emitter.radiance.to_f64(), visible)
+    }
+
+    /// Returns the range of the radiance that a disk at an infinite distance causes, of which surfaces
+    /// have the irradiance pi. `emitted` is its own radiance, seen if it is `visible`.
+    fn distant_disk(&self, emitted: f64, visible: bool) -> RadianceRange {
+        let Response { least, most, peak } = self.response();
+        let range = self.range_of(1.0, (least, most, peak));
+        if !visible {
+            return range;
+        }
+        // The angular radius, of whose sine `emitted` is the inverse square, is compared with a
+        // quarter of a pixel.
+        let is_wide = emitted.sqrt().recip() > 0.25 * self.eye.1;
+        RadianceRange {
+            brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },
+            spots: range.spots.max(emitted),
+            extreme: range.extreme.max(emitted * self.gain),
+            ..range
+        }
     }
 
     /// Returns the range of the radiance that object `index` causes if it emits radiance 1. The
@@ -382,7 +414,7 @@ impl<'a> SceneDistances<'a> {
 
     /// Returns the range of the radiance that an environment causes at intensity 1. `visible` is
     /// `true` if the camera and mirrors see it.
-    pub fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
+    fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
         let mean = map.mean().into_iter().fold(0.0, f64::max);
         let typical = if mean > 0.0 { mean } else { 1.0 };
         let Response { least, most, peak } = self.response();

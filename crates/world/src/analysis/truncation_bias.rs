@@ -1,7 +1,7 @@
 //! Upper bounds of the bias that truncated paths cause (`max_depth`, `min_throughput`,
 //! `max_diffuse_depth` and `caustics`).
 
-use crate::surface_emission::is_sampled;
+use crate::lights::emissive_forms::is_sampled;
 use glam::DVec3;
 use zerkalo_scene::material::{Fresnel, Material, Texture};
 use zerkalo_scene::{Object, RayTypes, Scene};

@@ -12,7 +12,8 @@
 
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::touching_pairs;
-use crate::surface_emission::{CONTACT_LIFTS, triangles_of_mesh, triangles_of_polyhedron};
+use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
+use crate::lights::emitters::CONTACT_LIFTS;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use std::slice;
@@ -41,7 +42,7 @@ const MIN_COSINE: f64 = 0.999_999;
 
 /// Sides on which an object emits light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Emits {
+pub(crate) enum Emits {
     Nothing,
     Front,
     BothSides,
@@ -51,7 +52,7 @@ pub(super) enum Emits {
 /// the sides that emit light, and `transmits` is `true` if it transmits light. `eye` is the
 /// position of the camera. `lift` is the height of sampled points above emissive surfaces. Returns
 /// `None` if no sheet is moved.
-pub(super) fn move_off_surfaces(
+pub(crate) fn move_off_surfaces(
     geometry: &RecenteredGeometry,
     (emits, transmits): (&[Emits], &[bool]),
     eye: DVec3,
@@ -256,7 +257,12 @@ fn points_on(form: &Form) -> Vec<DVec3> {
         Form::Mesh(mesh) => {
             triangles_of_mesh(mesh, form.triangles().div_ceil(MAX_POINTS).max(1)).collect()
         }
-        _ => Vec::new(),
+        Form::Sphere(_)
+        | Form::Ellipsoid(_)
+        | Form::ConicalFrustum(_)
+        | Form::Csg(_)
+        | Form::Plane(_)
+        | Form::Torus(_) => Vec::new(),
     };
     let per_side = if triangles.len() <= MAX_DETAILED { POINTS_PER_SIDE } else { 1 };
     let points_on_triangle = |&[a, b, c]: &[DVec3; 3]| {

@@ -3,11 +3,11 @@
 //! intensity of the source. The film stores each group separately, so that colour and intensity can
 //! change without new samples.
 
-use crate::light_choice::ManyLights;
-use crate::radiance_range::{RadianceRange, SceneDistances};
-use glam::DVec3;
+use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
+use crate::lights::choice::ManyLights;
+use std::collections::HashMap;
 use zerkalo_kernel::lanes::Float;
-use zerkalo_scene::light::{DeltaLight, Emitter, EnvironmentLight, Light};
+use zerkalo_scene::light::Light;
 use zerkalo_scene::material::Material;
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{Object, Scene};
@@ -56,7 +56,7 @@ impl LightGroupSource {
 
     /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
     /// black.
-    pub(super) fn emission(&self, scene: &Scene) -> [f64; 3] {
+    pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
@@ -71,11 +71,11 @@ pub struct LightGroups {
     /// Sources of the light groups, in the order of the film's sums: one source for each group.
     pub members: Vec<LightGroupSource>,
     /// `true` if some surface reflects light that arrives directly from lights.
-    pub(super) lit: bool,
+    pub(crate) lit: bool,
     /// `true` if some surface reflects ambient light.
-    pub(super) ambient: bool,
+    pub(crate) ambient: bool,
     /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
-    pub(super) many: ManyLights,
+    pub(crate) many: ManyLights,
 }
 
 impl LightGroups {
@@ -209,26 +209,14 @@ impl LightGroups {
     }
 
     /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`]. `origin`
-    /// is the point in scene coordinates that becomes the origin of the compiled geometry.
-    /// `emitter` compiles a light with a size; it returns `None` for other lights.
-    pub(super) fn scales<S: Float>(
+    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`].
+    /// `ranges` has that of each light, by its index in the scene, for intensity 1.
+    pub(crate) fn scales<S: Float>(
         &self,
         scene: &Scene,
-        origin: DVec3,
-        emitter: impl Fn(&Light) -> Option<Emitter<S>>,
+        ranges: &HashMap<usize, RadianceRange>,
         distances: &SceneDistances,
     ) -> Vec<f64> {
-        let range_of_light = |i: usize| {
-            let light = &scene.lights[i];
-            if let Some(environment) = EnvironmentLight::new(light) {
-                return Some(distances.environment(environment.map(), light.visible));
-            }
-            if let Some(emitter) = emitter(light) {
-                return Some(distances.emitter(&emitter, light.visible));
-            }
-            Some(distances.light(&DeltaLight::<S>::new(light, origin)?))
-        };
         let range_of_material = |name: &str| {
             let has_material = |object: &usize| scene.objects[*object].materials().contains(&name);
             let objects = (0..scene.objects.len()).filter(has_material);
@@ -237,7 +225,7 @@ impl LightGroups {
         let range_of_one = |source: &LightGroupSource| match source {
             LightGroupSource::Ambient => Some(distances.ambient()),
             LightGroupSource::Background => Some(distances.background()),
-            LightGroupSource::Light(i) => range_of_light(*i),
+            LightGroupSource::Light(i) => ranges.get(i).copied(),
             LightGroupSource::Material(name) => range_of_material(name),
             LightGroupSource::Shared(_) => None,
         };
@@ -264,7 +252,7 @@ impl LightGroups {
 }
 
 /// Returns the names of the materials that emit light and are used, in order of first use.
-pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
+pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for name in scene.objects.iter().flat_map(Object::materials) {
         let emits = scene.materials.get(name).is_some_and(Material::emits);
@@ -276,26 +264,25 @@ pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
 }
 
 /// Returns the emission of a light: colour times intensity, black if it is off.
-pub(super) fn emission(light: &Light) -> [f64; 3] {
+pub(crate) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
 /// Returns `true` if the light is on and its emission is not black.
-pub(super) fn emits(light: &Light) -> bool {
+pub(crate) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
 
 /// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
 /// or the camera sees it. `lit` is `true` if some surface reflects direct light.
-pub(super) fn contributes(light: &Light, lit: bool) -> bool {
-    let has_radiance = light.surface().is_some() || light.environment.is_some();
-    emits(light) && (lit || light.visible && has_radiance)
+pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
+    emits(light) && (lit || light.visible && light.has_radiance())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light_choice::MIN_LIGHTS;
+    use crate::lights::choice::MIN_LIGHTS;
 
     const LIGHTS: &str = "
         [ambient]
@@ -316,6 +303,10 @@ mod tests {
 
     fn scene(text: &str) -> Scene {
         Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn move_right(light: &mut Light) {
+        light.position_mut().unwrap()[0] = 5.0;
     }
 
     fn can_reuse(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
@@ -347,12 +338,12 @@ mod tests {
         }));
         // Lights that do not emit may move or be absent.
         assert!(reusable(|s| s.lights[1].intensity = 9.0));
-        assert!(reusable(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(reusable(|s| move_right(&mut s.lights[1])));
         assert!(reusable(|s| s.lights.truncate(s.lights.len() - 1)));
         assert!(reusable(|s| s.lights.clear()));
         assert!(reusable(|s| {
             s.lights[0].on = false;
-            s.lights[0].point.as_mut().unwrap().position[0] = 5.0;
+            move_right(&mut s.lights[0]);
         }));
     }
 
@@ -363,7 +354,7 @@ mod tests {
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         assert!(!reusable(|s| s.lights[1].on = true));
         assert!(!reusable(|s| s.background.color = Color::WHITE));
-        assert!(!reusable(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(!reusable(|s| move_right(&mut s.lights[0])));
         assert!(!reusable(|s| s.lights[0].falloff = zerkalo_scene::light::Falloff::InverseSquare));
         assert!(!reusable(|s| s.lights.push(s.lights[0].clone())));
         assert!(!reusable(|s| s.camera.eye[0] += 0.5));
