@@ -1,18 +1,6 @@
 //! Acceleration structures: every choice renders the same image, bit for bit.
 
-use crate::common;
-use crate::support;
-use crate::support::test_film::TestFilm;
-
-use common::Numbers;
-use glam::{DAffine3, DQuat, DVec3};
-use std::fmt::Write;
-use std::fs;
-use std::path::Path;
-use support::{accelerated, all_shipped, parsed, sized};
-use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use crate::harness::*;
 
 /// Picture size in pixels. Neither side is a multiple of a tile's side.
 const SIZE: [u32; 2] = [37, 35];
@@ -40,8 +28,8 @@ fn shipped_scenes_are_equal_under_every_acceleration_in_double_precision() {
 }
 
 /// Returns a scene with objects of every shape that allows transforms. The objects have all sizes
-/// and are rotated and stretched. They are around and behind the camera, which may be inside of one
-/// of them.
+/// and are rotated and stretched. They are around and behind the camera, which may be inside one of
+/// them.
 fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
     let shapes = [
         "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",

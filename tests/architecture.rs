@@ -1,9 +1,7 @@
 //! Guards of the map in ARCHITECTURE.md: which folders of `src` import which others, and which
 //! folders use each external crate.
 
-use std::collections::BTreeSet;
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 
 /// Folders of `src`, each with the folders that it may import. A folder imports only folders below
 /// it in this list.
@@ -141,7 +139,6 @@ const CRATES: &[(&str, &[&str])] = &[
     ("zune_jpeg", &["asset"]),
 ];
 
-/// Returns path and text of every Rust file under `folder`.
 fn files(folder: &str) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![root.join(folder)];

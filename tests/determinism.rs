@@ -1,21 +1,8 @@
-//! Determinism: a sample is a pure function of the seed, the pixel, the replicate (one of two
-//! halves of the samples) and the sample index. The bytes of the film do not depend on the number
-//! of threads, the order of tracing, the packet layout or the division into parts.
+//! Determinism: a sample is a pure function of the seed, the pixel, the replicate and the sample
+//! index. The bytes of the film do not depend on the number of threads, the order of tracing, the
+//! packet layout or the division into parts.
 
-use crate::common;
-use crate::common::report;
-use crate::support;
-use crate::support::test_film::TestFilm;
-
-use common::Numbers;
-use report::report;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-use support::{all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
-use zerkalo::film::Film;
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
 const SEED: u64 = 29;
@@ -39,7 +26,6 @@ fn scenes() -> Vec<(String, Scene)> {
     .into()
 }
 
-/// Returns the film of the samples `0..count` of both replicates (halves of the samples).
 fn film_of_samples(scene: &Scene, precision: Precision, count: u32) -> Film {
     film_of_ranges(scene, precision, &[(0, count), (0, count)])
 }
@@ -102,9 +88,9 @@ fn extreme_29_sum_of_parts_does_not_depend_on_order() {
     report(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// Checks that a render that is stopped within a wave (a set of concurrent tracing jobs) can be
-/// resumed. A second render traces the remaining jobs, as the successor of a killed process would.
-/// The sum of both films must equal the film of an uninterrupted render.
+/// Checks that a render that is stopped within a wave can be resumed. A second render traces the
+/// remaining jobs, as the successor of a killed process would. The sum of both films must equal the
+/// film of an uninterrupted render.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
@@ -220,14 +206,7 @@ fn reused_film_equals_a_new_film() {
     let (_, scene) = &scenes()[0];
     let mut other = scene.clone();
     other.camera.eye[0] += 0.5;
-    let options = zerkalo::render::Options {
-        world: zerkalo::world::Options::default(),
-        sampling: zerkalo::sampling::SampleSettings {
-            seed: SEED,
-            kind: zerkalo::sampling::SamplerKind::Sobol,
-        },
-        display: zerkalo::film::Display::default(),
-    };
+    let options = render_options(sobol(SEED));
     let mut rendering = RenderState::new(&other, &options, None);
     uniform(&mut rendering, 0, 8, &pool(2));
     let mut rendering = RenderState::new(scene, &options, Some(rendering));

@@ -1,19 +1,9 @@
 //! Environment lights: white furnaces, very bright pixels, scaled and turned images, hostile files.
 
-use crate::common::normal;
-use crate::support;
-
-use normal::two_sided_z;
-use std::fs;
-use std::path::Path;
-use support::{parsed, picture, rendered};
-use zerkalo::camera::ViewAngle;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 /// Returns the mean of each channel over the picture, and the standard error of the mean. The error
-/// comes from the difference of the two replicates (halves of the samples); pixels are independent.
+/// comes from the difference of the two replicates; pixels are independent.
 fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f64); 3] {
     let rendering = rendered(scene, seed, precision, count);
     assert_eq!(rendering.film.bad_samples().count, 0, "{:?}", rendering.film.bad_samples().first);
@@ -26,8 +16,6 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
     })
 }
 
-/// Returns the scene of a ball that fills most of the picture. The texts `material` and `trace` are
-/// keys of the ball's material and of the trace settings; `light` is a light or a background.
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
         "[film]
@@ -86,8 +74,6 @@ fn white_objects_in_a_white_environment_are_white() {
     }
 }
 
-/// Checks that a white convex body in a white environment is white at every diffuse depth. A
-/// diffuse bounce that escapes must not add the environment's light a second time.
 #[test]
 fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
     let threshold = two_sided_z(1e-4 / (2 * 2 * 3 * 2) as f64);
@@ -167,8 +153,6 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
     }
 }
 
-/// Checks lobes that lose light. A white environment, whose light is sampled, gives the same
-/// reflected radiance as a white background, which only rays find.
 #[test]
 fn lobes_reflect_a_white_environment_like_a_white_background() {
     let background = "[background]\ncolor = [1.0, 1.0, 1.0]";
@@ -274,7 +258,6 @@ fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     }
 }
 
-/// Checks that twice the intensity of an environment gives twice the picture, sample by sample.
 #[test]
 fn intensity_scales_the_picture_of_an_environment() {
     let sky = "[[light]]\nenvironment = { zenith = [0.2, 0.5, 1.0] }\nintensity = ";
@@ -290,8 +273,6 @@ fn intensity_scales_the_picture_of_an_environment() {
     }
 }
 
-/// Checks that an invisible environment lights surfaces, but that neither the camera nor mirrors
-/// see it.
 #[test]
 fn invisible_environment_lights_but_is_not_seen() {
     let hidden = format!("{WHITE_SKY}\nvisible = false");

@@ -1,18 +1,12 @@
 //! The film's public interface: order of addition, precision of sums, contents of files.
 
-use crate::common;
-use crate::common::report;
-use crate::support::test_film::TestFilm;
-
-use common::Numbers;
+use crate::harness::*;
 use proptest::prelude::*;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufReader;
-use std::ops::Range;
-use std::path::Path;
 use zerkalo::film::{
-    Depth, Display, Film, Header, ImageData, ImageOutput, InvalidSample, LightWeights, Replicates,
-    TILE, Tile, TileHandle, Tone, WholeFilm, lattice_pixels, quantised_8, quantised_16,
+    Depth, ImageData, ImageOutput, InvalidSample, Tile, TileHandle, WholeFilm, lattice_pixels,
+    quantised_8, quantised_16,
 };
 
 const WIDTH: usize = 37;
@@ -58,8 +52,8 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds the samples `range` of one of the two replicates (halves of the samples) to the tiles in
-/// `tiles`, in the order of this list.
+/// Adds the samples `range` of one of the two replicates to the tiles in `tiles`, in the order of
+/// this list.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -101,9 +95,8 @@ fn threads_do_not_change_the_bytes() {
     }
 }
 
-/// Adds the first sample of replicate A (half of the samples) to each pixel. The pixels are visited
-/// in lattices, from coarse to fine. `steps` contains for each lattice the distance between its
-/// pixels.
+/// Adds the first sample of replicate A to each pixel. The pixels are visited in lattices, from
+/// coarse to fine. `steps` contains for each lattice the distance between its pixels.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;
@@ -209,7 +202,7 @@ fn extreme_28_milliard_samples() {
     assert!((green / 0.6993 - 1.0).abs() < 1e-8, "{green}");
     assert!((blue - 1e-8).abs() <= 0.5 / scale, "{blue}");
     let error = (red / 0.7 - 1.0).abs().max((green / 0.6993 - 1.0).abs());
-    report::report(28, "both", &format!("{error:.0e} off (relative)"));
+    report(28, "both", &format!("{error:.0e} off (relative)"));
 }
 
 #[test]
@@ -238,7 +231,7 @@ fn extreme_28_saturation_is_flagged() {
     sums[1].add(&film).unwrap();
     assert_eq!(sums.each_ref().map(Film::saturated_pixels), [1, 1]);
     assert!(sums[0].bytes() == sums[1].bytes());
-    report::report(28, "both", "saturation flagged");
+    report(28, "both", "saturation flagged");
 }
 
 #[test]

@@ -1,16 +1,7 @@
 //! Truncation bias that the program reports for `max_depth` and `min_throughput`. It is compared
 //! with the true bias, the difference between pictures with and without these limits.
 
-use crate::common;
-use crate::common::shape_examples::EXAMPLES;
-use crate::support;
-
-use common::Numbers;
-use std::fmt::Write;
-use support::{parsed, picture, rendered};
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::{self, AnyWorld, Precision};
+use crate::harness::*;
 
 const SAMPLES: u32 = 4;
 

@@ -5,18 +5,7 @@
 //! - The limits are ray types, depth, smallest throughput, horizon, and the cap on samples of
 //!   glossy tiles.
 
-use crate::support;
-use crate::support::test_film::TestFilm;
-
-use support::{
-    all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
-};
-use zerkalo::camera::Focus;
-use zerkalo::film::{Display, LightWeights, Replicates};
-use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::scene::{BelowHorizon, RayTypes, Scene, TransformOp};
-use zerkalo::value::Color;
-use zerkalo::world::{self, AnyWorld, Precision};
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [48, 36];
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
@@ -137,7 +126,6 @@ fn unit_of_light_does_not_change_the_picture() {
     }
 }
 
-/// Returns `scene`, translated by `by`.
 fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
     let mut scene = scene.clone();
     let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
@@ -268,8 +256,6 @@ fn ray_types_add_shadows_and_reflections() {
     assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
 }
 
-/// Checks that the bias of a depth limit is bounded. With the depth limit K and the reflectance
-/// rho, longer paths add at most rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
 #[test]
 fn depth_limits_paths_and_its_bias_is_bounded() {
     const RHO: f64 = 0.9;
@@ -354,7 +340,7 @@ fn horizon_folds_or_absorbs_rays() {
 fn rays_per_pixel_caps_glossy_tiles() {
     let scene = sized(shipped("rays-per-pixel.toml"), [96, 64]);
     assert_eq!(scene.film.rays_per_pixel, 16);
-    let stop = Stop { noise_codes: Some(0.3), ..Stop::default() };
+    let stop = noise_stop(0.3);
     for adaptive in [false, true] {
         let mut rendering = begin(&scene, 1, Precision::Auto);
         let reason =

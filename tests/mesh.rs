@@ -1,14 +1,8 @@
 //! Ray/mesh intersection: meshes must be watertight, and hits independent of packets and vector
 //! width.
 
-use crate::common;
-
-use common::Numbers;
-use std::sync::Arc;
-use zerkalo::asset::Assets;
+use crate::harness::*;
 use zerkalo::asset::Mesh;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
 /// Returns a closed mesh of a ball around the origin, read from OBJ. The triangles at the poles can
@@ -49,8 +43,8 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
     v.map(|x| x / length)
 }
 
-/// Checks that rays from inside of a closed mesh towards its corners, edges and triangles all hit
-/// the mesh, both in packets and as single rays.
+/// Checks that rays from inside a closed mesh towards its corners, edges and triangles all hit the
+/// mesh, both in packets and as single rays.
 fn check_watertight<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     let mut random = Numbers::new(0x5EED);
     let triangles = &mesh.mesh().triangles;

@@ -1,20 +1,9 @@
 //! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals,
 //! colours, and files that are invalid or change.
 
-use crate::support;
-
-use glam::DVec3;
-use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
-use std::fs;
-use std::path::{Path, PathBuf};
-use support::{picture, rendered};
-use zerkalo::asset::Assets;
-use zerkalo::film::Replicates;
-use zerkalo::primitive::{Form, MeshForm};
-use zerkalo::scene::edit::{Target, add_object, set};
-use zerkalo::scene::{Scene, SceneFile};
-use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
+use crate::harness::*;
+use zerkalo::scene::SceneFile;
+use zerkalo::scene::edit::{add_object, set};
 
 /// Returns a tube around a trefoil knot, made of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {
@@ -103,8 +92,6 @@ fn mesh_files_match_generators() {
     }
 }
 
-/// Checks that the signed volume of each shipped closed mesh is positive, that is, its fronts face
-/// outwards.
 #[test]
 fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
@@ -201,7 +188,7 @@ fn sphere_mesh_hits_converge_to_sphere() {
         let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
         let mut both = 0;
         for (a, b) in a.iter().zip(&b) {
-            // The faces are at most 1 - cos(pi / 400) inside of the sphere. The difference of the
+            // The faces are at most 1 - cos(pi / 400) inside the sphere. The difference of the
             // depths is largest at the silhouette.
             let (n, m) =
                 (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
@@ -257,7 +244,7 @@ fn closed_mesh_has_no_holes() {
     }
 }
 
-/// Checks that a light inside of a closed mesh lights no surface outside of it, neither with smooth
+/// Checks that a light inside a closed mesh lights no surface outside of it, neither with smooth
 /// nor with flat normals.
 #[test]
 fn closed_mesh_leaks_no_light() {
@@ -410,7 +397,7 @@ fn scene_is_not_saved_where_mesh_would_be_missing() {
 
 #[test]
 fn the_inventory_counts_triangles() {
-    let scene = support::shipped("shape-mesh.toml");
+    let scene = shipped("shape-mesh.toml");
     let inventory = AnyWorld::compile(&scene, &Options::default()).inventory().to_string();
     assert!(inventory.contains("4 meshes of 23,106 triangles (list)"), "{inventory}");
 }

@@ -3,8 +3,8 @@
 
 mod architecture;
 mod command_line;
-mod common;
 mod fuzz;
+mod harness;
 mod kills;
 mod link;
 mod live_session;
@@ -15,4 +15,3 @@ mod scene_editing;
 mod scene_files;
 mod session;
 mod stories;
-mod support;

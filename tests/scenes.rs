@@ -4,28 +4,13 @@
 //! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values.
 //! `ZERKALO_BLESS=NAME.toml` writes those of one scene, and keeps the stored ones of all others.
 
-use crate::common::normal;
-use crate::support;
-
-use normal::{tail, two_sided_z};
-use std::collections::BTreeMap;
-use std::fmt::Write;
-use std::fs;
-use std::path::PathBuf;
-use support::{
-    all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform, without_chance,
-};
-use zerkalo::film::Replicates;
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::{self, AnyWorld, Precision};
+use crate::harness::*;
 
 /// Width and height in pixels of the compared pictures.
 const SIZE: [u32; 2] = [48, 32];
 const COUNT: u32 = 32;
 /// Side in pixels of the blocks whose mean colours are compared.
 const BLOCK: usize = 8;
-/// Seeds of the renders whose mean is the reference.
 const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
 /// Number of decimals of the stored means.
 const DECIMALS: usize = 6;
@@ -62,7 +47,7 @@ fn every_scene_compiles_to_its_inventory() {
 
 /// Returns two values for each block, row by row: its mean colour, and the squared standard error
 /// of that mean. The standard error of a pixel is estimated as half the difference of its two
-/// replicates (halves of the samples). The squares are added, because pixels are independent.
+/// replicates. The squares are added, because pixels are independent.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -200,8 +185,8 @@ fn furnace_radiance_is_exactly_1() {
     }
 }
 
-/// Checks that both replicates (halves of the samples) are equal in scenes without anti-aliasing
-/// and lobes, where no sample is random.
+/// Checks that both replicates are equal in scenes without anti-aliasing and lobes, where no sample
+/// is random.
 #[test]
 fn deterministic_scenes_have_equal_replicates() {
     for (name, mut scene) in all_shipped() {

@@ -1,17 +1,7 @@
-//! Films of sessions (background renderers), which must not depend on threads, interruptions or
-//! earlier scenes.
+//! Films of sessions, which must not depend on threads, interruptions or earlier scenes.
 
-use crate::support;
-use crate::support::test_film::TestFilm;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
-use zerkalo::disk::Existing;
-use zerkalo::render::Checkpoint;
-use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::Stop;
-use zerkalo::render::session::{Report, Session, State};
-use zerkalo::sampling::SamplerKind;
-use zerkalo::scene::Scene;
+use crate::harness::*;
+use zerkalo::render::session::Report;
 
 const SCENE: &str = r#"
 [film]
@@ -36,7 +26,7 @@ shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0,
 "#;
 
 fn session(threads: usize, adaptive: bool) -> Session {
-    support::session(threads, 3, Stop { spp: Some(150), ..Stop::default() }, adaptive)
+    new_session(threads, 3, spp_stop(150), adaptive)
 }
 
 fn scene() -> Arc<Scene> {
@@ -120,7 +110,7 @@ fn checkpoint_cost() {
     let path = folder.path().join("a.zk");
     let threads = std::thread::available_parallelism().unwrap().get();
     let mut session = session(threads, false);
-    session.set_stop(Stop { spp: Some(16), ..Stop::default() });
+    session.set_stop(spp_stop(16));
     let generation = session.set_scene(Arc::new(scene));
     finished(&session, generation);
     for round in 0..5 {

@@ -2,19 +2,10 @@
 //! tracer.
 
 use crate::agreement::tracer::{Estimate, Mutation, Tracer};
-use crate::common::Numbers;
-use crate::common::normal::two_sided_z;
-use crate::support::{begin_with, picture, pool, sized, uniform};
-use glam::DVec3;
+use crate::harness::*;
 use rayon::prelude::*;
 use std::fmt;
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use zerkalo::camera::ViewAngle;
-use zerkalo::film::Replicates;
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use std::sync::{OnceLock, PoisonError};
 
 /// Width and height of the compared pictures.
 pub const SIZE: [u32; 2] = [32, 24];
@@ -62,8 +53,6 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
         Self(Mutex::new(Vec::new()))
     }
 
-    /// Returns the result of `compute` for `key`; `compute` runs only once for each key. The result
-    /// must depend on the key alone.
     pub fn get(&self, key: K, compute: impl FnOnce() -> V) -> V {
         let slot = {
             // A test that fails while it holds the lock leaves the table valid.
@@ -84,8 +73,7 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
 pub struct Picture {
     size: [u32; 2],
     mean: Vec<DVec3>,
-    /// Estimate of the noise of `mean`: half the difference of the two replicates (halves of the
-    /// samples) of each pixel.
+    /// Estimate of the noise of `mean`: half the difference of the two replicates of each pixel.
     half: Vec<DVec3>,
     /// Estimate of the noise of a second picture, which is rendered with independent random
     /// numbers: half the difference of its two replicates at each pixel.
@@ -94,7 +82,6 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Renders `scene` with `samples` samples per pixel in each replicate (half of the samples).
     pub fn new(scene: &Scene, samples: u32) -> Arc<Self> {
         static PICTURES: Memo<(Scene, u32), Arc<Picture>> = Memo::new();
         PICTURES.get((scene.clone(), samples), || {
@@ -191,8 +178,8 @@ fn traced(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimat
     Ok(rows.concat())
 }
 
-/// Renders `scene` with the program, with `samples` samples per pixel in each of the two replicates
-/// (halves of the samples). Returns the picture, and half the difference of the replicates.
+/// Renders `scene` with the program, with `samples` samples per pixel in each replicate. Returns
+/// the picture, and half the difference of the replicates.
 pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
@@ -215,9 +202,9 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
 
 /// Compares the variance of single samples in two pictures of a scene. The picture `reference` by
 /// the reference tracer has `reference_samples` samples per pixel. This program's picture is given
-/// by `half`, half the difference of its two replicates (halves of the samples), which have
-/// `samples` samples per pixel each. Returns the magnitude of the difference of the variances,
-/// averaged over blocks, in standard errors.
+/// by `half`, half the difference of its two replicates, which have `samples` samples per pixel
+/// each. Returns the magnitude of the difference of the variances, averaged over blocks, in
+/// standard errors.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,

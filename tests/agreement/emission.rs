@@ -4,9 +4,7 @@
 
 use crate::agreement::compounds::Body;
 use crate::agreement::surfaces::Piece;
-use crate::common::Numbers;
-use glam::{DAffine3, DVec3};
-use std::f64::consts::PI;
+use crate::harness::*;
 
 /// Surface of an emissive object from which points are sampled.
 pub enum Shine {

@@ -3,10 +3,8 @@
 //! importance sampling.
 
 use crate::agreement::tracer::Mutation;
-use crate::common::Numbers;
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::light::{Light, LightUnit};
+use crate::harness::*;
+use zerkalo::light::LightUnit;
 
 /// Lamp: a light with a size.
 pub enum Lamp {

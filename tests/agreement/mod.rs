@@ -13,29 +13,21 @@ pub(crate) mod surfaces;
 pub(crate) mod tracer;
 pub(crate) mod transmission;
 
-use crate::support;
+use crate::harness::*;
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
-use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
-use zerkalo::camera::{Aperture, Focus};
-use zerkalo::light::Light;
-use zerkalo::material::Lobe;
-use zerkalo::sampling::SamplerKind;
-use zerkalo::scene::{BelowHorizon, Scale, Scene, TransformOp};
 
-/// Samples per pixel of the reference tracer.
 pub(crate) const REFERENCE_SAMPLES: u32 = 96;
-/// Number of samples per pixel that the program traces in each of the two replicates (halves of the
-/// samples).
+/// Number of samples per pixel that the program traces in each replicate.
 pub(crate) const SAMPLES: u32 = 128;
 
-/// Number of samples per pixel in each of the two replicates (halves of the samples), half of
-/// [`SAMPLES`]. It is for slow scenes, and for pictures with rare bright samples: with more
-/// samples, the program would find some that the reference tracer misses.
+/// Number of samples per pixel in each replicate, half of [`SAMPLES`]. It is for slow scenes, and
+/// for pictures with rare bright samples: with more samples, the program would find some that the
+/// reference tracer misses.
 const FEW_SAMPLES: u32 = 64;
 
-/// Number of samples per pixel in each of the two replicates (halves of the samples), four times
-/// [`SAMPLES`]. It is for [`TEXTURED_SCENES`].
+/// Number of samples per pixel in each replicate, four times [`SAMPLES`]. It is for
+/// [`TEXTURED_SCENES`].
 const MANY_SAMPLES: u32 = 512;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
@@ -45,8 +37,8 @@ const SLOW_SCENES: [&str; 3] = ["torus.toml", "gallery-triptych.toml", "water-gl
 /// samples.
 const TEXTURED_SCENES: [&str; 3] = ["texture-image.toml", "footprint-square.toml", "bump.toml"];
 
-/// Returns the number of samples per pixel in each of the two replicates (halves of the samples),
-/// for the picture of the shipped scene `name`. Tests that take the same number share the picture.
+/// Returns the number of samples per pixel in each replicate, for the picture of the shipped scene
+/// `name`. Tests that take the same number share the picture.
 fn samples_of(name: &str) -> u32 {
     match name {
         _ if SLOW_SCENES.contains(&name) => FEW_SAMPLES,
@@ -115,8 +107,8 @@ fn shipped_scenes_agree_with_reference_tracer() {
 }
 
 /// Checks that a picture of `scene` by the program agrees with one by the reference tracer. The
-/// program traces `samples` samples per pixel in each of the two replicates (halves of the
-/// samples). The reference tracer traces `reference_samples` samples per pixel.
+/// program traces `samples` samples per pixel in each replicate. The reference tracer traces
+/// `reference_samples` samples per pixel.
 fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u32) {
     let reference = reference(scene, reference_samples, Mutation::None).unwrap();
     let verdict = Picture::new(scene, samples).beside(&reference, reference_samples);
@@ -131,8 +123,8 @@ fn check_detection(mutations: &[Mutation], name: &str, scene: &Scene, samples: u
     detected(mutations, name, scene, FEW_SAMPLES.max(samples / 6), samples);
 }
 
-/// Implements [`check_detection`] for a picture with `picture_samples` samples per pixel in each of
-/// the two replicates (halves of the samples), and for references with `samples` samples per pixel.
+/// Implements [`check_detection`] for a picture with `picture_samples` samples per pixel in each
+/// replicate, and for references with `samples` samples per pixel.
 fn detected(mutations: &[Mutation], name: &str, scene: &Scene, picture_samples: u32, samples: u32) {
     let picture = Picture::new(scene, picture_samples);
     let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
@@ -192,8 +184,8 @@ fn deliberate_errors_are_detected() {
     let focused = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
     let mutations = [Mutation::SquareLens, Mutation::UnfocusedLens];
     check_detection(&mutations, name, &focused, 16 * REFERENCE_SAMPLES);
-    // The camera is inside of the glass. For a camera outside, rays would enter and leave the
-    // glass, and the errors of the index at these two surfaces would cancel.
+    // The camera is inside the glass. For a camera outside, rays would enter and leave the glass,
+    // and the errors of the index at these two surfaces would cancel.
     let mut inside = scene("rough-glass.toml");
     inside.camera.eye = [0.1, 0.85, 0.1];
     let name = "rough-glass.toml from inside";
@@ -409,8 +401,6 @@ fn variances_agree_under_independent_random_numbers() {
     }
 }
 
-/// Checks one-sided panes and one-sided solids with every Fresnel mode, seen from both sides. The
-/// back of their surfaces must only transmit.
 #[test]
 fn one_sided_transparent_objects_reflect_on_their_front_only() {
     for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {

@@ -5,15 +5,9 @@ use crate::agreement::compounds::Leaf;
 use crate::agreement::meshes::Triangles;
 use crate::agreement::surfaces::Piece;
 use crate::agreement::tracer::{Mutation, Tracer};
-use crate::support::png_file::PngImage;
-use glam::{DMat3, DVec2, DVec3};
+use crate::harness::*;
 use png::BitDepth;
-use std::f64::consts::{PI, TAU};
-use std::path::Path;
-use zerkalo::material::{
-    Axis, Bump, Mapping, Material, Placement, Texture, TextureFilter as Filter, Wrap,
-};
-use zerkalo::shape::Shape;
+use zerkalo::material::{Axis, Bump, Mapping, Placement, Texture, TextureFilter as Filter, Wrap};
 
 /// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;
@@ -251,7 +245,6 @@ impl Spot<'_> {
 }
 
 impl Tracer<'_> {
-    /// Opens the images that `material` names.
     pub fn open_images(&mut self, material: &Material) -> Result<(), String> {
         for file in material.files() {
             if !self.images.contains_key(file) {

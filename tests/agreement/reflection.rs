@@ -2,11 +2,7 @@
 //! evaluates the formulas literally. The program's reflection is compared with its results.
 
 use crate::agreement::tracer::Mutation;
-use crate::common::Numbers;
-use glam::DVec3;
-use std::f64::consts::{PI, TAU};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
-use zerkalo::scene::BelowHorizon;
+use crate::harness::*;
 
 /// Roughness alpha of microfacets below which surfaces are treated as mirrors. Highlights are
 /// computed with at least this alpha.

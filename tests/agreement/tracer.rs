@@ -8,66 +8,55 @@ use crate::agreement::meshes;
 use crate::agreement::paint::Pixels;
 use crate::agreement::reflection::{highlight, reflect, wide_lobe};
 use crate::agreement::transmission::{Way, medium};
-use crate::common::Numbers;
-use glam::DVec3;
-use std::collections::HashMap;
-use std::f64::consts::PI;
+use crate::harness::*;
 use std::sync::LazyLock;
-use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::light::{Falloff, Light, Spot};
-use zerkalo::material::Material;
-use zerkalo::scene::{Filter, RayTypes, Scene};
-use zerkalo::value::{Color, TomlValue};
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
     /// No deliberate error.
     None,
-    /// Deliberate error: lobes are 5 % wider.
     WiderLobe,
-    /// Deliberate error: the densities of lobes are overestimated by 5 %.
+    /// The densities of lobes are overestimated by 5 %.
     LobeDensity,
-    /// Deliberate error: shadow rays start 1e-3 scene units too far towards the light.
+    /// Shadow rays start 1e-3 scene units too far towards the light.
     ShadowOffset,
-    /// Deliberate error: lobe directions below the horizon are absorbed.
+    /// Lobe directions below the horizon are absorbed.
     Absorb,
-    /// Deliberate error: for the first light, the cosine at the lit surface is omitted.
+    /// For the first light, the cosine at the lit surface is omitted.
     NoCosine,
-    /// Deliberate error: the intensity of a spot light falls linearly, instead of by a smoothstep,
-    /// from the inner to the outer cone.
+    /// The intensity of a spot light falls linearly, instead of by a smoothstep, from the inner to
+    /// the outer cone.
     LinearCone,
-    /// Deliberate error: light that enters a solid is not refracted.
+    /// Light that enters a solid is not refracted.
     NoBending,
-    /// Deliberate error: texture coordinates u and v are exchanged.
+    /// Texture coordinates u and v are exchanged.
     SidewaysTexture,
-    /// Deliberate error: bump heights are negated.
+    /// Bump heights are negated.
     SunkenBumps,
-    /// Deliberate error: diffuse bounces are distributed uniformly over the hemisphere.
+    /// Diffuse bounces are distributed uniformly over the hemisphere.
     UniformBounce,
-    /// Deliberate error: ambient light is also added at diffuse bounces.
+    /// Ambient light is also added at diffuse bounces.
     AmbientTwice,
-    /// Deliberate error: points of the lens are distributed over the square around it.
+    /// Points of the lens are distributed over the square around it.
     SquareLens,
-    /// Deliberate error: rays through the lens keep the direction of the ray through its centre.
+    /// Rays through the lens keep the direction of the ray through its centre.
     UnfocusedLens,
-    /// Deliberate error: refracted rays have the density of the microfacet normals, without
-    /// Jacobian.
+    /// Refracted rays have the density of the microfacet normals, without Jacobian.
     NoJacobian,
-    /// Deliberate error: the Jacobian of the half vector of refraction contains the index of the
-    /// incident side instead of the transmitted side.
+    /// The Jacobian of the half vector of refraction contains the index of the incident side
+    /// instead of the transmitted side.
     OtherIndex,
-    /// Deliberate error: absorption is computed for half of the distance.
+    /// Absorption is computed for half of the distance.
     HalfAbsorption,
-    /// Deliberate error: the cosine at the surface of a lamp is omitted.
+    /// The cosine at the surface of a lamp is omitted.
     NoLampCosine,
-    /// Deliberate error: the cosine at the surface of an emissive object is omitted.
+    /// The cosine at the surface of an emissive object is omitted.
     NoEmissionCosine,
-    /// Deliberate error: rays that miss all surfaces do not see environments.
+    /// Rays that miss all surfaces do not see environments.
     NoSky,
-    /// Deliberate error: reflected rays also see lamps whose reflected light was already found at
-    /// sampled points of the lamp. The results of two sampling techniques are thus added without
-    /// weights.
+    /// Reflected rays also see lamps whose reflected light was already found at sampled points of
+    /// the lamp. The results of two sampling techniques are thus added without weights.
     LampSeenTwice,
 }
 

@@ -7,10 +7,7 @@ use crate::agreement::reflection::{
     Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread,
 };
 use crate::agreement::tracer::{Hit, Mutation, Tracer};
-use crate::common::Numbers;
-use glam::DVec3;
-use zerkalo::material::{Fresnel, Material};
-use zerkalo::scene::{BelowHorizon, RayTypes, Scene};
+use crate::harness::*;
 
 /// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;
@@ -51,7 +48,6 @@ impl Tracer<'_> {
         self.filling(point).map_or((None, 1.0), |(i, material)| (Some(i), material.ior))
     }
 
-    /// Returns the index and the material of the solid that fills the space at `point`.
     fn filling(&self, point: DVec3) -> Option<(usize, &Material)> {
         let bodies = self.bodies.iter().zip(&self.media).enumerate().rev();
         bodies

@@ -2,14 +2,13 @@
 //! their folder.
 
 use super::*;
-use std::fmt::Write;
+use crate::harness::*;
 
 /// Text with control sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse
 /// the text direction.
 const EVIL: &str =
     "\u{1b}]52;c;cm0gLXJm\u{7}\u{1b}[31m\u{9b}32m\u{9d}52;c;AA\u{9c}\u{202e}\r\u{8}\u{200b}";
 
-/// Returns `true` if `text` contains control or formatting characters other than line ends.
 fn has_control_characters(text: &str) -> bool {
     text.chars().any(|c| {
         (c.is_control() && c != '\n')
@@ -24,7 +23,6 @@ fn check(what: &str, run: &Run) {
     assert!(!run.err.contains("panicked"), "{what}: {:?}", run.err);
 }
 
-/// Returns `text` as a string of TOML, with escapes.
 fn toml(text: &str) -> String {
     let escaped: String = text.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     format!("\"{escaped}\"")
@@ -173,7 +171,6 @@ fn scenes_read_regular_files_only() {
     }
 }
 
-/// Checks that a scene may name files in any folder, as docs/scene-format.md says.
 #[test]
 #[cfg(unix)]
 fn scenes_name_files_anywhere() {
@@ -192,7 +189,6 @@ fn scenes_name_files_anywhere() {
     }
 }
 
-/// Checks that files to which a mesh file refers must be in the mesh file's folder or below it.
 #[test]
 fn files_named_by_meshes_stay_in_their_folder() {
     let desk = Desk::new();
@@ -223,7 +219,6 @@ fn files_named_by_meshes_stay_in_their_folder() {
     }
 }
 
-/// Checks that excessive sizes in mesh files are refused before memory is allocated.
 #[test]
 fn sizes_are_checked_before_allocation() {
     let desk = Desk::new();

@@ -12,8 +12,7 @@ mod shards;
 mod signals;
 mod watch;
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 

@@ -1,8 +1,8 @@
 //! Reactions of commands to SIGINT and SIGTERM, which tests send by `kill`.
 
 use super::*;
+use crate::harness::*;
 use std::process::Child;
-use std::time::{Duration, Instant};
 
 pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
@@ -68,7 +68,7 @@ fn signal_saves_the_picture_so_far() {
 }
 
 /// Checks that a second signal ends the program at once. After the first signal alone, the program
-/// would write the picture when the wave (the set of concurrent tracing jobs) ends, minutes later.
+/// would write the picture when the wave ends, minutes later.
 #[test]
 fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();

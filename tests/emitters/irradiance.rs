@@ -1,10 +1,8 @@
 //! Irradiance by spheres, rectangles and disks on matt surfaces, with and without an occluder.
 
 use crate::emitters::forms;
-use crate::emitters::setup::{array, check, scene};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::scene::Scene;
+use crate::emitters::setup::{array, check};
+use crate::harness::*;
 
 /// Allowed relative rounding errors in single and double precision. They arise because lights are
 /// lifted off surfaces and rays start above surfaces.
@@ -13,7 +11,7 @@ const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 /// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by the
 /// light `light`, which the camera does not see. `rest` is the text of further objects.
 fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
          [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
@@ -215,7 +213,6 @@ fn tiny_and_huge_lights_keep_their_irradiance() {
     check(&cases, 1 << 15, [1e-3, 1e-6]);
 }
 
-/// Checks that a light that lies in the surface of a ceiling is not covered by the ceiling.
 #[test]
 fn light_in_a_ceiling_shines_into_the_room() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);

@@ -1,16 +1,8 @@
 //! Scenes with many point lights, of which each path samples only a few. The mean radiance is
 //! compared with the sum over all lights.
 
-use crate::common::Numbers;
-use crate::common::normal::two_sided_z;
-use crate::emitters::setup::{array, check, mean_and_error, radiance, samples, scene};
-use crate::support::{begin, pool, settings, trace};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::emitters::setup::{array, check, mean_and_error, radiance, samples};
+use crate::harness::*;
 
 /// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;
@@ -28,11 +20,9 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
 /// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit
 /// intensity. Every third light has no falloff.
 fn receiver(lights: &[DVec3]) -> Scene {
-    scene(&receiver_text(lights, |_| 1.0))
+    parsed(&receiver_text(lights, |_| 1.0))
 }
 
-/// Returns the text of the scene of [`receiver`], in which light `i` has the intensity
-/// `intensity(i)`.
 fn receiver_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
     let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
@@ -85,7 +75,7 @@ fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
             };
             let light = |(i, position): (usize, &DVec3)| intensity(i) * expected(i, *position);
             let sum = lights.iter().enumerate().map(light).sum();
-            let scene = scene(&receiver_text(&lights, intensity));
+            let scene = parsed(&receiver_text(&lights, intensity));
             cases.push((format!("{count} lights, {bright} of them bright"), scene, sum));
         }
     }
@@ -124,7 +114,7 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
             text += &spot;
             sum += radiance;
         }
-        cases.push((format!("{} points, {spots} spots", points.len()), scene(&text), sum));
+        cases.push((format!("{} points, {spots} spots", points.len()), parsed(&text), sum));
     }
     check(&cases, 1 << 16, [2e-4, 1e-9]);
 }
@@ -142,7 +132,7 @@ fn few_spots_among_many_points_are_all_asked() {
         for position in positions(spots, &mut Numbers::new(4)) {
             text += &spot(position, -position).0;
         }
-        let (_, error) = radiance::<Double>(&scene(&text), 64, 1);
+        let (_, error) = radiance::<Double>(&parsed(&text), 64, 1);
         assert_eq!(error > 1e-6, is_chosen, "{spots} spots: {error}");
     }
 }
@@ -169,8 +159,8 @@ fn samples_to_half_a_level(lights: &[f64]) -> f64 {
         text += &format!("[[light]]\npoint = {{ position = {position} }}\nfalloff = \"none\"\n");
         text += &format!("intensity = {intensity:?}\n");
     }
-    let mut rendering = begin(&scene(&text), 4, Precision::Auto);
-    let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+    let mut rendering = begin(&parsed(&text), 4, Precision::Auto);
+    let stop = noise_stop(0.5);
     let mut schedule = rendering.schedule(settings(true, 0, stop));
     let pool = pool(2);
     loop {
@@ -209,7 +199,7 @@ fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
     let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
                 inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
-    let scene = scene(&(receiver_text(&lights, |_| 1.0) + spot));
+    let scene = parsed(&(receiver_text(&lights, |_| 1.0) + spot));
     let count = 1 << 16;
     let mut sums: Vec<(f64, f64)> = Vec::new();
     samples::<Single>(&scene, count, 5, |groups| {
@@ -241,7 +231,6 @@ fn few_lights_are_all_asked() {
     assert!(error > 1e-3, "{error}");
 }
 
-/// Checks that lights at one place, on surfaces, far away and very near give finite samples.
 #[test]
 fn a_thousand_lights_at_extreme_places_have_finite_samples() {
     let mut lights = positions(1000, &mut Numbers::new(11));

@@ -1,14 +1,12 @@
 //! Lights seen by the camera, in mirrors and in glossy lobes.
 
-use crate::emitters::setup::{check, radiance, scene};
-use std::f64::consts::TAU;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::scene::Scene;
+use crate::emitters::setup::{check, radiance};
+use crate::harness::*;
 
 /// Creates the scene of a camera that looks down at a mirror with the keys `material`. A light with
 /// the keys `light` is the only light.
 fn mirror(material: &str, light: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = [0.0, 0.1, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
          view_angle.vertical = 0.1\n\
@@ -73,8 +71,6 @@ fn rough_panes_find_small_lights_on_both_sides() {
     check(&cases, 1 << 14, [2e-3, 1e-6]);
 }
 
-/// Checks a mirror with a cone lobe. Its radiance must be 0.7 times the fraction of the lobe's
-/// solid angle that a light of unit radiance covers.
 #[test]
 fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     let mut cases = Vec::new();
@@ -90,7 +86,6 @@ fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     check(&cases, 1 << 15, [2e-3, 1e-6]);
 }
 
-/// Checks that a lobe without loss reflects the radiance of a light that fills all directions.
 #[test]
 fn lobes_inside_a_sphere_light_reflect_all_light() {
     let mut cases = Vec::new();

@@ -1,13 +1,8 @@
 //! Light of emissive objects: closed forms, agreement with lights of the same size, white furnaces.
 
-use crate::common::normal::two_sided_z;
 use crate::emitters::forms;
-use crate::emitters::setup::{array, check, radiance, scene};
-use glam::{DMat3, DVec3};
-use std::f64::consts::PI;
-use std::fs;
-use zerkalo::lanes::{Double, Single};
-use zerkalo::scene::Scene;
+use crate::emitters::setup::{array, check, radiance};
+use crate::harness::*;
 
 /// Allowed relative rounding errors in single and double precision. They arise because sampled
 /// points are lifted off the emitter and rays start above the receiver.
@@ -17,7 +12,7 @@ pub const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 /// receiver's material. `rest` is the text of further objects; they may have the materials `lamp`
 /// (black and emissive), `front` (the same, one-sided) and `black`.
 pub fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
          [materials.white]\n{white}\n\
@@ -163,8 +158,6 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Checks an emissive box that stands on a surface. The box's lower face must light nothing behind
-/// the surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let turned = "transform = [{ rotate_y = 30.0 }]\n";
@@ -213,8 +206,6 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     agree("box beside a square", &alone, &with_square, 4096);
 }
 
-/// Checks that a flat emissive object emits on both sides if its material is two-sided, and only on
-/// its front if its material is one-sided.
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);
@@ -247,8 +238,6 @@ pub fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
     }
 }
 
-/// Checks rough mirrors, which combine sampled points with reflected rays. For each lobe, the
-/// reflected light of an emissive object equals that of a light of the same size.
 #[test]
 fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let center = DVec3::new(0.15, 0.7, 0.0);
@@ -272,7 +261,7 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     }
 }
 
-/// Checks that white objects inside of a closed surface of radiance 1 have the radiance 1. The
+/// Checks that white objects inside a closed surface of radiance 1 have the radiance 1. The
 /// emission is found by sampled points, by rays, or by both. If no points of the emissive surface
 /// are sampled, matt objects need a diffuse bounce.
 #[test]
@@ -313,8 +302,6 @@ fn furnace_of_emissive_walls_shows_white() {
     check(&cases, 1 << 14, [1e-4, 1e-6]);
 }
 
-/// Checks shadows inside of an emissive sphere. A black platform hides a part of the wall from the
-/// receiver.
 #[test]
 fn inside_of_an_emissive_sphere_has_shadows() {
     // A black square above the receiver, larger than the sphere.

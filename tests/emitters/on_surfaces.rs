@@ -3,10 +3,8 @@
 
 use crate::emitters::forms;
 use crate::emitters::objects::{MATT, ROUNDING, agree, mesh, object, receiver, rectangle};
-use crate::emitters::setup::{array, check, scene};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::scene::Scene;
+use crate::emitters::setup::{array, check};
+use crate::harness::*;
 
 /// Centre of the lamps on ceilings, and their size.
 const LAMP: (DVec3, [f64; 2]) = (DVec3::new(0.2, 2.0, 0.1), [1.0, 0.7]);
@@ -20,7 +18,7 @@ fn look(eye: DVec3, target: DVec3, rest: &str) -> Scene {
 
 /// Returns the scene of [`look`] for a camera with the given angle of view in degrees.
 fn look_through(degrees: f64, eye: DVec3, target: DVec3, rest: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "[film]\nsize = [1, 1]\n\
          [camera]\neye = {}\ntarget = {}\nup = [0.1, 0.2, 0.9]\nview_angle.vertical = {degrees:?}\n\
          [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
@@ -114,7 +112,6 @@ fn rooms() -> Vec<String> {
     ]
 }
 
-/// Checks flat emissive objects on the ceiling of a room, or on the lower side of a slab.
 #[test]
 fn emissive_sheets_on_ceilings_are_visible_and_light_the_room() {
     let (center, size) = LAMP;
@@ -199,8 +196,6 @@ fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
     check(&cases, 4096, ROUNDING);
 }
 
-/// Checks that an emissive sheet on another sheet shows on the side of the eye, and lights nothing
-/// on the other side.
 #[test]
 fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
     let lamp = object("lamp", "shape.platform = { center = [0.0, 1.0, 0.0], size = [1.0, 1.0] }");

@@ -1,19 +1,11 @@
 //! Scenes with one receiver and one light, and their radiance with its standard error.
 
-use crate::common::normal::two_sided_z;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
+use crate::harness::*;
+use zerkalo::world::Path;
 
 /// Returns three numbers as a TOML array.
 pub fn array(v: glam::DVec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
-}
-
-pub fn scene(text: &str) -> Scene {
-    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// Calls `visit` for each of `count` independent samples of the pixel (0, 0), with the red radiance
@@ -43,8 +35,6 @@ pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: im
     }
 }
 
-/// Returns the mean of a quantity and the mean's standard error, from its sum and its sum of
-/// squares over `count` samples.
 pub fn mean_and_error(sum: f64, squares: f64, count: u32) -> (f64, f64) {
     let n = f64::from(count);
     let mean = sum / n;

@@ -6,15 +6,8 @@ mod rays;
 mod scenes;
 mod survey;
 
-use crate::common::report;
-use crate::support;
-use std::f64::consts::PI;
-use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
-use zerkalo::film::{Display, Estimator, Replicates, TILE};
-use zerkalo::render::RenderState;
-use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use crate::harness::*;
+use zerkalo::film::Estimator;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;
@@ -85,9 +78,9 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     a.map(|x| x / dot(a, a).sqrt())
 }
 
-/// Returns the share of the directions in a cone that are inside of a half-space through the cone's
+/// Returns the share of the directions in a cone that are inside a half-space through the cone's
 /// apex. `theta` is the half-angle of the cone. `delta` is the angle of its axis above the plane of
-/// the half-space; it is positive inside of the half-space.
+/// the half-space; it is positive inside the half-space.
 fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta >= theta {
         1.0
@@ -265,7 +258,7 @@ fn outcomes(filter: Filter, adaptive: bool, stop: Stop, expected: StoppedBy) -> 
 /// Also checks that the mean error is 0 within noise. Returns the true RMSE of the displayed
 /// picture, divided by the estimated one, averaged over the seeds.
 fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let stop = spp_stop(spp);
     let outcomes = outcomes(filter, adaptive, stop, StoppedBy::Spp);
     let case = format!("{filter:?}, {spp} spp, adaptive {adaptive}");
 
@@ -312,7 +305,7 @@ fn assert_always_honest(adaptive: bool) {
     let ratios: Vec<f64> = cases.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
     let sampling = if adaptive { "adaptive" } else { "uniform" };
-    report::report(30, "both", &format!("{sampling}: true / estimated {low:.3} to {high:.3}"));
+    report(30, "both", &format!("{sampling}: true / estimated {low:.3} to {high:.3}"));
 }
 
 #[test]
@@ -328,11 +321,11 @@ fn extreme_30_adaptive_estimates_are_honest() {
 #[test]
 fn extreme_30_noise_target_is_reached() {
     for (filter, target) in [(Filter::Box, 2.0), (Filter::Point, 0.5)] {
-        let stop = Stop { noise_codes: Some(target), ..Stop::default() };
+        let stop = noise_stop(target);
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();
         assert!(achieved <= 1.1 * target, "{filter:?}: target {target}, achieved {achieved}");
-        report::report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
+        report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
     }
 }
 
@@ -350,7 +343,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
     let reference_spp = 1408;
-    let stop = Stop { spp: Some(reference_spp), ..Stop::default() };
+    let stop = spp_stop(reference_spp);
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_codes;
     assert!(own < 0.1, "the reference has an error of {own} levels itself");
@@ -358,7 +351,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
 
     for seed in 0..5 {
         let mut rendering = begin(&scene, seed, Precision::Auto);
-        let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+        let stop = noise_stop(0.5);
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
         let spp = rendering.film.samples() / (240 * 180);
         assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
@@ -378,7 +371,7 @@ fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let pool = pool(2);
     let values = |rendering: &RenderState| picture(rendering, Replicates::Both).concat();
     let mut reference = begin(&scene, 1000, Precision::Auto);
-    let stop = Stop { spp: Some(3072), ..Stop::default() };
+    let stop = spp_stop(3072);
     let linear = |stop| Settings { criterion: Criterion::Linear, ..settings(true, 0, stop) };
     assert_eq!(follow(&mut reference, linear(stop), &pool), StoppedBy::Spp);
     let noise = reference.film.noise(&reference.mix, &Display::default()).unwrap();
@@ -406,8 +399,6 @@ fn linear_target_is_met() {
     assert_linear_target_is_met([96, 72], 4);
 }
 
-/// Checks a linear noise target on a picture of 640x480 pixels, the size at which speed is
-/// measured.
 #[test]
 #[ignore = "half a minute: cargo test --test engine error_estimates:: -- --ignored --nocapture"]
 fn linear_target_is_met_at_full_size() {

@@ -1,9 +1,7 @@
 //! Audit of the thirty numbered tests of extremes: each exists once, in the file that the table
 //! names.
 
-use crate::common::report::report;
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 
 /// Table of the thirty numbered extremes. Each has a subject, a criterion, the name of a test
 /// without the prefix `extreme_NN_`, and the file of the test. Further tests may have the same
@@ -191,7 +189,6 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
     ),
 ];
 
-/// Appends every Rust file under `folder` to `out`.
 fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

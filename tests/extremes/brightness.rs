@@ -1,12 +1,6 @@
 //! Extremes of brightness: samples inside and outside of the range of the film.
 
-use crate::common::report::report;
-use crate::support::{begin, parsed, picture, pool, rendered, uniform};
-use std::fs;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 
@@ -103,7 +97,6 @@ fn surface_near_lamp_is_lit_at_every_scene_extent() {
     report(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
 }
 
-/// Checks a lamp close to a wall in a room whose walls are triangles.
 #[test]
 fn mesh_wall_near_lamp_is_lit() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +122,6 @@ fn mesh_wall_near_lamp_is_lit() {
     assert!((mean(&rendering) - 1.0).abs() < 2e-3, "{}", mean(&rendering));
 }
 
-/// Returns the scene of a floor of the material `material` in directional light of `intensity`.
 fn floor(material: &str, intensity: f64) -> Scene {
     parsed(&format!(
         "film = {{ size = [8, 8] }}\n\
@@ -141,7 +133,6 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// Checks that a surface of the colour c in light of the intensity 1 / c is white.
 #[test]
 fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
@@ -155,8 +146,6 @@ fn dim_colour_in_bright_light_is_white() {
     }
 }
 
-/// Checks that a colour of 1e6 does not saturate the film after half a million samples in each of
-/// two pixels.
 #[test]
 fn bright_colour_does_not_saturate_film() {
     let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
@@ -204,7 +193,6 @@ fn amplifying_mirrors_give_finite_white() {
     }
 }
 
-/// Checks that an object far from the lamp leaves the picture near the lamp unchanged.
 #[test]
 fn distant_object_leaves_surface_near_lamp_unchanged() {
     let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";

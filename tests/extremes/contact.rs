@@ -1,16 +1,8 @@
 //! Transparent objects in contact with others. The picture must be the limit of pictures with a gap
 //! between the objects as the gap vanishes.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced};
-use crate::support::{parsed, picture, rendered};
-use glam::{DAffine3, DQuat, DVec3};
-use std::fs;
-use std::path::Path;
+use crate::harness::*;
 use tempfile::TempDir;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
 
 /// Width of the gap in scenes that are compared with the same scene without a gap.
 const GAP: f64 = 1e-4;

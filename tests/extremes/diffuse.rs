@@ -1,10 +1,6 @@
-//! Indirect diffuse light against closed forms: a white furnace, and the inside of a sphere.
+//! Indirect diffuse light against closed forms: a white furnace, and the inside a sphere.
 
-use crate::support::{picture, rendered};
-use std::f64::consts::PI;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 const SAMPLES: u32 = 64;
 
@@ -80,7 +76,7 @@ fn furnace_is_white_at_every_diffuse_depth() {
     }
 }
 
-/// Checks the inside of a sphere of albedo rho and radius R around a light of intensity I. Every
+/// Checks the inside a sphere of albedo rho and radius R around a light of intensity I. Every
 /// bounce adds rho times the radiance of the one before. The first radiance is rho I / (pi R^2).
 #[test]
 fn sphere_from_inside_is_a_geometric_series() {
@@ -117,8 +113,6 @@ fn sphere_from_inside_is_a_geometric_series() {
     }
 }
 
-/// Checks a floor beside a wall. Directional light falls on the wall only, which is 1 high and
-/// infinitely wide. The form factor between a point of the floor and the wall is known.
 #[test]
 fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
     let rho = 0.5;

@@ -1,14 +1,7 @@
 //! Thin lens: circles of confusion against their closed form, and lenses of zero size and of the
 //! size of the room.
 
-use crate::support::test_film::TestFilm;
-use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
-use std::f64::consts::PI;
-use zerkalo::camera::{Aperture, Focus};
-use zerkalo::film::Replicates;
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 /// Largest allowed deviation of a pixel from a closed form, in standard errors. The comparisons of
 /// this file, some 4,000 pixels, give a false alarm in 1 of 1,000 runs.
@@ -38,7 +31,6 @@ fn edge(depth: f64, radius: f64, focus: f64) -> Scene {
     .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Returns the share of a unit disk on the side x < `t` of a line.
 fn disk_share(t: f64) -> f64 {
     let t = t.clamp(-1.0, 1.0);
     0.5 + (t * (1.0 - t * t).sqrt() + t.asin()) / PI

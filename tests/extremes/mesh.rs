@@ -1,18 +1,8 @@
 //! Watertight meshes: no ray passes between two triangles, at edges, at corners or in slivers.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, closest, packets};
-use crate::common::report::{LEFT_TO_DOUBLE, report};
-use glam::{DAffine3, DQuat, DVec3};
+use crate::harness::*;
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::fmt::Write;
-use std::sync::Arc;
-use zerkalo::asset::{Assets, Mesh};
-use zerkalo::lanes::{Double, Mask, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, Form, MeshForm};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options};
+use zerkalo::asset::Mesh;
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
@@ -77,8 +67,8 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 }
 
 /// Returns the number of rays that miss the mesh, by closest hit or by occlusion. `rays` rays start
-/// inside of the mesh and point to its corners, its edges and into its triangles. `place`
-/// transforms the mesh, an ellipsoid with the half-axes `axes`.
+/// inside the mesh and point to its corners, its edges and into its triangles. `place` transforms
+/// the mesh, an ellipsoid with the half-axes `axes`.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
@@ -116,8 +106,8 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
 
 /// Checks meshes of few and of many triangles. One of them is scaled, rotated and moved. A needle
 /// and a sheet have the relative thickness 1e-6, and their triangles are slivers. Single precision
-/// resolves the inside of a sliver to a tenth of its thickness and loses one ray in a million
-/// there; `auto` selects double.
+/// resolves the inside a sliver to a tenth of its thickness and loses one ray in a million there;
+/// `auto` selects double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),

@@ -1,12 +1,6 @@
 //! Lamps that lie exactly on surfaces.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced};
-use glam::{DAffine3, DQuat, DVec3};
-use std::fs;
-use std::path::Path;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 /// Ceilings that contain the point lamp at (0, 3, 0). The number determines which points above the
 /// ceiling, at y = 4, the lamp lights: those farther from the y axis than this distance. It is 0 for
@@ -114,8 +108,6 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     }
 }
 
-/// Checks that a lamp on a surface lights exactly those points that a lamp slightly off the surface
-/// would light.
 #[test]
 fn lamp_on_surface_lights_like_lamp_just_off_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,20 +3,13 @@
 //! radius of a ball on a floor of constant size. The error of single precision is the RMSE against
 //! double precision with the same samples, in 8-bit levels.
 
-use crate::common::report::report;
-use crate::support::{all_shipped, begin, parsed, picture, pool, shipped, sized, uniform};
-use std::collections::BTreeMap;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::render::RenderState;
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision};
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [24, 18];
 /// Picture size in pixels for scenes of a [`Family`].
 const FAMILY_SIZE: [u32; 2] = [32, 24];
-/// Number of samples per pixel in each of the two replicates (halves of the samples). Rounding
-/// diverts some paths, as often to one side of an edge as to the other. With this number of
-/// samples, diverted paths add no visible noise.
+/// Number of samples per pixel in each replicate. Rounding diverts some paths, as often to one side
+/// of an edge as to the other. With this number of samples, diverted paths add no visible noise.
 const SAMPLES: u32 = 128;
 
 /// Largest error of single precision in scenes for which `auto` selects it, in 8-bit levels: a
@@ -30,7 +23,7 @@ fn takes_single(scene: &Scene) -> bool {
 /// Pictures of a scene in single and in double precision, with the same samples.
 struct Pair {
     pictures: [RenderState; 2],
-    /// Samples per pixel in each replicate (half of the samples).
+    /// Samples per pixel in each replicate.
     samples: u32,
 }
 
@@ -301,8 +294,6 @@ fn auto_takes_single_where_proportions_are_harmless() {
     assert!(takes_single(&two_balls(40.0)) && !takes_single(&two_balls(0.4)));
 }
 
-/// Checks the choice of precision for scenes of all thirty numbered extremes. `auto` selects double
-/// precision for the extremes that single precision cannot represent, and single for the others.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
     let scene_from = |eye: [f64; 3], degrees: f64, shape: &str| {
@@ -378,7 +369,7 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     }
 }
 
-/// Checks eyes inside of the bounding box of a cylinder, a cone or an ellipsoid. The box contains
+/// Checks eyes inside the bounding box of a cylinder, a cone or an ellipsoid. The box contains
 /// points close to the surface, for which `auto` selects double precision, and points far from it,
 /// for which it selects single.
 #[test]
@@ -405,7 +396,6 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
     }
 }
 
-/// Checks that shipped scenes are traced in single precision, without visible error.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
     // Rounding diverts some paths in glass and between mirrors. The result is noise, not an error,

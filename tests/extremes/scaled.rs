@@ -1,12 +1,7 @@
 //! Scenes that are scaled by a millionth or a million, or moved by ten million units, against the
 //! original scene: the pictures are equal.
 
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use zerkalo::film::{Display, Replicates};
-use zerkalo::light::Falloff;
-use zerkalo::scene::{Scale, Scene, TransformOp};
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;

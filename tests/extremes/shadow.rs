@@ -1,12 +1,7 @@
 //! Shadows of surfaces on themselves and on each other.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, scene};
-use crate::common::report::report;
-use glam::{DMat3, DVec3};
-use zerkalo::world::Precision;
+use crate::harness::*;
 
-/// Convex shapes for the test of self-shadowing.
 #[derive(Clone, Copy, Debug)]
 enum ConvexShape {
     Plane,
@@ -129,7 +124,7 @@ fn falsely_dark(
     let [x, y, z] = (-towards).to_array();
     let [ex, ey, ez] = (place + DVec3::new(0.0, 3.0, 5.0) * scale).to_array();
     let [px, py, pz] = place.to_array();
-    let scene = scene(&format!(
+    let scene = parsed(&format!(
         "[camera]\neye = [{ex:?}, {ey:?}, {ez:?}]\ntarget = [{px:?}, {py:?}, {pz:?}]\n\
          [[light]]\ndirectional = {{ direction = [{x:?}, {y:?}, {z:?}] }}\n\
          [[object]]\nshape.{}\n",
@@ -224,7 +219,7 @@ fn extreme_15_self_shadow_far_from_the_origin() {
 /// under the box must be dark, except for a strip as wide as the gap, which slanting light reaches.
 fn check_gap(scale: f64, precision: Precision) {
     let gap = 1e-6 * scale;
-    let scene = scene(&format!(
+    let scene = parsed(&format!(
         "[camera]\neye = [0.0, {:?}, {:?}]\ntarget = [0.0, 0.0, 0.0]\n\
          [[light]]\ndirectional = {{ direction = [-1.0, -1.0, 0.0] }}\n\
          [[object]]\nshape.platform = {{ center = [0.0, 0.0, 0.0], size = [{:?}, {:?}] }}\n\

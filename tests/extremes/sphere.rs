@@ -1,14 +1,7 @@
 //! Spheres seen from afar, from inside, as ground, and at the limb.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, closest, scene};
-use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
-use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form, SphereForm};
-use zerkalo::world::{AnyWorld, Options, Precision};
+use crate::harness::*;
+use zerkalo::camera::PerspectiveCamera;
 
 /// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]
@@ -165,7 +158,7 @@ fn extreme_02_sphere_as_ground() {
     assert!((below - row).abs() < 0.01, "horizon in row {below}, expected {row}");
 
     for light in ["[0.0, -1.0, 0.0]", "[0.3, -0.2, 0.1]", "[1.0, -0.001, 0.0]"] {
-        let scene = scene(&text(light));
+        let scene = parsed(&text(light));
         // `auto` selects double precision, because single precision rounds coordinates of such a
         // ground to about 100 units.
         let auto = AnyWorld::compile(&scene, &Options::default());
@@ -251,8 +244,6 @@ fn closed_form_10_silhouettes() {
     }
 }
 
-/// Checks that a pixel shows the sphere exactly if the pixel's centre is inside of the sphere's
-/// silhouette, for which there is a closed form. The camera rays are those of the compiled camera.
 #[test]
 fn closed_form_10_every_pixel_of_a_sphere() {
     let camera = Camera {

@@ -1,12 +1,7 @@
 //! Extremes of cylinders, cones and conical frusta.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, LineHit, closest};
-use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
-use glam::{DAffine3, DQuat, DVec3};
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, Form};
-use zerkalo::shape::{Cone, Cylinder, ShapeDesc, TaperedCylinder, UnitFrustum};
+use crate::harness::*;
+use zerkalo::shape::{Cone, TaperedCylinder, UnitFrustum};
 
 fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)
@@ -113,8 +108,6 @@ fn extreme_11_tapered_cylinders() {
     report(11, "single", LEFT_TO_DOUBLE);
 }
 
-/// Checks that a tapered cylinder of two equal radii is bit-equal to a cylinder, and one with the
-/// top radius 0 to a cone.
 #[test]
 fn extreme_11_untapered_solid_is_bit_equal_to_cylinder() {
     let (base, end) = ([0.1, -0.2, 0.3], [0.5, 0.9, -0.4]);

@@ -2,9 +2,7 @@
 //! Rectangles and triangles are intersected directly.
 
 use crate::agreement::surfaces::map;
-use glam::{DAffine3, DVec3};
-use zerkalo::scene::{Object, TransformOp};
-use zerkalo::shape::{CsgOperand, Shape};
+use crate::harness::*;
 
 /// Implicit function: negative inside, zero on the surface, positive outside.
 pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;
@@ -87,7 +85,6 @@ fn placed(inside: Inside, steps: &[TransformOp]) -> Inside {
     Box::new(move |p| inside(object_from_scene.transform_point3(p)))
 }
 
-/// Returns the affine map of the transform steps `steps`, applied in order.
 pub fn placement(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all)
 }

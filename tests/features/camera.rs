@@ -4,10 +4,7 @@ use crate::agreement::compare::zoomed;
 use crate::features::first_hits::hits_agree;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, row};
-use crate::support::shipped;
-use glam::DVec3;
-use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::scene::Scene;
+use crate::harness::*;
 
 fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))

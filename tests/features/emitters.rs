@@ -4,9 +4,8 @@ use crate::agreement::REFERENCE_SAMPLES;
 use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
-use crate::support::{parsed, shipped};
-use zerkalo::light::{Environment, Falloff, Light, LightUnit, Point};
-use zerkalo::scene::{RayTypes, Scene};
+use crate::harness::*;
+use zerkalo::light::{Environment, LightUnit};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
 /// `mutations`, changed versions of the scene, must disagree.

@@ -2,11 +2,8 @@
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
-use crate::support::test_film::TestFilm;
-use crate::support::{rendered, shipped, sized};
+use crate::harness::*;
 use zerkalo::primitive::Acceleration;
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {

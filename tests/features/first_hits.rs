@@ -2,12 +2,8 @@
 
 use crate::features::analytic_shapes::AnalyticShape;
 use crate::features::row::Verdict;
-use crate::support::sized;
-use glam::DVec3;
+use crate::harness::*;
 use rayon::prelude::*;
-use zerkalo::camera::{Camera, ViewAngle};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
 /// Width and height in pixels of the compared pictures.
 pub const RASTER: [u32; 2] = [48, 36];

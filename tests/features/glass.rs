@@ -2,10 +2,8 @@
 
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{material, row};
-use crate::support::shipped;
+use crate::harness::*;
 use zerkalo::light::SphereLight;
-use zerkalo::material::Lobe;
-use zerkalo::value::Color;
 
 #[test]
 fn d6_rough_transmission() {
@@ -21,8 +19,7 @@ fn d6_rough_transmission() {
             ("microfacets for the cone", &|s| material(s, "spread").lobe = Lobe::Beckmann),
         ],
     );
-    // A lamp instead of the sun: points of it are sampled through the pane and from inside of
-    // solids.
+    // A lamp instead of the sun: points of it are sampled through the pane and from inside solids.
     let mut lit = original;
     let lamp = &mut lit.lights[0];
     lamp.clear_kind();

@@ -4,13 +4,8 @@ use crate::agreement::REFERENCE_SAMPLES;
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::features::row::{Verdict, ensure, material, object, row};
-use crate::support::{parsed, shipped, sized};
-use glam::DVec3;
-use zerkalo::camera::ViewAngle;
-use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
-use zerkalo::scene::{RayTypes, Scene};
-use zerkalo::value::Color;
+use crate::harness::*;
+use zerkalo::material::Metal;
 
 /// Checks that the picture of `file` agrees exactly with the reference tracer. The picture of each
 /// of `mutations`, changed versions of the scene, must disagree.

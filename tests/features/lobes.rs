@@ -3,14 +3,7 @@
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::{agrees, without_chance};
 use crate::features::row::{Verdict, ensure, material, number, object, row, shape};
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::film::Replicates;
-use zerkalo::material::Lobe;
-use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
-use zerkalo::shape::Shape;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 /// Returns `scene` with the mirror as its only reflecting object. The mirror's material has no
 /// ambient and no diffuse part.
@@ -26,8 +19,6 @@ fn stripped(scene: &Scene) -> Scene {
     scene
 }
 
-/// Returns `scene` without the mirror, and with objects and lights mirrored at the mirror's plane z
-/// = -2.
 fn mirrored_scene(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");

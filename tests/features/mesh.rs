@@ -3,17 +3,13 @@
 use crate::features::analytic_shapes::{AnalyticShape, placement, triangles};
 use crate::features::first_hits::hits_agree_with;
 use crate::features::row::{object, row, shape};
-use crate::support::{parsed, shipped};
-use glam::DVec3;
-use std::fs;
-use zerkalo::scene::Scene;
+use crate::harness::*;
 
 /// Returns the triangles of a polygon: a fan around its first corner.
 fn fan(corners: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> {
     corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
-/// Returns the triangles of an OBJ file.
 fn obj_triangles(text: &str) -> Vec<[DVec3; 3]> {
     let statements = |key: &str| {
         let lines = text.lines().filter_map(|line| line.split_once(' '));

@@ -3,14 +3,7 @@
 use crate::features::first_hits::{RASTER, centers, hits_agree, pixel_ray};
 use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use zerkalo::film::Replicates;
-use zerkalo::material::Fresnel;
-use zerkalo::scene::{Filter, RayTypes, Scene};
-use zerkalo::shape::Shape;
-use zerkalo::value::Color;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 #[test]
 fn b1_tracing_depth() {
@@ -34,7 +27,6 @@ fn b1_tracing_depth() {
 /// Upright pane of a scene of panes, each of which reflects and transmits rays.
 struct Pane {
     center: DVec3,
-    /// Half the width and half the height of the pane.
     half: [f64; 2],
     /// Radiance that the pane emits.
     glow: DVec3,
@@ -168,8 +160,8 @@ fn b2_ray_tree() {
 }
 
 /// Checks a large ball that reflects all light on its outside and transmits a fifth at each
-/// surface. In front of a white background its radiance is 1 + 0.2 x 0.2, because light inside of
-/// the ball is not reflected.
+/// surface. In front of a white background its radiance is 1 + 0.2 x 0.2, because light inside the
+/// ball is not reflected.
 fn has_no_inner_reflections(tested: &Scene) -> Verdict {
     let mut alone = tested.clone();
     alone.objects.truncate(1);

@@ -3,16 +3,11 @@
 use crate::agreement::SAMPLES;
 use crate::agreement::compare::{Picture, reference, small};
 use crate::agreement::tracer::{Mutation, Tracer};
-use crate::common::Numbers;
 use crate::features::first_hits::RASTER;
 use crate::features::row::Verdict;
-use crate::support::{picture, rendered, sized};
-use glam::DVec3;
-use zerkalo::film::Replicates;
-use zerkalo::scene::{Filter, Scene};
-use zerkalo::world::Precision;
+use crate::harness::*;
 
-/// Samples per pixel of each replicate (half of the samples) in the picture of a mutation.
+/// Samples per pixel of each replicate in the picture of a mutation.
 const MUTATION_SAMPLES: u32 = SAMPLES / 2;
 
 /// Compares the program's picture of `tested` statistically with the reference tracer's picture of

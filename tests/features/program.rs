@@ -4,31 +4,13 @@
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, material, number};
-use crate::support::test_film::TestFilm;
-use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
-use std::path::Path;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
-use zerkalo::disk::Existing;
-use zerkalo::film::file::FilmReader;
-use zerkalo::film::{Display, Film, Replicates, TILE};
-use zerkalo::material::Material;
-use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Checkpoint, Options, SyncRender};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::edit::{self, Edit, EditError, Target};
-use zerkalo::scene::{History, Scene};
-use zerkalo::shape::Shape;
-use zerkalo::world::{self, Precision};
+use crate::harness::*;
+use zerkalo::render::{Options, SyncRender};
+use zerkalo::scene::History;
+use zerkalo::scene::edit::{Edit, EditError};
 
 fn options() -> Options {
-    Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed: 1, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    }
+    render_options(sobol(1))
 }
 
 /// Returns two values for each tile: its samples per pixel, and `true` if the camera sees a
@@ -53,7 +35,7 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
 /// 16 samples in such a tile.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
-    let stop = Stop { noise_codes: Some(levels), ..Stop::default() };
+    let stop = noise_stop(levels);
     let settings =
         Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
     let mut render = SyncRender::new(&scene, &options(), settings, 2).map_err(|e| e.to_string())?;
@@ -117,7 +99,7 @@ fn is_the_experiment(scene: &Scene) -> Verdict {
 /// different sample counts.
 fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     let mut rendering = begin(&sized(scene.clone(), [100, 70]), seed, Precision::Auto);
-    let stop = Stop { spp: Some(96), ..Stop::default() };
+    let stop = spp_stop(96);
     follow(&mut rendering, settings(true, 0, stop), &pool(threads));
     rendering.film
 }
@@ -164,7 +146,6 @@ impl Desk {
         Self { session: Session::new(2, options(), settings).unwrap() }
     }
 
-    /// Returns the session's finished picture of `scene`.
     fn finished_picture(&mut self, scene: &Scene) -> Vec<[f64; 3]> {
         let generation = self.session.set_scene(Arc::new(scene.clone()));
         let end = Instant::now() + Duration::from_secs(60);
@@ -188,11 +169,10 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
     picture(&rendering, Replicates::Both)
 }
 
-/// Name of an edit, and the function that applies it to a scene.
 type NamedEdit<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, EditError> + 'a>);
 
 /// Returns the edit that sets the property `key` of a part of the scene. `label` is the part's
-/// label in the outline (the list of all parts).
+/// label in the outline.
 fn set<'a>(label: &'a str, key: &'a str, text: &'a str) -> NamedEdit<'a> {
     let edit = move |scene: &Scene| {
         let subject = edit::outline(scene).into_iter().map(|(_, s)| s).find(|s| {
@@ -386,7 +366,7 @@ fn a19_checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.zk");
     let scene = Arc::new(sized(shipped("mirror-room.toml"), [96, 72]));
-    let stop = Stop { noise_codes: Some(0.7), ..Stop::default() };
+    let stop = noise_stop(0.7);
     let settings =
         Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
     let start = || Session::new(2, options(), settings).unwrap();

@@ -1,10 +1,7 @@
 //! Test of a row of docs/features.md: a check that passes for the shipped scene and fails for each
 //! mutation of it.
 
-use crate::support::{parsed, shipped};
-use zerkalo::material::Material;
-use zerkalo::scene::{Object, Scene};
-use zerkalo::shape::Shape;
+use crate::harness::*;
 
 /// Result of a check: success, or a description of the failure.
 pub type Verdict = Result<(), String>;
@@ -37,24 +34,20 @@ fn checked_row(file: &str, check: &dyn Fn(&Scene) -> Verdict, mutations: &[(&str
     }
 }
 
-/// Returns the object of the scene with the name `name`.
 pub fn object<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Object {
     let found = scene.objects.iter_mut().find(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// Returns the index of the object with the name `name`.
 pub fn number(scene: &Scene, name: &str) -> usize {
     let found = scene.objects.iter().position(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// Returns the material of the scene with the name `name`.
 pub fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
     scene.materials.get_mut(name).unwrap_or_else(|| panic!("no material \"{name}\""))
 }
 
-/// Returns the shape that scene files write as `shape.` followed by `text`.
 pub fn shape(text: &str) -> Shape {
     parsed(&format!("[[object]]\nshape.{text}")).objects.remove(0).shape
 }

@@ -2,9 +2,8 @@
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{object, row, shape};
-use crate::support::shipped;
-use zerkalo::scene::Scene;
-use zerkalo::shape::{Difference, Intersection, Shape, Union};
+use crate::harness::*;
+use zerkalo::shape::{Difference, Intersection, Union};
 
 /// Checks that first hits in `file` agree with the formulas of the shapes, and that they disagree
 /// after each mutation. A mutation consists of its name, the name of an object, and the text of the
@@ -234,7 +233,6 @@ fn as_difference(scene: &mut Scene) {
     replace_operation(scene, |of| Shape::Difference(Difference { of }));
 }
 
-/// Replaces the set operation of every compound by that of `combine`.
 fn replace_operation(
     scene: &mut Scene,
     combine: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape,

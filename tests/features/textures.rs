@@ -4,15 +4,9 @@ use crate::agreement::paint::Pixels;
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::without_chance;
 use crate::features::row::{Verdict, ensure, number, row};
-use crate::support::{shipped, sized};
-use glam::{DVec2, DVec3};
-use std::f64::consts::{PI, TAU};
+use crate::harness::*;
 use zerkalo::material::{TextureFilter, Wrap};
-use zerkalo::scene::edit::{self, Target};
-use zerkalo::scene::{RayTypes, Scene};
-use zerkalo::shape::Shape;
 
-/// Returns the image `name` of the folder `scenes/textures`.
 fn image(name: &str) -> Pixels {
     Pixels::open(&format!("textures/{name}")).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -86,7 +80,6 @@ fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Sets the property `key` of a material to the value `text`.
 fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
     let subject = Target::Material(material.into());
     let edit = edit::set(scene, &subject, key, text);

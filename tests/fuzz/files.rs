@@ -1,11 +1,9 @@
 //! Small valid files of every format that the program reads. Together they contain every feature
 //! that the readers support.
 
-use crate::support::png_file::PngImage;
+use crate::harness::*;
 use png::{BitDepth, ColorType};
-use zerkalo::film::Display;
-use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
-use zerkalo::sampling::SamplerKind;
+use zerkalo::render::plan::PlannedTile;
 use zerkalo::value::fnv1a64;
 
 /// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.

@@ -1,6 +1,6 @@
 //! Mutations of files, similar to those that faulty writers, transfers and editors cause.
 
-use crate::common::Numbers;
+use crate::harness::*;
 
 /// Generator of random mutations.
 pub struct Random(Numbers);

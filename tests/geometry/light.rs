@@ -1,10 +1,6 @@
 //! Point light over a plane, against closed forms: irradiance, radiance, the edge of a shadow.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, scene};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 fn ground(extra: &str, light: DVec3) -> String {
     let [x, y, z] = light.to_array();
@@ -29,7 +25,7 @@ fn to_ground(numbers: &mut Numbers, half: f64) -> (Line, DVec3) {
 #[test]
 fn closed_form_01_a_point_light_on_a_plane() {
     let light = DVec3::new(1.0, 3.0, -2.0);
-    let scene = scene(&ground("", light));
+    let scene = parsed(&ground("", light));
     let mut numbers = Numbers::new(1);
     let (lines, points): (Vec<_>, Vec<_>) =
         (0..20_000).map(|_| to_ground(&mut numbers, 45.0)).unzip();
@@ -63,7 +59,7 @@ fn closed_form_01_a_point_light_on_a_plane() {
 fn closed_form_01_the_shadow_has_straight_edges() {
     let light = DVec3::new(0.5, 4.0, -0.7);
     let (sin, cos) = 20f64.to_radians().sin_cos();
-    let scene = scene(&ground(
+    let scene = parsed(&ground(
         &format!(
             "[[object]]\nshape.rectangle = {{ center = [0.2, 1.0, 0.1], size = [3.0, 2.0], \
              normal = [0.0, 1.0, 0.0], up = [{sin:?}, 0.0, {cos:?}] }}\n"

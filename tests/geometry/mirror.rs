@@ -1,12 +1,7 @@
 //! Perfect mirrors against the view from the mirrored camera. The image of a point P in the plane
 //! n.X = d is P - 2 (n.P - d) n.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, closest, scene};
-use glam::DVec3;
-use zerkalo::lanes::Double;
-use zerkalo::primitive::Aggregate;
-use zerkalo::world::Precision;
+use crate::harness::*;
 
 const OBJECTS: &str = r#"
 [camera]
@@ -56,8 +51,8 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
          normal = [{:?}, {:?}, {:?}] }}\n",
         center.x, center.y, center.z, normal.x, normal.y, normal.z
     );
-    let with_mirror = scene(&format!("{OBJECTS}{mirror}"));
-    let without_mirror = scene(OBJECTS);
+    let with_mirror = parsed(&format!("{OBJECTS}{mirror}"));
+    let without_mirror = parsed(OBJECTS);
     let forms: Vec<_> = with_mirror.objects.iter().map(|o| o.shape.form()).collect();
     let geometry = Aggregate::<Double>::new(&forms);
     let mut numbers = Numbers::new(2);

@@ -5,14 +5,8 @@
 //! - self-shadowing
 //! - tori in compounds
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, blocked, closest};
-use glam::{DAffine3, DQuat, DVec3};
-use std::f64::consts::PI;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{
-    Aggregate, BoundingVolume, CsgSolid, CsgTree, Form, PlaneForm, SphereForm, TorusForm,
-};
+use crate::harness::*;
+use zerkalo::primitive::{BoundingVolume, CsgSolid, CsgTree, TorusForm};
 
 /// Ratios of the tube's radius to the ring's radius.
 const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];
@@ -149,13 +143,11 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Checks that hits in a lane depend neither on the other lanes of the packet nor on the width of
-/// the packet.
 #[test]
 fn torus_hits_do_not_depend_on_other_lanes() {
     let mut numbers = Numbers::new(3);
     let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
-    let bits = |all: Vec<Option<crate::common::rays::LineHit>>| -> Vec<Option<u64>> {
+    let bits = |all: Vec<Option<LineHit>>| -> Vec<Option<u64>> {
         all.into_iter().map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
     };
     let form = torus(0.3);
@@ -226,8 +218,6 @@ fn torus_casts_shadows_on_itself() {
     assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
-/// Checks rays that start on the outside of the ring, offset from the surface by the ray offset of
-/// their precision. They must not hit the surface again near their start.
 #[test]
 fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     fn check<L: SimdFloat>(tube: f64) {
@@ -258,8 +248,8 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
 }
 
 /// Checks hits on compounds (CSG) of a torus, a ball and a half-space. A line has an odd number of
-/// hits before a point exactly if the point is inside of the compound. The test compares both for
-/// the middle of each interval between two hits.
+/// hits before a point exactly if the point is inside the compound. The test compares both for the
+/// middle of each interval between two hits.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {

@@ -1,11 +1,7 @@
 //! Transformed objects against the definition of a transform: a point is on the transformed object
 //! if its inverse image is on the original object.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, bounding_sphere, closest, every_kind, scene};
-use glam::{DAffine3, DMat3, DQuat, DVec3};
-use zerkalo::lanes::Double;
-use zerkalo::primitive::Aggregate;
+use crate::harness::*;
 
 fn random_map(numbers: &mut Numbers) -> DAffine3 {
     let mut factor = || {
@@ -84,7 +80,7 @@ fn stretched_sphere_satisfies_its_equation() {
     let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\
                 transform = [ { scale = [2.0, 0.5, 1.0] }, { rotate_z = 90.0 }, \
                 { translate = [1.0, 2.0, 3.0] } ]\n";
-    let scene = scene(text);
+    let scene = parsed(text);
     let object = &scene.objects[0];
     let form = object.shape.form().transformed(&object.scene_from_object());
     let geometry = Aggregate::<Double>::new(&[form]);

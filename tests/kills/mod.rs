@@ -11,15 +11,10 @@
 mod pty;
 mod states;
 
-use crate::common;
-use common::Numbers;
+use crate::harness::*;
 use pty::{Pty, find, screen};
 use states::{KEYS, SAVE, SCENE, states};
-use std::fs;
-use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::AtomicUsize;
 use zerkalo::film::read_exr;
 use zerkalo::scene::Recovery;
 use zerkalo::terminal::{ENTER, LEAVE};
@@ -72,7 +67,6 @@ struct Plan {
     end: End,
     /// Time from the first picture to the end of the program.
     moment: Duration,
-    /// Keys that are pressed: the time of each, and its index into `KEYS`.
     keys: Vec<(Duration, usize)>,
 }
 
@@ -357,8 +351,6 @@ fn check_runs(numbers: Vec<usize>) {
     );
 }
 
-/// Checks the exit status if the terminal is lost while an export is still running. The program
-/// then prints the result of the export to a closed stdout.
 #[test]
 fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
     for _ in 0..4 {

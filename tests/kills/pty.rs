@@ -1,15 +1,13 @@
 //! Pseudo-terminal that replies to only one request, that for the terminal's device attributes. It
 //! can be closed like a lost connection, and several can run concurrently.
 
+use crate::harness::*;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
-use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::Condvar;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 /// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -121,7 +119,6 @@ impl Pty {
         self.wait_for(&format!("{text:?}"), |bytes| screen(bytes).contents().contains(text))
     }
 
-    /// Sends the signal `name` to the program by `kill`.
     pub fn signal(&self, name: &str) {
         let id = self.child.process_id().expect("a process").to_string();
         let sent = Command::new("kill").args([&format!("-{name}"), &id]).status();

@@ -1,14 +1,10 @@
 //! Expected texts of a scene file after key presses, computed by the dashboard's model without
 //! running the program.
 
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
+use crate::harness::*;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::update::update;
-use zerkalo::render::schedule::Stop;
-use zerkalo::scene::Document;
 
 /// Text of a scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.

@@ -1,20 +1,12 @@
-//! Changes that a client makes while a session (background renderer) runs: lights, stop criteria,
-//! display, threads. Samples must be kept where possible, and noise estimates must equal those of a
-//! fresh render.
+//! Changes that a client makes while a session runs: lights, stop criteria, display, threads.
+//! Samples must be kept where possible, and noise estimates must equal those of a fresh render.
 
 mod noise;
 
-use crate::support;
-use crate::support::test_film::TestFilm;
-use std::sync::Arc;
+use crate::harness::*;
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
-use zerkalo::film::{Display, LinearImage, Tone};
-use zerkalo::lanes::{SimdFloat, Single};
-use zerkalo::render::schedule::{Stop, StoppedBy};
-use zerkalo::render::session::{Session, Snapshot, State, View};
-use zerkalo::scene::Scene;
-use zerkalo::value::Color;
+use zerkalo::film::LinearImage;
+use zerkalo::render::session::{Snapshot, View};
 
 const SCENE: &str = r#"
 [film]
@@ -53,15 +45,15 @@ fn scene() -> Scene {
 }
 
 fn spp(spp: u32) -> Stop {
-    Stop { spp: Some(spp), ..Stop::default() }
+    spp_stop(spp)
 }
 
 fn noise(codes: f64) -> Stop {
-    Stop { noise_codes: Some(codes), ..Stop::default() }
+    noise_stop(codes)
 }
 
 fn session(stop: Stop, adaptive: bool) -> Session {
-    support::session(2, 3, stop, adaptive)
+    new_session(2, 3, stop, adaptive)
 }
 
 fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
@@ -342,7 +334,6 @@ fn snapshot_picture_features_and_generation_match() {
     assert!(seen > 20, "{seen} snapshots");
 }
 
-/// Checks that the thread of a finished or paused session sleeps until a command arrives.
 #[cfg(target_os = "linux")]
 #[test]
 fn finished_or_paused_session_stays_asleep() {

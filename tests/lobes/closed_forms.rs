@@ -1,11 +1,9 @@
-//! Fractions of lobes inside of a half-space: closed forms against sampled directions.
+//! Fractions of lobes inside a half-space: closed forms against sampled directions.
 
-use crate::common::report::{precision, report};
+use crate::harness::*;
 use crate::lobes::setup::*;
 use crate::lobes::stats::slope;
-use std::f64::consts::{FRAC_PI_2, PI};
-use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
+use std::f64::consts::FRAC_PI_2;
 use zerkalo::sampling::warp;
 
 /// Returns the fraction of a uniform cone of half-angle `theta` in a half-space whose boundary
@@ -28,16 +26,16 @@ pub fn cone_share(theta: f64, delta: f64) -> f64 {
     (PI - a - theta.cos() * b) / (PI * 2.0 * (0.5 * theta).sin().powi(2))
 }
 
-/// Returns the fraction of a disc of radius `r` that is inside of a straight edge at distance `d`
-/// from the disc's centre: 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2). If `d` is
-/// positive, the centre is inside.
+/// Returns the fraction of a disc of radius `r` that is inside a straight edge at distance `d` from
+/// the disc's centre: 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2). If `d` is positive,
+/// the centre is inside.
 fn disc_share(r: f64, d: f64) -> f64 {
     let d = (d / r).clamp(-1.0, 1.0);
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Returns the fraction of a square that is inside of a straight edge in the square's plane. `side`
-/// is the length of the square's sides, `d` the distance of the edge from the square's centre, and
+/// Returns the fraction of a square that is inside a straight edge in the square's plane. `side` is
+/// the length of the square's sides, `d` the distance of the edge from the square's centre, and
 /// `phi` the angle between the edge's normal and a side. If `d` is positive, the centre is inside.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
@@ -55,7 +53,7 @@ pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
 }
 
 /// Half-space that cuts a lobe whose axis is the surface normal: the inward normal of the
-/// half-space, and the fraction of the lobe inside of it.
+/// half-space, and the fraction of the lobe inside it.
 struct Edge {
     inward: Vector,
     share: f64,
@@ -90,15 +88,15 @@ fn half_angles() -> [f64; 7] {
     [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
 }
 
-/// Counts the sampled directions of a lobe that are inside of each half-space of `edges`. Returns
-/// the largest deviation of the counted fraction from the closed form, in standard deviations of
-/// the count.
+/// Counts the sampled directions of a lobe that are inside each half-space of `edges`. Returns the
+/// largest deviation of the counted fraction from the closed form, in standard deviations of the
+/// count.
 fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
     let mut inside = vec![0u32; edges.len()];
     let incident = combine(&[(-1.0, n)]);
-    each_reflection::<L>(&material, (incident, n), true, Numbers::random(11), count, |d, _| {
+    each_reflection::<L>(&material, (incident, n), true, Draws::random(11), count, |d, _| {
         for (edge, inside) in edges.iter().zip(&mut inside) {
             *inside += u32::from(dot(d, edge.inward) > 0.0);
         }
@@ -111,8 +109,8 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Estimates the fraction of a lobe that is inside of each half-space of `edges`. Each estimate
-/// uses its own set of `count` Sobol points. Returns the root mean square error against the closed
+/// Estimates the fraction of a lobe that is inside each half-space of `edges`. Each estimate uses
+/// its own set of `count` Sobol points. Returns the root mean square error against the closed
 /// forms.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
@@ -120,7 +118,7 @@ fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f6
     let mut sum = 0.0;
     for (i, edge) in edges.iter().enumerate() {
         let mut inside = 0u32;
-        let numbers = Numbers { pixel: (i as u32, 7), ..Numbers::sobol(5) };
+        let numbers = Draws { pixel: (i as u32, 7), ..Draws::sobol(5) };
         each_reflection::<Double>(&material, (incident, n), true, numbers, count, |d, _| {
             inside += u32::from(dot(d, edge.inward) > 0.0);
         });
@@ -251,9 +249,9 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Compares two lobes by the fraction of each that is inside of a straight edge. Returns the
-/// largest difference of the two fractions over many edges. The lobes are a square of the side
-/// `side` and a cone with tan theta = 0.2.
+/// Compares two lobes by the fraction of each that is inside a straight edge. Returns the largest
+/// difference of the two fractions over many edges. The lobes are a square of the side `side` and a
+/// cone with tan theta = 0.2.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
     let mut largest: f64 = 0.0;
@@ -268,7 +266,7 @@ fn largest_difference(side: f64) -> f64 {
 }
 
 /// Compares square lobes of four sizes with the cone lobe of radius 0.2, by the largest difference
-/// between the fractions inside of a straight edge. The square with the area of the cone differs
+/// between the fractions inside a straight edge. The square with the area of the cone differs
 /// least. The expected differences are computed for a flat disc instead of the cone, and rounded.
 /// With the cone, the differences change by at most 0.0025.
 #[test]
@@ -288,7 +286,7 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
 }
 
 /// Compares the square lobe and the cone lobe by sampled directions. The fraction of each lobe that
-/// is inside of a straight edge is estimated with 65,536 Sobol points.
+/// is inside a straight edge is estimated with 65,536 Sobol points.
 #[test]
 fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     let (r, n) = (0.2f64, tilted_normal());
@@ -301,7 +299,7 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
             let response = |lobe| {
                 let (mut inside, count) = (0u32, 1 << 16);
                 let material = reflector(lobe, Masking::VCavity, r);
-                let (numbers, incident) = (Numbers::sobol(2), combine(&[(-1.0, n)]));
+                let (numbers, incident) = (Draws::sobol(2), combine(&[(-1.0, n)]));
                 each_reflection::<Double>(
                     &material,
                     (incident, n),
@@ -362,7 +360,7 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             let count = 1 << 16;
             for fold in [true, false] {
                 let (mut sum, mut under) = (0.0, 0);
-                let numbers = Numbers::random(21);
+                let numbers = Draws::random(21);
                 each_reflection::<L>(&material, (incident, n), fold, numbers, count, |d, w| {
                     sum += w[0];
                     under += u32::from(w[0] > 0.0 && dot(d, n) < -2.0 * L::EPSILON);

@@ -1,6 +1,6 @@
 //! Physical properties that the tests demand of each reflection model.
 
-use zerkalo::material::{Fresnel, Highlight, Lobe};
+use crate::harness::*;
 
 /// Energy balance of a reflection model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +28,6 @@ impl BsdfProperties {
     pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
-/// Reflection model with known physical properties.
 pub trait ReflectionModel {
     /// Returns the properties of reflection by this model.
     fn properties(self) -> BsdfProperties;

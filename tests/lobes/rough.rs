@@ -1,10 +1,8 @@
 //! Rough interfaces: energy, Walter's formula for their BTDF, extreme inputs, and scenes with rough
 //! and absorbing glass.
 
+use crate::harness::*;
 use crate::lobes::setup::*;
-use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 
 fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
     every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror)
@@ -148,7 +146,7 @@ fn sampled_albedo<L: SimdFloat>(
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
     let material = rough_glass(lobe, masking, alpha, 1.5);
     let mut sums = [0.0; 2];
-    let numbers = Numbers::sobol(5);
+    let numbers = Draws::sobol(5);
     each_crossing::<L>(&material, (incident, n), (sides, true), numbers, count, |crossing| {
         let (r, t) = (crossing.reflected.1[0], crossing.transmitted.1);
         assert!(r >= 0.0 && t >= 0.0 && r + t <= 1.0 + 16.0 * L::EPSILON, "{lobe:?}: {r} {t}");
@@ -158,8 +156,6 @@ fn sampled_albedo<L: SimdFloat>(
     sums
 }
 
-/// Checks that sampled albedos of rough glass equal the albedos of single scattering, which are
-/// computed by quadrature. The sampled ones have an error of a thousandth (16,384 Sobol points).
 #[test]
 fn rough_glass_has_the_albedo_of_single_scattering() {
     let mut worst = 0f64;
@@ -252,7 +248,7 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
                         vh * lh / (nv * nl) * transmitted * g * facets.d(nh) * n_l * n_l
                             / (below * below)
                     };
-                    let numbers = Numbers::sobol(3);
+                    let numbers = Draws::sobol(3);
                     let at = (incident, n);
                     each_crossing::<f64>(&material, at, (sides, true), numbers, 200, |crossing| {
                         let (l, weight) = crossing.transmitted;
@@ -285,7 +281,6 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
     assert!(compared > 20_000, "{compared}");
 }
 
-/// Checks that glass with an alpha of 1e-8 is clear.
 #[test]
 fn smooth_glass_is_clear() {
     for (lobe, masking) in every_lobe() {

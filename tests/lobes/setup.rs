@@ -1,11 +1,9 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Float, SimdFloat, Vec3};
-use zerkalo::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
-use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
+use crate::harness::*;
+use zerkalo::material::InterfaceMedia;
+use zerkalo::sampling::CameraDimensions;
+use zerkalo::world::Path;
 
 pub type Vector = [f64; 3];
 
@@ -72,7 +70,6 @@ pub fn has_facets(lobe: Lobe) -> bool {
     matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
 }
 
-/// Returns every lobe with every masking that affects it.
 pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     let maskings = |lobe| if has_facets(lobe) { &Masking::ALL[..] } else { &Masking::ALL[..1] };
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
@@ -80,13 +77,13 @@ pub fn every_lobe() -> Vec<(Lobe, Masking)> {
 
 /// Source of the random numbers for sampled reflections: kind, seed and pixel.
 #[derive(Clone, Copy)]
-pub struct Numbers {
+pub struct Draws {
     pub kind: SamplerKind,
     pub seed: u64,
     pub pixel: (u32, u32),
 }
 
-impl Numbers {
+impl Draws {
     pub fn random(seed: u64) -> Self {
         Self { kind: SamplerKind::Random, seed, pixel: (3, 5) }
     }
@@ -103,7 +100,7 @@ pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     fold: bool,
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     mut take: impl FnMut(Vector, Vector),
 ) {
@@ -115,7 +112,7 @@ fn reflect<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     fold: bool,
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     take: &mut dyn FnMut(Vector, Vector),
 ) {
@@ -181,7 +178,7 @@ pub fn each_crossing<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     (sides, fold): (Sides, bool),
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     mut take: impl FnMut(Crossing),
 ) {
@@ -193,7 +190,7 @@ fn cross<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     (sides, fold): (Sides, bool),
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     take: &mut dyn FnMut(Crossing),
 ) {
@@ -220,7 +217,7 @@ fn cross<L: SimdFloat>(
 /// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
 /// `first` on. The values of lanes outside of `active` have no meaning. The order of values is
 /// `[sample][group][channel]`.
-pub fn trace<L: SimdFloat>(
+pub fn trace_packet<L: SimdFloat>(
     world: &World<L>,
     sampler: &Sampler<L>,
     pixel: (u32, u32),
@@ -241,17 +238,13 @@ pub fn trace<L: SimdFloat>(
     (0..L::WIDTH).map(of_lane).collect()
 }
 
-pub fn scene(text: &str) -> Scene {
-    Scene::parse(text, "test").unwrap()
-}
-
 const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
 
 /// Returns the samples `0..count` of every pixel, traced in full packets. Each is the sum over the
 /// light groups, with the weight 1 for all lights.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        trace(world, sampler, pixel, first, L::mask(true))
+        trace_packet(world, sampler, pixel, first, L::mask(true))
     })
 }
 
@@ -262,13 +255,13 @@ pub fn lone_samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
         L::from_fn(|i| L::Scalar::from_f64(f64::from(u8::from(i == lane)))).gt(L::zero())
     };
     samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        let alone = |lane| trace(world, sampler, pixel, first, only(lane)).swap_remove(lane);
+        let alone = |lane| trace_packet(world, sampler, pixel, first, only(lane)).swap_remove(lane);
         (0..L::WIDTH).map(alone).collect()
     })
 }
 
 /// Returns the samples `0..count` of every pixel. `packet` returns the radiance of the samples of a
-/// pixel from an index on, as [`trace`] does.
+/// pixel from an index on, as [`trace_packet`] does.
 fn samples_by<L: SimdFloat>(
     scene: &Scene,
     count: u32,

@@ -1,12 +1,8 @@
-//! Transparent objects against closed forms: slabs, white furnaces, cameras inside of glass.
+//! Transparent objects against closed forms: slabs, white furnaces, cameras inside glass.
 
-use crate::common::report::report;
+use crate::harness::*;
 use crate::lobes::setup::*;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::material::{Interface, Lobe};
-use zerkalo::primitive::Aggregate;
-use zerkalo::scene::Scene;
+use zerkalo::material::Interface;
 
 fn mean(samples: &[Vector]) -> Vector {
     let all: Vec<_> = samples.iter().map(|s| (1.0 / samples.len() as f64, *s)).collect();
@@ -27,7 +23,7 @@ fn check_slab<L: SimdFloat>() -> f64 {
     /// Half width of the slab. It is large enough for a ray at 89.9 degrees if the index is 1.
     const HALF_WIDTH: f64 = 450.0;
     let t = 0.75;
-    let slab = scene(&format!(
+    let slab = parsed(&format!(
         "[[object]]\nshape.box = {{ center = [0.0, 0.0, {}], size = [{}, 2.0, {t}] }}",
         -0.5 * t,
         2.0 * HALF_WIDTH
@@ -84,9 +80,8 @@ fn extreme_27_slab_displacement() {
     report(27, "single", &format!("{single:.0e} t off at most"));
 }
 
-/// Returns the scene of a red wall behind a slab and a green wall behind the camera.
 fn between_walls(slab: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "film = {{ size = [1, 1], filter = \"point\" }}
         trace.max_depth = 10000
         ambient.color = [1.0, 1.0, 1.0]
@@ -139,7 +134,7 @@ fn closed_form_11_a_slab_with_all_orders() {
 fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let all = samples::<L>(
-        &scene(&format!(
+        &parsed(&format!(
             "film = {{ size = [1, 1], filter = \"point\" }}
             background.color = [1.0, 1.0, 1.0]
             camera = {{ eye = [0.0, 0.0, 2.0], direction = [{sin}, 0.0, -{cos}] }}
@@ -225,10 +220,8 @@ fn closed_form_an_absorbing_slab_with_all_orders() {
     }
 }
 
-/// Returns a scene with the text `objects` between camera and background. `inner` are the keys of
-/// the material `m` of these objects.
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "film = {{ size = [24, 24] }}
         trace.max_depth = {depth}
         ambient.color = [0.5, 0.5, 0.5]
@@ -247,7 +240,6 @@ const BALL: &str =
 const TILES: &str = "[[object]]\nmaterial = \"tile\"\n\
     shape.box = { center = [0.3, 0.2, -2.0], size = [1.0, 0.7, 0.5] }\n";
 
-/// Checks that a lossless ball is invisible in a white furnace, also with a bubble of air in it.
 #[test]
 fn glass_is_invisible_in_white_furnace() {
     let nested = "[[object]]\nmaterial = \"air\"\n\
@@ -298,11 +290,9 @@ fn rough_glass_in_white_furnace() {
     }
 }
 
-/// Checks that the picture of rough glass converges to that of clear glass as alpha vanishes. If
-/// alpha is less than 0.001, the two pictures are equal in every bit.
 #[test]
 fn rough_glass_converges_to_clear_glass() {
-    let mut scene = scene(
+    let mut scene = parsed(
         &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/rough-glass.toml")).unwrap(),
     );
     scene.film.size = [24, 16];
@@ -347,9 +337,9 @@ fn index_1_is_invisible() {
     assert!(without.iter().any(|s| s[0] > 0.4), "the box is not seen");
 }
 
-/// Checks a camera inside of glass. It sees the outside up to the critical angle of 41.8 degrees,
-/// and internal reflections beyond it. This also holds with a near plane, and for a camera in a
-/// bubble in the glass.
+/// Checks a camera inside glass. It sees the outside up to the critical angle of 41.8 degrees, and
+/// internal reflections beyond it. This also holds with a near plane, and for a camera in a bubble
+/// in the glass.
 #[test]
 fn camera_inside_glass_starts_in_its_medium() {
     let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
@@ -368,7 +358,7 @@ fn camera_inside_glass_starts_in_its_medium() {
             shape.box = {{ center = [0.0, 0.0, 0.0], size = [1e4, 1e4, 2.0] }}
             {more}"
         );
-        mean(&samples::<Double>(&scene(&text), 8))[0]
+        mean(&samples::<Double>(&parsed(&text), 8))[0]
     };
     let bubble = "[[object]]\nmaterial = \"air\"\n\
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 0.25 }";
@@ -403,11 +393,10 @@ fn fixed_coefficients_reflect_outside_only() {
     assert!(on_ball > all.len() / 3);
 }
 
-/// Checks that every bit of a sample is the same if it is traced alone and in a full packet.
 #[test]
 fn glass_packets_equal_samples_traced_alone() {
     for file in ["glass", "transmission", "water-glass"] {
-        let mut scene = scene(
+        let mut scene = parsed(
             &std::fs::read_to_string(format!("{}scenes/{file}.toml", env!("ZERKALO_ROOT")))
                 .unwrap(),
         );

@@ -1,12 +1,8 @@
 //! Whole paths: white furnaces, parallel mirrors, samples traced alone and in packets.
 
-use crate::common::report::report;
+use crate::harness::*;
 use crate::lobes::properties::{Energy, ReflectionModel};
 use crate::lobes::setup::*;
-use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::material::{Lobe, Masking};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// Checks that every sample of a ball in a white furnace is exactly rho, for every
 /// energy-conserving lobe. At the silhouette, lobe directions are partly below the surface and
@@ -20,7 +16,7 @@ fn furnace<L: SimdFloat>() {
         material = \"m\"
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
         [materials.m]";
-    let mut scene = scene(text);
+    let mut scene = parsed(text);
     for lobe in Lobe::ALL.into_iter().filter(|l| l.properties().energy == Energy::Conserving) {
         for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
             let mut material = reflector(lobe, Masking::VCavity, roughness);
@@ -41,11 +37,9 @@ fn closed_form_7_a_white_furnace_is_exact() {
     furnace::<Double>();
 }
 
-/// Checks that at roughness 0 every lobe equals the mirror in every bit. Also checks that the
-/// square lobe is close to the mirror at a roughness of 1e-9.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
-    let mut scene = scene(
+    let mut scene = parsed(
         &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/lobe-square.toml")).unwrap(),
     );
     scene.film.size = [40, 30];
@@ -71,7 +65,7 @@ fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
 }
 
 fn parallel_mirrors(depth: u32) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "film = {{ size = [4, 4] }}
         trace.max_depth = {depth}
         camera = {{ eye = [0.0, 0.0, 0.0], target = [0.3, 0.2, -1.0] }}
@@ -131,13 +125,11 @@ fn physical() -> Scene {
     let text =
         std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room-physical.toml"))
             .unwrap();
-    let mut scene = scene(&text);
+    let mut scene = parsed(&text);
     scene.film.size = [48, 36];
     scene
 }
 
-/// Checks that every bit of a sample is the same if it is traced alone and in a full packet. The
-/// mirror has a lobe, no reflection, or an ideal one.
 #[test]
 fn packets_equal_samples_traced_alone() {
     let (lobe, mut lambert, mut mirror) = (physical(), physical(), physical());

@@ -12,8 +12,7 @@ mod stopping;
 mod terminal;
 mod watch;
 
-use std::fs;
-use std::path::PathBuf;
+use crate::harness::*;
 use std::process::Command;
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
@@ -51,7 +50,6 @@ impl Fixture {
         })
     }
 
-    /// Runs the program with `args`, which must succeed.
     fn run(&self, args: &[&str]) {
         let run = Command::new(PROGRAM).args(args).current_dir(self.0.path()).output().unwrap();
         assert!(run.status.success(), "{args:?}: {}", String::from_utf8_lossy(&run.stderr));

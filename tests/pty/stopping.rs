@@ -2,9 +2,8 @@
 
 use super::life::signal;
 use super::*;
+use crate::harness::*;
 use std::os::unix::fs::PermissionsExt;
-use std::time::{Duration, Instant};
-use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::{ENTER, LEAVE};
 
 /// Starts a shell with job control and a plain prompt in the test terminal.
@@ -197,8 +196,6 @@ fn doctor_reports_after_restoring_the_terminal() {
     }
 }
 
-/// Checks that a named pipe in place of the scene file does not block the program. Opening a pipe
-/// whose other end is closed blocks for ever.
 #[test]
 fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     let fixture = Fixture::with_room();
@@ -220,8 +217,6 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     assert!(fs::metadata(fixture.path(".room.toml.unsaved")).unwrap().len() > 100);
 }
 
-/// Checks that the terminal is restored after an abort, for example after a failed allocation, and
-/// after a kill. After a kill, a helper process restores it.
 #[test]
 fn abort_and_kill_leave_a_restored_terminal() {
     for name in ["ABRT", "KILL"] {

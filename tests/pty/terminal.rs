@@ -27,7 +27,6 @@ static TURN: Mutex<()> = Mutex::new(());
 /// Writer of keys and replies to the program.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 
-/// Request to the terminal, and the terminal's reply.
 pub type RequestReply = (&'static [u8], &'static str);
 
 /// Requests, each with the reply of a terminal that supports synchronised updates. The empty reply
@@ -186,7 +185,6 @@ impl Terminal {
         });
     }
 
-    /// Returns the result of `look` for the current screen of the terminal.
     pub fn screen<R>(&self, look: impl FnOnce(&vt100::Screen) -> R) -> R {
         look(self.output.0.lock().unwrap().parser.screen())
     }
@@ -196,7 +194,6 @@ impl Terminal {
         self.output.0.lock().unwrap().bytes.clone()
     }
 
-    /// Resizes the terminal to `size` columns and rows.
     pub fn resize(&self, size: [u16; 2]) {
         let [columns, rows] = size.map(|n| NonZeroU16::new(n).unwrap());
         self.output.0.lock().unwrap().parser.screen_mut().set_size(rows, columns);

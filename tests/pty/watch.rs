@@ -2,8 +2,7 @@
 
 use super::*;
 
-/// Plans a render of `room.toml` in 160x120 pixels by three shards (parts, each for one process),
-/// as `job.plan`.
+/// Plans a render of `room.toml` in 160x120 pixels by three shards, as `job.plan`.
 fn planned(fixture: &Fixture) {
     fixture.run(&[
         "plan",

@@ -1,15 +1,10 @@
 //! Acceleration structures on random scenes. The films of a scene with all structures must be
 //! identical byte for byte.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
-use crate::support::{accelerated, picture};
-use zerkalo::film::Replicates;
-use zerkalo::scene::{Acceleration, Scene};
-use zerkalo::world::Precision;
 
-/// Number of samples per pixel in each of the two replicates (halves of the samples). It is not a
-/// multiple of the packet width.
+/// Number of samples per pixel in each replicate. It is not a multiple of the packet width.
 const SAMPLES: u32 = 3;
 
 fn same_bytes(scene: &Scene) -> Verdict {

@@ -1,17 +1,11 @@
 //! Random materials, shapes of every registered kind, and objects.
 
-use crate::common::NAME;
-use crate::common::Numbers;
+use crate::harness::*;
 use crate::random_scenes::words::{chance, direction, list, log, pick, table};
-use glam::DVec3;
-use std::path::Path;
-use std::sync::{Arc, OnceLock};
-use toml::{Table, Value};
-use zerkalo::asset::Assets;
-use zerkalo::material::{self, Material};
-use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
-use zerkalo::shape::{CsgOperand, KINDS, Shape};
-use zerkalo::value::{Color, Field, TomlValue, ValueType};
+use std::sync::OnceLock;
+use zerkalo::material;
+use zerkalo::scene::{AssetResolver, Rotate};
+use zerkalo::shape::KINDS;
 
 /// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[

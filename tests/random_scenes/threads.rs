@@ -1,13 +1,9 @@
 //! Adaptive renders of random scenes with different numbers of threads, whose films and sample
 //! counts must be equal.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::test_film::TestFilm;
-use crate::support::{begin, pool, settings, trace};
 use zerkalo::film::Noise;
-use zerkalo::render::schedule::{Step, Stop, StoppedBy};
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;

@@ -2,9 +2,8 @@
 //! from the same run.
 
 use super::*;
-use std::fmt::Write;
+use crate::harness::*;
 
-/// Returns the text of a scene of `count` spheres, each with a comment.
 fn spheres(count: usize, has_names: bool) -> String {
     let mut text = "# Spheres.\nambient.color = [1, 1, 1]\n".to_string();
     for i in 0..count {
@@ -46,7 +45,6 @@ fn move_object(object: &mut Object) {
     }
 }
 
-/// Name of an edit, and the function that applies it.
 type NamedEdit = (&'static str, fn(&mut Scene));
 
 /// Checks that the time of updating the text after an edit grows at most by the factor `limit` if

@@ -1,12 +1,11 @@
 //! Random sequences of all operations that edit a scene.
 
 use super::LAYOUTS;
+use crate::harness::*;
 use proptest::prelude::*;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use zerkalo::scene::edit::{self, Edit, EditError, Target, Widget};
-use zerkalo::scene::{BUILT_IN, Document, History, Scene};
+use zerkalo::scene::History;
+use zerkalo::scene::edit::{Edit, EditError, Widget};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 
@@ -26,7 +25,6 @@ fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
     list.get(at.checked_rem(list.len())?).cloned()
 }
 
-/// Performs one edit operation. Returns its name for the tally, and its result.
 fn perform(
     scene: &Scene,
     (what, at, other, amount): Act,

@@ -1,15 +1,13 @@
 //! Random valid scenes and random edits.
 
+use crate::harness::*;
 use proptest::prelude::*;
-use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::light::{Directional, Falloff, Light, Point};
-use zerkalo::material::{Fresnel, Highlight, Lobe, Material, Metal};
-use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
+use zerkalo::material::Metal;
+use zerkalo::scene::Rotate;
 use zerkalo::shape::{
-    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, Plane,
-    Prism, Pyramid, Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitFrustum,
+    Cone, Cube, Difference, HorizontalRectangle, Intersection, Plane, Prism, Pyramid, Rectangle,
+    Sphere, TaperedCylinder, Union, UnitFrustum,
 };
-use zerkalo::value::Color;
 
 fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![

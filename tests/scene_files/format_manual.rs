@@ -1,10 +1,8 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
-use crate::common::shape_examples::EXAMPLES;
-use std::fmt::Write as _;
-use zerkalo::scene::FIELDS;
+use crate::harness::*;
 use zerkalo::shape::{KINDS, TransformOp};
-use zerkalo::value::{DefaultValue, Field, ValueType};
+use zerkalo::value::DefaultValue;
 
 const INTRODUCTION: &str = "\
 # Scene files
@@ -129,7 +127,6 @@ and every key with a default may be left out. Unknown keys are errors.
 `zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
 
-/// Returns the manual of the scene format, as Markdown.
 pub fn format_manual() -> String {
     let mut out = INTRODUCTION.to_string();
     for field in FIELDS {

@@ -1,20 +1,13 @@
 //! Stories (scene, keys, expected result) of the command table, at least one for every command.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
-use std::collections::HashSet;
-use std::path::Path;
-use zerkalo::camera::{Camera, Focus as LensFocus};
+use zerkalo::camera::Focus as LensFocus;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::COMMANDS;
-use zerkalo::film::Tone;
-use zerkalo::light::Light;
-use zerkalo::material::{Lobe, Material};
-use zerkalo::scene::Scene;
-use zerkalo::scene::edit::Target;
-use zerkalo::shape::Shape;
 
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
@@ -438,7 +431,6 @@ fn every_command_does_what_its_story_expects() {
     }
 }
 
-/// Checks that the command palette finds each command by its label and runs it.
 #[test]
 fn palette_finds_every_command_by_its_label() {
     for command in COMMANDS {

@@ -1,12 +1,11 @@
-//! Stories (user input and expected state) of mouse events.
+//! Stories of mouse events.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::panel_lines::outline;
-use zerkalo::scene::edit::Target;
-use zerkalo::shape::Shape;
 use zerkalo::terminal::event::{Button, Mouse, MouseKind};
 
 /// Returns column and row of the cell at the centre of the picture, which shows the ball.

@@ -1,13 +1,9 @@
 //! Keys that change the roughness of a mirror: they must change the pixels that show the mirror and
 //! leave all others equal in every bit.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::Desk;
-use crate::support::test_film::TestFilm;
-use crate::support::{pool, rendered, sized};
-use zerkalo::render::{FirstHitBuffer, RenderState};
-use zerkalo::scene::{BUILT_IN, Scene};
-use zerkalo::value::Color;
-use zerkalo::world::{FirstHit, Precision};
+use zerkalo::render::FirstHitBuffer;
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;

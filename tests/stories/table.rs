@@ -1,7 +1,6 @@
 //! Consistency of the command table.
 
-use std::collections::{HashMap, HashSet};
-use std::path::Path;
+use crate::harness::*;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::terminal::event::Key;
 

@@ -18,7 +18,7 @@ use super::{Film, LightWeights, Replicates, TILE, Tile};
 /// Film whose contents a test examines.
 pub trait TestFilm {
     /// Returns the radiance of the pixel in column `x` and row `y`: the mean over its samples in
-    /// both replicates (halves of the samples), or black without samples.
+    /// both replicates, or black without samples.
     fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3];
 
     /// Returns the radiance of each pixel of the row `y`, as [`Self::pixel`] does.

@@ -2,17 +2,10 @@
 //! pictures of both forms must be equal. The direct evaluation of a variant of the object must give
 //! another picture.
 
-use crate::common::Numbers;
-use crate::support::png_file::RgbImage;
-use crate::support::{picture, rendered};
-use crate::textures::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
-use glam::{DAffine3, DVec3};
-use std::f64::consts::PI;
-use std::fmt::Write;
+use crate::harness::*;
+use crate::textures::direct;
+use crate::textures::direct::{Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
 use tempfile::TempDir;
-use zerkalo::film::Replicates;
-use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
 
 /// Folder of scenes, with two images of random pixels.
 pub struct Desk {

@@ -2,9 +2,7 @@
 //! space, mapping formula, texture lookup, Lambert's law. It has no code in common with the
 //! program.
 
-use crate::support::png_file::RgbImage;
-use glam::{DAffine3, DVec2, DVec3};
-use std::f64::consts::{PI, TAU};
+use crate::harness::*;
 
 /// Width and height of the pictures in pixels.
 pub const SIZE: [u32; 2] = [60, 48];

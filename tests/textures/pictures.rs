@@ -1,16 +1,11 @@
 //! Pictures of textured objects against the direct evaluation, for every mapping, wrap and kind.
 
-use crate::support::{picture, rendered};
+use crate::harness::*;
 use crate::textures::cases::{
     ALLOWED, Case, Desk, TOLD, ball, block, check, differences, differing, lay, mappings, moved,
     sheet,
 };
 use crate::textures::direct::{Lay, Solid};
-use glam::{DAffine3, DVec3};
-use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
-use zerkalo::film::Replicates;
-use zerkalo::world::Precision;
 
 #[test]
 fn every_mapping_of_an_image() {
@@ -156,8 +151,6 @@ fn a_mesh_of_a_sphere() {
     assert!(error[1] < 0.05 && error[1] < 0.3 * error[0], "{error:?}");
 }
 
-/// Checks that the texture of a part of a compound is placed in the space of the part, if the part
-/// has its own material.
 #[test]
 fn parts_of_compounds() {
     let desk = Desk::new();

@@ -1,0 +1,64 @@
+//! Harness of the tests: scenes from text or file, their renders and rays, statistics, and the names that most tests use.
+#![allow(dead_code, unused_imports, reason = "each of the two test programs uses a part")]
+
+mod numbers;
+mod png_file;
+mod rays;
+mod renders;
+mod report;
+#[path = "../common/shape_examples.rs"]
+mod shape_examples;
+mod statistics;
+mod tables;
+#[path = "../support/test_film.rs"]
+mod test_film;
+
+pub use numbers::*;
+pub use png_file::*;
+pub use rays::*;
+pub use renders::*;
+pub use report::*;
+pub use shape_examples::*;
+pub use statistics::*;
+pub use tables::*;
+pub use test_film::*;
+
+pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+pub use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+pub use std::f64::consts::{PI, TAU};
+pub use std::fmt::Write;
+pub use std::fs;
+pub use std::ops::Range;
+pub use std::path::{Path, PathBuf};
+pub use std::sync::atomic::{AtomicBool, Ordering};
+pub use std::sync::{Arc, Mutex};
+pub use std::time::{Duration, Instant};
+pub use toml::{Table, Value};
+pub use zerkalo::asset::Assets;
+pub use zerkalo::bvh::{Hit, Ray};
+pub use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
+pub use zerkalo::disk::Existing;
+pub use zerkalo::film::file::FilmReader;
+pub use zerkalo::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile, Tone};
+pub use zerkalo::lanes::{Double, Float, Frame, Mask, SimdFloat, Single, Vec3};
+pub use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
+pub use zerkalo::material::{Bsdf, Fresnel, Highlight, Lobe, Masking, Material, ReflectionLobe};
+pub use zerkalo::primitive::{
+    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, MeshForm, PlaneForm,
+    SphereForm, SurfacePoint,
+};
+pub use zerkalo::render::export::Provenance;
+pub use zerkalo::render::plan::{Plan, PlanSettings};
+pub use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
+pub use zerkalo::render::session::{Session, State};
+pub use zerkalo::render::{Checkpoint, RenderState};
+pub use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+pub use zerkalo::scene::edit::Target;
+pub use zerkalo::scene::{
+    Acceleration, AssetResolver, BUILT_IN, BelowHorizon, Document, FIELDS, Filter, Object,
+    RayTypes, Scale, Scene, TransformOp, edit,
+};
+pub use zerkalo::shape::{CsgOperand, Cuboid, Cylinder, Shape, ShapeDesc};
+pub use zerkalo::value::{Color, Field, TomlValue, ValueType};
+pub use zerkalo::world;
+pub use zerkalo::world::{AnyWorld, FirstHit, MAX_GROUPS, Options, Precision, Radiance, World};
