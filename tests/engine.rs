@@ -21,6 +21,7 @@ mod lobes;
 mod mesh;
 mod mesh_scenes;
 mod random_scenes;
+mod reference;
 mod scenes;
 mod serving;
 mod shards;

@@ -1,10 +1,8 @@
 //! Tests of the camera's frame and of navigation.
 
-use crate::agreement::compare::zoomed;
-use crate::features::first_hits::hits_agree;
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Verdict, ensure, row};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 
 fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))

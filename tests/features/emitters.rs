@@ -1,10 +1,9 @@
 //! Tests of lights with a size, and of many lights.
 
-use crate::agreement::REFERENCE_SAMPLES;
 use crate::emitters::setup::check;
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Change, material, row};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 use zerkalo::light::{Environment, LightUnit};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of

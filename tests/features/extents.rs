@@ -1,8 +1,8 @@
 //! Bounding boxes and the other acceleration structures.
 
-use crate::features::first_hits::hits_agree;
-use crate::features::row::{Verdict, ensure, row};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 use zerkalo::primitive::Acceleration;
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.

@@ -1,8 +1,8 @@
 //! Tests of rough transmission and absorption.
 
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{material, row};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 use zerkalo::light::SphereLight;
 
 #[test]

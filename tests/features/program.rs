@@ -1,10 +1,9 @@
 //! Tests of features of the program: cap on rays per pixel, threads, edits during rendering,
 //! demonstrations.
 
-use crate::features::first_hits::{RASTER, first_hits, hits_agree};
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Verdict, ensure, material, number};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 use zerkalo::render::{Options, SyncRender};
 use zerkalo::scene::History;
 use zerkalo::scene::edit::{Edit, EditError};
@@ -273,8 +272,7 @@ fn left_to_right(scene: &Scene) -> f64 {
     scene.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(14.0);
     scene.objects.retain(|o| ["floor", "ball"].contains(&o.name.as_str()));
     let floor = number(&scene, "floor") as u32;
-    let (hits, pixels) =
-        (first_hits(&scene), crate::features::plain_tracer::without_chance(&scene));
+    let (hits, pixels) = (first_hits(&scene), without_noise(&scene));
     let side = |left: bool| -> f64 {
         let half = RASTER[0] as usize / 2;
         let indices = (0..hits.len()).filter(|i| (i % RASTER[0] as usize >= half) != left);

@@ -1,6 +1,6 @@
 //! Test of rendering in regions, the feature for big pictures.
 
-use crate::features::row::{Verdict, ensure, material, row};
+use crate::features::row::*;
 use crate::harness::*;
 use zerkalo::film::Bands;
 use zerkalo::render::RegionRender;

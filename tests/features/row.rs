@@ -3,9 +3,6 @@
 
 use crate::harness::*;
 
-/// Result of a check: success, or a description of the failure.
-pub type Verdict = Result<(), String>;
-
 /// Mutation of a scene, which replaces a feature by a similar one.
 pub type Change<'a> = &'a dyn Fn(&mut Scene);
 
@@ -50,9 +47,4 @@ pub fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
 
 pub fn shape(text: &str) -> Shape {
     parsed(&format!("[[object]]\nshape.{text}")).objects.remove(0).shape
-}
-
-/// Returns `Err` with the text of `error` unless `condition` holds.
-pub fn ensure(condition: bool, error: impl FnOnce() -> String) -> Verdict {
-    if condition { Ok(()) } else { Err(error()) }
 }

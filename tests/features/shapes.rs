@@ -1,8 +1,8 @@
 //! Tests of shapes, transforms and compounds, compared with the formulas of the shapes.
 
-use crate::features::first_hits::hits_agree;
-use crate::features::row::{object, row, shape};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 use zerkalo::shape::{Difference, Intersection, Union};
 
 /// Checks that first hits in `file` agree with the formulas of the shapes, and that they disagree
@@ -17,10 +17,7 @@ fn shapes(file: &str, mutations: &[(&str, &str, &str)]) {
             (*name, change)
         })
         .collect();
-    let changes: Vec<_> = changes
-        .iter()
-        .map(|(name, change)| (*name, change as crate::features::row::Change))
-        .collect();
+    let changes: Vec<_> = changes.iter().map(|(name, change)| (*name, change as Change)).collect();
     row(file, |tested| hits_agree(&original, tested), &changes);
 }
 
@@ -254,7 +251,7 @@ fn replace_operation(
 
 #[test]
 fn b7_compound() {
-    let files: [(&str, [(&str, crate::features::row::Change); 2]); 4] = [
+    let files: [(&str, [(&str, Change); 2]); 4] = [
         (
             "compound-union.toml",
             [("intersections", &as_intersection), ("differences", &as_difference)],

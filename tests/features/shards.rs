@@ -1,6 +1,6 @@
 //! Tests of renders that are divided among machines.
 
-use crate::features::row::{Verdict, ensure, material, row};
+use crate::features::row::*;
 use crate::harness::*;
 use std::time::SystemTime;
 use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};

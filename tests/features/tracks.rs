@@ -1,9 +1,8 @@
 //! Test of the scene of the reflecting tracks.
 
-use crate::features::first_hits::hits_agree;
-use crate::features::plain_tracer::{agrees, agrees_exactly};
-use crate::features::row::{ensure, row, shape};
+use crate::features::row::*;
 use crate::harness::*;
+use crate::reference::*;
 
 fn generated_tracks() -> Scene {
     let mut text = String::from(

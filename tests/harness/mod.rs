@@ -12,6 +12,7 @@ mod statistics;
 mod tables;
 #[path = "../support/test_film.rs"]
 mod test_film;
+mod verdict;
 
 pub use numbers::*;
 pub use png_file::*;
@@ -22,6 +23,7 @@ pub use shape_examples::*;
 pub use statistics::*;
 pub use tables::*;
 pub use test_film::*;
+pub use verdict::*;
 
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 pub use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};

@@ -1,8 +1,8 @@
 //! Surface reflection of the reference tracer. It is an independent, slow implementation that
 //! evaluates the formulas literally. The program's reflection is compared with its results.
 
-use crate::agreement::tracer::Mutation;
 use crate::harness::*;
+use crate::reference::tracer::Mutation;
 
 /// Roughness alpha of microfacets below which surfaces are treated as mirrors. Highlights are
 /// computed with at least this alpha.

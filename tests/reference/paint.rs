@@ -1,11 +1,11 @@
 //! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their
 //! derivatives from finite differences.
 
-use crate::agreement::compounds::Leaf;
-use crate::agreement::meshes::Triangles;
-use crate::agreement::surfaces::Piece;
-use crate::agreement::tracer::{Mutation, Tracer};
 use crate::harness::*;
+use crate::reference::compounds::Leaf;
+use crate::reference::meshes::Triangles;
+use crate::reference::surfaces::Piece;
+use crate::reference::tracer::{Mutation, Tracer};
 use png::BitDepth;
 use zerkalo::material::{Axis, Bump, Mapping, Placement, Texture, TextureFilter as Filter, Wrap};
 

@@ -2,12 +2,12 @@
 //! finds the media on both sides of a surface by testing two points, one just in front of the
 //! surface and one just behind it.
 
-use crate::agreement::compounds::Body;
-use crate::agreement::reflection::{
+use crate::harness::*;
+use crate::reference::compounds::Body;
+use crate::reference::reflection::{
     Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread,
 };
-use crate::agreement::tracer::{Hit, Mutation, Tracer};
-use crate::harness::*;
+use crate::reference::tracer::{Hit, Mutation, Tracer};
 
 /// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;

@@ -2,8 +2,8 @@
 //! uniformly over the lamp's area. Camera and mirror rays find the lamps that they hit. There is no
 //! importance sampling.
 
-use crate::agreement::tracer::Mutation;
 use crate::harness::*;
+use crate::reference::tracer::Mutation;
 use zerkalo::light::LightUnit;
 
 /// Lamp: a light with a size.

@@ -1,10 +1,10 @@
 //! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in
 //! front and just behind decide if the ray enters or leaves the compound.
 
-use crate::agreement::meshes::Triangles;
-use crate::agreement::paint::{Canvas, Spot};
-use crate::agreement::surfaces::{Piece, map, pieces};
 use crate::harness::*;
+use crate::reference::meshes::Triangles;
+use crate::reference::paint::{Canvas, Spot};
+use crate::reference::surfaces::{Piece, map, pieces};
 
 /// Simple shape: its pieces or triangles, and the transforms between its own coordinates and those
 /// of the scene.

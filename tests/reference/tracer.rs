@@ -1,14 +1,14 @@
 //! Reference path tracer in double precision. It traces one sample at a time and is optimised for
 //! readability.
 
-use crate::agreement::compounds::{Body, Leaf, Meeting};
-use crate::agreement::emission::Shine;
-use crate::agreement::lamps::Lamp;
-use crate::agreement::meshes;
-use crate::agreement::paint::Pixels;
-use crate::agreement::reflection::{highlight, reflect, wide_lobe};
-use crate::agreement::transmission::{Way, medium};
 use crate::harness::*;
+use crate::reference::compounds::{Body, Leaf, Meeting};
+use crate::reference::emission::Shine;
+use crate::reference::lamps::Lamp;
+use crate::reference::meshes;
+use crate::reference::paint::Pixels;
+use crate::reference::reflection::{highlight, reflect, wide_lobe};
+use crate::reference::transmission::{Way, medium};
 use std::sync::LazyLock;
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
@@ -262,7 +262,7 @@ impl<'a> Tracer<'a> {
 
     /// Returns the camera ray through a random point of the lens and the point `x`, `y` of the
     /// picture, in pixels from its upper left corner.
-    fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
+    pub fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let eye = DVec3::from(camera.eye);
         let forward = match (camera.target, camera.direction) {
@@ -323,7 +323,7 @@ impl<'a> Tracer<'a> {
         1e-10 * (1.0 + origin.abs().max_element())
     }
 
-    fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
+    pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
         let from = Self::clearance(origin);
         let mut nearest: Option<(Meeting, usize)> = None;
         for (i, body) in self.bodies.iter().enumerate() {

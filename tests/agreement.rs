@@ -2,24 +2,8 @@
 //! only the scene description with the program. The pictures agree within noise, and deliberate
 //! errors of the reference are detected.
 
-pub(crate) mod compare;
-pub(crate) mod compounds;
-pub(crate) mod emission;
-pub(crate) mod lamps;
-pub(crate) mod meshes;
-pub(crate) mod paint;
-pub(crate) mod reflection;
-pub(crate) mod surfaces;
-pub(crate) mod tracer;
-pub(crate) mod transmission;
-
 use crate::harness::*;
-use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
-use tracer::{Mutation, Tracer};
-
-pub(crate) const REFERENCE_SAMPLES: u32 = 96;
-/// Number of samples per pixel that the program traces in each replicate.
-pub(crate) const SAMPLES: u32 = 128;
+use crate::reference::*;
 
 /// Number of samples per pixel in each replicate, half of [`SAMPLES`]. It is for slow scenes, and
 /// for pictures with rare bright samples: with more samples, the program would find some that the
@@ -181,7 +165,7 @@ fn deliberate_errors_are_detected() {
     let mutations = [Mutation::UniformBounce, Mutation::AmbientTwice];
     check_detection(&mutations, "mirror-room.toml", &bouncing, 2 * REFERENCE_SAMPLES);
     let name = "depth-of-field.toml";
-    let focused = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
+    let focused = zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
     let mutations = [Mutation::SquareLens, Mutation::UnfocusedLens];
     check_detection(&mutations, name, &focused, 16 * REFERENCE_SAMPLES);
     // The camera is inside the glass. For a camera outside, rays would enter and leave the glass,
@@ -195,7 +179,7 @@ fn deliberate_errors_are_detected() {
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);
         let name = format!("{lobe:?}");
         // A view in which most blocks show blurred edges.
-        let mirror = compare::zoomed(&scene, [0.0, 1.0, -2.0], 20.0);
+        let mirror = zoomed(&scene, [0.0, 1.0, -2.0], 20.0);
         check_detection(&[Mutation::WiderLobe], &name, &mirror, 12 * REFERENCE_SAMPLES);
         check_detection(&[Mutation::LobeDensity], &name, &scene, REFERENCE_SAMPLES);
     }
@@ -373,7 +357,7 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
             let folded = scene.clone();
             scene.trace.below_horizon = BelowHorizon::Absorb;
             if lobe.contains("alpha") {
-                let few = |scene: &Scene| rendered(scene, 8, SamplerKind::Sobol);
+                let few = |scene: &Scene| replicates(scene, 8, SamplerKind::Sobol);
                 assert!(
                     few(&scene) == few(&folded),
                     "{name}: depends on directions below the surface"
@@ -394,7 +378,7 @@ fn variances_agree_under_independent_random_numbers() {
         let scene = small(shipped(name));
         let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
         let samples = MANY_SAMPLES;
-        let (_, half) = rendered(&scene, samples, SamplerKind::Random);
+        let (_, half) = replicates(&scene, samples, SamplerKind::Random);
         let z = variances_differ_by(&reference, REFERENCE_SAMPLES, &half, samples, scene.film.size);
         println!("{name}: {z:.2} standard errors");
         assert!(z < 4.0, "{name}: variances differ by {z:.2} standard errors");
@@ -467,7 +451,7 @@ fn back_of_one_sided_pane_does_not_reflect() {
                 material = \"wall\"
                 shape.plane = {{ point = [0.0, 0.0, -3.0], normal = [0.0, 0.0, 1.0] }}"
             );
-            let (mean, _) = rendered(&small(parsed(&text)), 4, SamplerKind::Sobol);
+            let (mean, _) = replicates(&small(parsed(&text)), 4, SamplerKind::Sobol);
             for pixel in mean {
                 assert!((pixel.x - expected).abs() < 1e-6, "{law}, {two_sided}: {pixel}");
             }
