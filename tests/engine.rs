@@ -13,6 +13,7 @@ mod error_estimates;
 mod extremes;
 mod features;
 mod film;
+mod furnaces;
 mod geometry;
 mod harness;
 mod limits;

@@ -72,29 +72,6 @@ fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
     tile.advance(replicate, range.len() as u32);
 }
 
-#[test]
-fn threads_do_not_change_the_bytes() {
-    let expected = whole().bytes();
-    for threads in [1, 2, 7] {
-        let mut film = new_film();
-        let all = all_tiles(&film);
-        for replicate in 0..2 {
-            let mut shares: Vec<Vec<_>> = (0..threads).map(|_| vec![]).collect();
-            for (i, slot) in film.slots(&all).into_iter().enumerate() {
-                shares[i % threads].push(slot);
-            }
-            std::thread::scope(|scope| {
-                for share in shares {
-                    scope.spawn(move || {
-                        share.into_iter().for_each(|s| trace_slot(s, replicate, 0..12))
-                    });
-                }
-            });
-        }
-        assert!(film.bytes() == expected, "{threads} threads");
-    }
-}
-
 /// Adds the first sample of replicate A to each pixel. The pixels are visited in lattices, from
 /// coarse to fine. `steps` contains for each lattice the distance between its pixels.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
@@ -122,30 +99,6 @@ fn whole() -> Film {
     trace(&mut film, &all, 0, 0..12);
     trace(&mut film, &all, 1, 0..12);
     film
-}
-
-#[test]
-fn disjoint_ranges_in_any_order_equal_the_whole() {
-    let whole = whole();
-    let ranges = [0..1, 1..5, 5..12];
-    let part = |range: &Range<u32>| {
-        let mut film = new_film();
-        let backwards: Vec<_> = all_tiles(&film).into_iter().rev().collect();
-        trace(&mut film, &backwards, 1, range.clone());
-        trace(&mut film, &backwards, 0, range.clone());
-        film
-    };
-    for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-        let mut sum = new_film();
-        order.iter().for_each(|i| sum.add(&part(&ranges[*i])).unwrap());
-        assert!(sum.bytes() == whole.bytes(), "{order:?}");
-        assert_eq!(sum.bad_samples(), whole.bad_samples());
-    }
-    let bad = whole.bad_samples();
-    assert!(bad.count > 4 && !bad.first.is_empty(), "{bad:?}");
-    assert_eq!(whole.samples(), (WIDTH * HEIGHT * 24) as u64);
-    // Different films have different bytes.
-    assert!(part(&ranges[0]).bytes() != part(&ranges[1]).bytes());
 }
 
 #[test]

@@ -212,38 +212,6 @@ fn sphere_mesh_hits_converge_to_sphere() {
     assert!(apart < 1e-3, "{apart}");
 }
 
-/// Checks that the blue background is nowhere visible through a closed red mesh, up to 33 pixels
-/// from the centre of the picture.
-#[test]
-fn closed_mesh_has_no_holes() {
-    let desk = Desk::new();
-    for (rings, sides) in [(7, 12), (90, 181)] {
-        desk.put("ball.obj", &ball(rings, sides));
-        for normals in ["smooth", "flat"] {
-            let text =
-                format!("{VIEW}shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
-            let scene = desk.scene(&text);
-            for precision in [Precision::Single, Precision::Double] {
-                let rendering = rendered(&scene, 3, precision, 16);
-                let pixels = picture(&rendering, Replicates::Both);
-                let blue = |x: usize, y: usize| pixels[y * 96 + x][2];
-                let mut inner = 0;
-                for y in 0..96usize {
-                    for x in 0..96usize {
-                        let (dx, dy) = (x as f64 - 47.5, y as f64 - 47.5);
-                        // The ball's image has a radius of about 37 pixels.
-                        if dx.hypot(dy) < 33.0 {
-                            inner += 1;
-                            assert_eq!(blue(x, y), 0.0, "{x} {y} {rings} {normals}");
-                        }
-                    }
-                }
-                assert!(inner > 3000);
-            }
-        }
-    }
-}
-
 /// Checks that a light inside a closed mesh lights no surface outside of it, neither with smooth
 /// nor with flat normals.
 #[test]

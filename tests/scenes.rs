@@ -171,20 +171,6 @@ fn every_scene_renders_its_golden_picture() {
     assert!(wrong.is_empty(), "{} of {values}:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-#[test]
-fn furnace_radiance_is_exactly_1() {
-    let scene = shipped("furnace.toml");
-    for precision in [Precision::Single, Precision::Double] {
-        let rendering = rendered(&scene, 3, precision, 16);
-        assert_eq!(rendering.film.bad_samples().count, 0);
-        let picture = picture(&rendering, Replicates::Both);
-        let wrong = picture.iter().filter(|rgb| **rgb != [1.0; 3]).count();
-        assert_eq!(wrong, 0, "{precision:?}: of {} pixels, such as {:?}", picture.len(), {
-            picture.iter().find(|rgb| **rgb != [1.0; 3])
-        });
-    }
-}
-
 /// Checks that both replicates are equal in scenes without anti-aliasing and lobes, where no sample
 /// is random.
 #[test]

@@ -79,24 +79,6 @@ fn noise(state: &RenderState) -> Noise {
 }
 
 #[test]
-fn merged_film_equals_one_process_and_is_the_expected_one() {
-    let scene = scene("mirror-room", Some([100, 70]));
-    let pilot = adaptive(&scene, 3, 1.0);
-    let plan = plan(&scene, &pilot, 3, 0.5, 5);
-    let ends: Vec<_> = plan.tiles.iter().map(|tile| 0..tile.end).collect();
-    let state = RenderState::new(&scene, &options(3), None);
-    let mut one = ShardRender::new(state, &ends, 0, THREADS).unwrap();
-    while one.step() {}
-    let pilot_rays = pilot.schedule.rays();
-    let (sum, rays) = merged(&scene, &plan, pilot);
-    assert!(sum.film.bytes() == one.state.film.bytes());
-    assert_eq!(pilot_rays + rays.iter().sum::<u64>(), one.rays());
-    let all: Vec<u32> = (0..=5).collect();
-    assert_eq!(plan.differing_tile(&sum.film, &all), None);
-    assert!(plan.differing_tile(&sum.film, &all[1..]).is_some());
-}
-
-#[test]
 fn interrupted_shard_equals_uninterrupted() {
     let scene = scene("reflecting-tracks", Some([96, 64]));
     let pilot = adaptive(&scene, 0, 4.0);

@@ -1,7 +1,6 @@
 //! Scenes with many point lights, of which each path samples only a few. The mean radiance is
 //! compared with the sum over all lights.
 
-use crate::emitters::setup::{array, check, mean_and_error, radiance, samples};
 use crate::harness::*;
 
 /// Smallest number of point lights of which each path samples only a few.
@@ -57,7 +56,7 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
         let sum = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
         cases.push((format!("{count} lights"), receiver(&lights), sum));
     }
-    check(&cases, 1 << 15, [1e-4, 1e-9]);
+    check_means(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
 /// Checks lights of very different intensities: the brightest are sampled by all paths, and each
@@ -79,7 +78,7 @@ fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
             cases.push((format!("{count} lights, {bright} of them bright"), scene, sum));
         }
     }
-    check(&cases, 1 << 15, [1e-4, 1e-9]);
+    check_means(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
 /// Returns the text of a spot light at `position` with the axis `axis`, and the radiance of the
@@ -116,7 +115,7 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
         }
         cases.push((format!("{} points, {spots} spots", points.len()), parsed(&text), sum));
     }
-    check(&cases, 1 << 16, [2e-4, 1e-9]);
+    check_means(&cases, 1 << 16, [2e-4, 1e-9]);
 }
 
 /// Checks the limit up to which each path samples all spot lights, although it samples only a few
@@ -200,21 +199,13 @@ fn chosen_lights_have_one_light_group() {
     let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
                 inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
     let scene = parsed(&(receiver_text(&lights, |_| 1.0) + spot));
-    let count = 1 << 16;
-    let mut sums: Vec<(f64, f64)> = Vec::new();
-    samples::<Single>(&scene, count, 5, |groups| {
-        sums.resize(groups.len(), (0.0, 0.0));
-        for ((sum, squares), sample) in sums.iter_mut().zip(groups) {
-            *sum += sample;
-            *squares += sample * sample;
-        }
-    });
     let of_points = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
     let expected = [0.25 / PI, of_points];
-    assert_eq!(sums.len(), expected.len());
-    let limit = two_sided_z(1e-3 / sums.len() as f64);
-    for ((sum, squares), expected) in sums.into_iter().zip(expected) {
-        let (mean, error) = mean_and_error(sum, squares, count);
+    let mut means = group_means::<Single>(&scene, 1 << 16, 5);
+    means.pop();
+    assert_eq!(means.len(), expected.len());
+    let limit = two_sided_z(1e-3 / means.len() as f64);
+    for ((mean, error), expected) in means.into_iter().zip(expected) {
         let off = (mean - expected).abs() - 1e-4 * expected;
         assert!(off <= limit * error, "{mean} ± {error}, expected {expected}");
     }

@@ -2,8 +2,7 @@
 //! and light the scene as with a vanishing gap.
 
 use crate::emitters::forms;
-use crate::emitters::objects::{MATT, ROUNDING, agree, mesh, object, receiver, rectangle};
-use crate::emitters::setup::{array, check};
+use crate::emitters::objects::{MATT, mesh, object, receiver, rectangle};
 use crate::harness::*;
 
 /// Centre of the lamps on ceilings, and their size.
@@ -72,7 +71,7 @@ fn lights_on_planes_are_visible_and_light_the_scene() {
             ));
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
 /// Returns a box between two corners as six quadrilaterals, counter-clockwise as seen from outside.
@@ -133,7 +132,7 @@ fn emissive_sheets_on_ceilings_are_visible_and_light_the_room() {
             }
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
 /// Checks that rays which hit an emissive sheet on a ceiling and points sampled on it agree: glossy
@@ -150,7 +149,7 @@ fn reflections_of_emissive_sheets_on_ceilings_are_the_limit_of_a_gap() {
             let objects = object("black", &room) + &object("lamp", &format!("shape.{text}"));
             receiver(DVec3::Y, &glossy, &objects)
         };
-        agree(&room, &scene(0.0), &scene(1e-4), 1 << 14);
+        means_agree(&room, &scene(0.0), &scene(1e-4), 1 << 14);
     }
 }
 
@@ -193,7 +192,7 @@ fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
             cases.push((format!("{material} behind {block}"), look(eye, image, &objects), 1.0));
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
 #[test]
@@ -218,5 +217,5 @@ fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
         let from_below = look(eye, image, &(objects + below));
         cases.push(("back of the lower sheet".to_string(), from_below, 0.0));
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }

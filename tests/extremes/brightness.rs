@@ -202,30 +202,3 @@ fn distant_object_leaves_surface_near_lamp_unchanged() {
     let [alone, both] = [alone, both].map(|scene| mean(&rendered(&scene, 1, Precision::Double, 8)));
     assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
 }
-
-/// Checks that multiplying the intensity of a light by 2^40 or 2^-40 multiplies every pixel by
-/// exactly this factor. One of the films has a scale of its fixed-point numbers other than the
-/// default.
-#[test]
-fn light_intensity_in_powers_of_two_scales_picture_exactly() {
-    let scenes = [
-        floor("color = [1e-9, 0.5, 1e3]", 1.0),
-        below_a_lamp(
-            1e-3,
-            [0.0; 3],
-            "shape.sphere = { center = [0.0, -500.0, 0.0], radius = 500.0 }",
-        ),
-    ];
-    for scene in scenes {
-        let pixels_of =
-            |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
-        let expected = pixels_of(&scene);
-        for ev in [-40, 40] {
-            let factor = f64::from(ev).exp2();
-            let mut other = scene.clone();
-            other.lights[0].intensity *= factor;
-            let scaled: Vec<_> = pixels_of(&other).iter().map(|p| p.map(|c| c / factor)).collect();
-            assert_eq!(scaled, expected, "{ev}");
-        }
-    }
-}

@@ -100,52 +100,10 @@ fn circle_of_confusion_matches_its_closed_form() {
     }
 }
 
-/// Returns the scene without random numbers other than those of the lens.
-fn sharp(mut scene: Scene) -> Scene {
-    scene.film.filter = Filter::Point;
-    for material in scene.materials.values_mut() {
-        material.roughness = 0.0;
-    }
-    sized(scene, [48, 36])
-}
-
 fn with_radius(scene: &Scene, radius: f64) -> Scene {
     let mut scene = scene.clone();
     scene.camera.aperture = Some(Aperture::Radius(radius));
     scene
-}
-
-#[test]
-fn tiny_aperture_equals_the_pinhole() {
-    for name in ["mirror-room.toml", "glass.toml", "reflecting-tracks-lit.toml"] {
-        let scene = sharp(shipped(name));
-        for precision in [Precision::Single, Precision::Double] {
-            let pixels = |scene: &Scene| {
-                let rendering = rendered(scene, 1, precision, 2);
-                picture(&rendering, Replicates::Both)
-            };
-            let (pinhole, lens) = (pixels(&scene), pixels(&with_radius(&scene, 1e-9)));
-            let different = pinhole
-                .iter()
-                .zip(&lens)
-                .filter(|(a, b)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * (1.0 + a[c].abs())))
-                .count();
-            println!("{name}, {precision:?}: {different} pixels differ");
-            // With a lens, rays in glass choose between reflection and transmission by other random
-            // numbers than without. The agreement tests compare these pictures.
-            let allowed = if name == "mirror-room.toml" { 0 } else { pinhole.len() / 100 };
-            assert!(different <= allowed, "{name}, {precision:?}: {different} pixels differ");
-        }
-        assert_eq!(
-            pixels_bytes(&scene),
-            pixels_bytes(&with_radius(&scene, 0.0)),
-            "{name}: a radius of 0 is a pinhole"
-        );
-    }
-}
-
-fn pixels_bytes(scene: &Scene) -> Vec<u8> {
-    rendered(scene, 1, Precision::Auto, 2).film.bytes()
 }
 
 /// Checks that all samples are finite for lenses as large as the room and larger, at any focus

@@ -1,6 +1,5 @@
 //! Tests of lights with a size, and of many lights.
 
-use crate::emitters::setup::check;
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
@@ -68,7 +67,7 @@ fn d5_rectangle_light() {
     };
     // A light that fills the cone lobe. Sampled points of the light and reflected rays both find
     // all of its light. The weights of these two techniques are 0.22 and 0.78.
-    check(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
+    check_means(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
 }
 
 #[test]

@@ -14,45 +14,6 @@ fn ground(extra: &str, light: DVec3) -> String {
     )
 }
 
-/// Returns a ray from above to a random point of the ground, and this point. The point's
-/// coordinates x and z are between -`half` and `half`.
-fn to_ground(numbers: &mut Numbers, half: f64) -> (Line, DVec3) {
-    let p = DVec3::new(numbers.between(-half, half), 0.0, numbers.between(-half, half));
-    let from = DVec3::new(numbers.between(-5.0, 5.0), 2.0, numbers.between(-5.0, 5.0));
-    ((from, (p - from).normalize()), p)
-}
-
-#[test]
-fn closed_form_01_a_point_light_on_a_plane() {
-    let light = DVec3::new(1.0, 3.0, -2.0);
-    let scene = parsed(&ground("", light));
-    let mut numbers = Numbers::new(1);
-    let (lines, points): (Vec<_>, Vec<_>) =
-        (0..20_000).map(|_| to_ground(&mut numbers, 45.0)).unzip();
-    // Shadow rays start above the ground, at 8 times the rounding error of the largest coordinate
-    // (50). By this offset they are nearer to the lamp at the height 3, and its light falls off
-    // with the square of the distance.
-    let lifted = |rounding: f64| 2.0 * 8.0 * rounding * 50.0 / 3.0;
-    for (precision, rounding) in
-        [(Precision::Double, f64::EPSILON), (Precision::Single, f64::from(f32::EPSILON))]
-    {
-        let tolerance = lifted(rounding) + 100.0 * rounding;
-        let traced = Traced::new(&scene, precision);
-        for (p, found) in points.iter().zip(traced.radiance(&lines)) {
-            let foot = DVec3::new(light.x, 0.0, light.z);
-            let (h, x) = (light.y, (*p - foot).length());
-            // E = I h / (h^2 + x^2)^(3/2); L = rho E / pi.
-            let irradiance = 40.0 * h / (h * h + x * x).powf(1.5);
-            for (channel, (rho, color)) in [(0.5, 1.0), (0.8, 0.5), (0.3, 0.25)].iter().enumerate()
-            {
-                let expected = rho * color * irradiance / PI;
-                let off = (found[channel] / expected - 1.0).abs();
-                assert!(off < tolerance, "{precision:?} at {p}: {found:?}, not {expected}: {off}");
-            }
-        }
-    }
-}
-
 /// Checks the shadow of a rectangle with the corners (+-1.5, 1, +-1), turned by 20 degrees. The
 /// ground must be dark exactly where the segment to the light crosses the rectangle.
 #[test]

@@ -2,7 +2,6 @@
 
 mod bits;
 mod light;
-mod mirror;
 mod torus;
 mod transforms;
 mod tree;

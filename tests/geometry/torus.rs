@@ -143,20 +143,6 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-#[test]
-fn torus_hits_do_not_depend_on_other_lanes() {
-    let mut numbers = Numbers::new(3);
-    let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
-    let bits = |all: Vec<Option<LineHit>>| -> Vec<Option<u64>> {
-        all.into_iter().map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
-    };
-    let form = torus(0.3);
-    let single = bits(closest(&geometry::<Single>(&form), &lines));
-    assert_eq!(single, bits(closest(&geometry::<f32>(&form), &lines)));
-    let double = bits(closest(&geometry::<Double>(&form), &lines));
-    assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
-}
-
 /// Returns the distances of all hits along each line, in ascending order. The lines start outside
 /// of the object.
 fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {

@@ -6,6 +6,7 @@ mod png_file;
 mod rays;
 mod renders;
 mod report;
+mod samples;
 #[path = "../common/shape_examples.rs"]
 mod shape_examples;
 mod statistics;
@@ -19,6 +20,7 @@ pub use png_file::*;
 pub use rays::*;
 pub use renders::*;
 pub use report::*;
+pub use samples::*;
 pub use shape_examples::*;
 pub use statistics::*;
 pub use tables::*;

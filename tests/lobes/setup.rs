@@ -3,7 +3,6 @@
 use crate::harness::*;
 use zerkalo::material::InterfaceMedia;
 use zerkalo::sampling::CameraDimensions;
-use zerkalo::world::Path;
 
 pub type Vector = [f64; 3];
 
@@ -212,72 +211,4 @@ fn cross<L: SimdFloat>(
             });
         }
     }
-}
-
-/// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
-/// `first` on. The values of lanes outside of `active` have no meaning. The order of values is
-/// `[sample][group][channel]`.
-pub fn trace_packet<L: SimdFloat>(
-    world: &World<L>,
-    sampler: &Sampler<L>,
-    pixel: (u32, u32),
-    first: u32,
-    active: L::Mask,
-) -> Vec<Vec<Vector>> {
-    let points = sampler.block(first, L::WIDTH);
-    let draws = points.for_pixel(sampler.key(pixel, 0));
-    let half = L::from_f64(0.5);
-    let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let (origin, direction) = world.camera().rays(corner, jitter);
-    let mut path = Path::new(Ray { origin, direction });
-    let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
-    world.trace(&mut path, None, &draws, active, &mut radiance);
-    let groups = &radiance.groups[..world.groups()];
-    let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
-    (0..L::WIDTH).map(of_lane).collect()
-}
-
-const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
-
-/// Returns the samples `0..count` of every pixel, traced in full packets. Each is the sum over the
-/// light groups, with the weight 1 for all lights.
-pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
-    samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        trace_packet(world, sampler, pixel, first, L::mask(true))
-    })
-}
-
-/// Returns the same values as [`samples`]. Each sample is traced alone: it is the only active lane
-/// of its packet.
-pub fn lone_samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
-    let only = |lane: usize| {
-        L::from_fn(|i| L::Scalar::from_f64(f64::from(u8::from(i == lane)))).gt(L::zero())
-    };
-    samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        let alone = |lane| trace_packet(world, sampler, pixel, first, only(lane)).swap_remove(lane);
-        (0..L::WIDTH).map(alone).collect()
-    })
-}
-
-/// Returns the samples `0..count` of every pixel. `packet` returns the radiance of the samples of a
-/// pixel from an index on, as [`trace_packet`] does.
-fn samples_by<L: SimdFloat>(
-    scene: &Scene,
-    count: u32,
-    packet: impl Fn(&World<L>, &Sampler<L>, (u32, u32), u32) -> Vec<Vec<Vector>>,
-) -> Vec<Vector> {
-    let world = World::<L>::new(scene);
-    let sampler = Sampler::<L>::new(SETTINGS, world.camera_dimensions());
-    let [width, height] = scene.film.size;
-    let mut out = Vec::new();
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        for first in (0..count).step_by(L::WIDTH) {
-            for groups in packet(&world, &sampler, (x, y), first) {
-                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
-                out.push(combine(&all));
-            }
-        }
-    }
-    out
 }

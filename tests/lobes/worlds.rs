@@ -1,41 +1,7 @@
 //! Whole paths: white furnaces, parallel mirrors, samples traced alone and in packets.
 
 use crate::harness::*;
-use crate::lobes::properties::{Energy, ReflectionModel};
 use crate::lobes::setup::*;
-
-/// Checks that every sample of a ball in a white furnace is exactly rho, for every
-/// energy-conserving lobe. At the silhouette, lobe directions are partly below the surface and
-/// mirrored up.
-fn furnace<L: SimdFloat>() {
-    let rho = 0.75;
-    let text = "film = { size = [24, 24] }
-        camera = { eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }
-        background.color = [1.0, 1.0, 1.0]
-        [[object]]
-        material = \"m\"
-        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
-        [materials.m]";
-    let mut scene = parsed(text);
-    for lobe in Lobe::ALL.into_iter().filter(|l| l.properties().energy == Energy::Conserving) {
-        for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
-            let mut material = reflector(lobe, Masking::VCavity, roughness);
-            material.reflection = rho;
-            scene.materials.insert("m".to_string(), material);
-            let samples = samples::<L>(&scene, 16);
-            let on_ball = samples.iter().filter(|s| **s == [rho; 3]).count();
-            let beside = samples.iter().filter(|s| **s == [1.0; 3]).count();
-            assert_eq!(on_ball + beside, samples.len(), "{} {lobe:?} {roughness}", L::NAME);
-            assert!(on_ball > samples.len() / 3 && beside > samples.len() / 10);
-        }
-    }
-}
-
-#[test]
-fn closed_form_7_a_white_furnace_is_exact() {
-    furnace::<Single>();
-    furnace::<Double>();
-}
 
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
