@@ -19,7 +19,6 @@ mod harness;
 mod limits;
 mod linearity;
 mod lobes;
-mod mesh;
 mod mesh_scenes;
 mod random_scenes;
 mod reference;

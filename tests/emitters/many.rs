@@ -16,20 +16,10 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
     (0..count).map(position).collect()
 }
 
-/// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit
-/// intensity. Every third light has no falloff.
-fn receiver(lights: &[DVec3]) -> Scene {
-    parsed(&receiver_text(lights, |_| 1.0))
-}
-
-fn receiver_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
-    let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
-         view_angle.vertical = 0.1\n\
-         [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
-         [[object]]\nmaterial = \"white\"\n\
-         shape.platform = { center = [0.0, 0.0, 0.0], size = [0.01, 0.01] }\n"
-        .to_string();
+/// Returns the text of a white diffuse receiver that faces up. Light `i` has the intensity
+/// `intensity(i)`; every third light has no falloff.
+fn lit_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
+    let mut text = receiver_text(DVec3::Y, WHITE, "");
     for (i, position) in lights.iter().enumerate() {
         let falloff = if i.is_multiple_of(3) { "none" } else { "inverse-square" };
         text += &format!(
@@ -54,7 +44,7 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
     for count in [CHOSEN, 23, 24, 33, 64, 100, 191, 1000] {
         let lights = positions(count, &mut numbers);
         let sum = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
-        cases.push((format!("{count} lights"), receiver(&lights), sum));
+        cases.push((format!("{count} lights"), parsed(&lit_text(&lights, |_| 1.0)), sum));
     }
     check_means(&cases, 1 << 15, [1e-4, 1e-9]);
 }
@@ -74,7 +64,7 @@ fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
             };
             let light = |(i, position): (usize, &DVec3)| intensity(i) * expected(i, *position);
             let sum = lights.iter().enumerate().map(light).sum();
-            let scene = parsed(&receiver_text(&lights, intensity));
+            let scene = parsed(&lit_text(&lights, intensity));
             cases.push((format!("{count} lights, {bright} of them bright"), scene, sum));
         }
     }
@@ -105,7 +95,7 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
     let mut cases = Vec::new();
     for (points, spots) in [(0, 20), (0, 33), (0, 600), (CHOSEN, 20), (3, 64), (100, 29)] {
         let points = positions(points, &mut numbers);
-        let mut text = receiver_text(&points, |_| 1.0);
+        let mut text = lit_text(&points, |_| 1.0);
         let mut sum: f64 = points.iter().enumerate().map(|(i, light)| expected(i, *light)).sum();
         for position in positions(spots, &mut numbers) {
             let axis = numbers.in_cube(1.0) - position.normalize();
@@ -127,7 +117,7 @@ fn few_spots_among_many_points_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
     // A cone of 80 degrees has 0.826 times the solid angle of a hemisphere.
     for (spots, is_chosen) in [(19, false), (20, true)] {
-        let mut text = receiver_text(&lights, |_| 1e-30);
+        let mut text = lit_text(&lights, |_| 1e-30);
         for position in positions(spots, &mut Numbers::new(4)) {
             text += &spot(position, -position).0;
         }
@@ -198,7 +188,7 @@ fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
     let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
                 inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
-    let scene = parsed(&(receiver_text(&lights, |_| 1.0) + spot));
+    let scene = parsed(&(lit_text(&lights, |_| 1.0) + spot));
     let of_points = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
     let expected = [0.25 / PI, of_points];
     let mut means = group_means::<Single>(&scene, 1 << 16, 5);
@@ -216,9 +206,9 @@ fn chosen_lights_have_one_light_group() {
 #[test]
 fn few_lights_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
-    let (_, error) = radiance::<Double>(&receiver(&lights[1..]), 64, 1);
+    let (_, error) = radiance::<Double>(&parsed(&lit_text(&lights[1..], |_| 1.0)), 64, 1);
     assert!(error < 1e-9, "{error}");
-    let (_, error) = radiance::<Double>(&receiver(&lights), 64, 1);
+    let (_, error) = radiance::<Double>(&parsed(&lit_text(&lights, |_| 1.0)), 64, 1);
     assert!(error > 1e-3, "{error}");
 }
 
@@ -234,7 +224,7 @@ fn a_thousand_lights_at_extreme_places_have_finite_samples() {
             _ => {}
         }
     }
-    let scene = receiver(&lights);
+    let scene = parsed(&lit_text(&lights, |_| 1.0));
     for (mean, error) in
         [radiance::<Single>(&scene, 1 << 12, 1), radiance::<Double>(&scene, 1 << 12, 2)]
     {

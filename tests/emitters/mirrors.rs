@@ -2,18 +2,14 @@
 
 use crate::harness::*;
 
-/// Creates the scene of a camera that looks down at a mirror with the keys `material`. A light with
-/// the keys `light` is the only light.
+/// Returns the scene of a mirror with the keys `material`, and of a light above it with the keys
+/// `light`.
 fn mirror(material: &str, light: &str) -> Scene {
-    parsed(&format!(
-        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = [0.0, 0.1, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
-         view_angle.vertical = 0.1\n\
-         [materials.mirror]\nambient = 0.0\ndiffuse = 0.0\nspecular = 0.0\n{material}\n\
-         [[light]]\n{light}\n\
-         [[object]]\nmaterial = \"mirror\"\n\
-         shape.platform = {{ center = [0.0, 0.0, 0.0], size = [0.2, 0.2] }}\n"
-    ))
+    receiver(
+        DVec3::Y,
+        &format!("ambient = 0\ndiffuse = 0\n{material}"),
+        &format!("[[light]]\n{light}"),
+    )
 }
 
 fn sphere(radius: f64) -> String {

@@ -3,28 +3,6 @@
 use crate::emitters::forms;
 use crate::harness::*;
 
-/// Returns the scene of a camera that looks at a receiver at the origin. `white` is the text of the
-/// receiver's material. `rest` is the text of further objects; they may have the materials `lamp`
-/// (black and emissive), `front` (the same, one-sided) and `black`.
-pub fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
-    parsed(&format!(
-        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
-         [materials.white]\n{white}\n\
-         [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
-         [materials.lamp]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\n\
-         [materials.front]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\ntwo_sided = false\n\
-         [[object]]\nmaterial = \"white\"\n\
-         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
-        eye = array(normal * 0.01),
-        direction = array(-normal),
-        up = array(normal.any_orthonormal_vector()),
-        normal = array(normal),
-    ))
-}
-
-pub const MATT: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
-
 pub fn object(material: &str, shape: &str) -> String {
     format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
 }
@@ -75,7 +53,7 @@ pub fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
 fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let mut cases = Vec::new();
     let mut case = |name: String, normal: DVec3, rest: String, irradiance: f64| {
-        cases.push((name, receiver(normal, MATT, &rest), irradiance / PI));
+        cases.push((name, receiver(normal, WHITE, &rest), irradiance / PI));
     };
     for (i, (center, size)) in [
         (DVec3::Y, [1.0, 0.7]),
@@ -166,7 +144,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     ];
     let dark = floors.map(|floor| {
         let rest = object("black", floor) + turned + &lamp + turned;
-        (floor.to_string(), receiver(DVec3::Y, MATT, &rest), 0.0)
+        (floor.to_string(), receiver(DVec3::Y, WHITE, &rest), 0.0)
     });
     check_means(&dark, 4096, ROUNDING);
     let (_, corners) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.4, 0.3]);
@@ -174,7 +152,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let small = "shape.platform = { center = [0.1, 1.0, 0.0], size = [0.2, 0.1] }";
     let (_, covered) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.2, 0.1]);
     let seen = forms::polygon(&corners, DVec3::Y) - forms::polygon(&covered, DVec3::Y);
-    let partly = receiver(DVec3::Y, MATT, &(object("black", small) + &lamp));
+    let partly = receiver(DVec3::Y, WHITE, &(object("black", small) + &lamp));
     check_means(&[("a part of the face".to_string(), partly, seen / PI)], 1 << 14, ROUNDING);
     // Shadow rays end at glass, even if the glass stands on the lamp.
     let glass = "[materials.glass]\ncolor = [0.0, 0.0, 0.0]\ntransmission = 1.0\n".to_string();
@@ -186,7 +164,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     ]
     .map(|shape| {
         let rest = glass.clone() + &object("glass", block) + &object("lamp", shape);
-        (format!("glass on {shape}"), receiver(DVec3::NEG_Y, MATT, &rest), 0.0)
+        (format!("glass on {shape}"), receiver(DVec3::NEG_Y, WHITE, &rest), 0.0)
     });
     check_means(&inside, 4096, ROUNDING);
     // The lamp's lower face is in the plane of a rotated square. The face is within the square's
@@ -196,8 +174,8 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let square =
         object("black", "shape.platform = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0] }")
             + "transform = [{ rotate_y = 45.0 }, { translate = [1.2, 1.0, 0.0] }]\n";
-    let alone = receiver(DVec3::Y, MATT, &beside);
-    let with_square = receiver(DVec3::Y, MATT, &(square + &beside));
+    let alone = receiver(DVec3::Y, WHITE, &beside);
+    let with_square = receiver(DVec3::Y, WHITE, &(square + &beside));
     means_agree("box beside a square", &alone, &with_square, 4096);
 }
 
@@ -207,7 +185,7 @@ fn back_of_a_flat_emissive_object_follows_two_sided() {
     let upward = text.replace("normal = [0.0, -1.0, 0.0]", "normal = [0.0, 1.0, 0.0]");
     let expected = forms::polygon(&corners, DVec3::Y) / PI;
     let scene =
-        |material: &str| receiver(DVec3::Y, MATT, &object(material, &format!("shape.{upward}")));
+        |material: &str| receiver(DVec3::Y, WHITE, &object(material, &format!("shape.{upward}")));
     let cases = [
         ("two-sided".to_string(), scene("lamp"), expected),
         ("one-sided".to_string(), scene("front"), 0.0),
@@ -244,7 +222,7 @@ fn inside_of_an_emissive_sphere_has_shadows() {
     let cover =
         object("black", "shape.platform = { center = [0.0, 0.5, 0.0], size = [100.0, 100.0] }");
     let wall = object("lamp", "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 2.0 }");
-    let scene = receiver(DVec3::Y, MATT, &(cover + &wall));
+    let scene = receiver(DVec3::Y, WHITE, &(cover + &wall));
     // The receiver sees the wall below the cover. This is a band of directions from the horizon up
     // to the elevation of the circle in which the cover cuts the sphere.
     let cos2 = 0.25 / 4.0;

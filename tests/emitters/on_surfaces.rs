@@ -2,7 +2,7 @@
 //! and light the scene as with a vanishing gap.
 
 use crate::emitters::forms;
-use crate::emitters::objects::{MATT, mesh, object, receiver, rectangle};
+use crate::emitters::objects::{mesh, object, rectangle};
 use crate::harness::*;
 
 /// Centre of the lamps on ceilings, and their size.
@@ -66,7 +66,7 @@ fn lights_on_planes_are_visible_and_light_the_scene() {
             let irradiance = forms::polygon(&corners, DVec3::Y);
             cases.push((
                 format!("floor below {text}"),
-                receiver(DVec3::Y, MATT, &lit),
+                receiver(DVec3::Y, WHITE, &lit),
                 irradiance / PI,
             ));
         }
@@ -126,7 +126,7 @@ fn emissive_sheets_on_ceilings_are_visible_and_light_the_room() {
                     let target = center + DVec3::new(0.1, 0.0, 0.05);
                     let eye = DVec3::new(0.3, 0.4, -0.5);
                     cases.push((format!("look: {objects}"), look(eye, target, &objects), 1.0));
-                    let lit = receiver(DVec3::Y, MATT, &objects);
+                    let lit = receiver(DVec3::Y, WHITE, &objects);
                     cases.push((format!("lit: {objects}"), lit, irradiance / PI));
                 }
             }
@@ -176,7 +176,7 @@ fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
             let lit = forms::polygon(&corners, DVec3::Y) / PI;
             cases.push((
                 format!("{material} below {block}"),
-                receiver(DVec3::Y, MATT, &objects),
+                receiver(DVec3::Y, WHITE, &objects),
                 lit,
             ));
             let eye = DVec3::new(0.3, 0.1, 0.4);
@@ -207,7 +207,7 @@ fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
         }
         let (_, corners) = rectangle(DVec3::Y, [1.0, 1.0]);
         let lit = forms::polygon(&corners, DVec3::Y) / PI;
-        cases.push((format!("lit: {objects}"), receiver(DVec3::Y, MATT, &objects), lit));
+        cases.push((format!("lit: {objects}"), receiver(DVec3::Y, WHITE, &objects), lit));
         // The eye is above both sheets. A mirror shows the back of the lower one.
         let below = "[materials.mirror]\ncolor = [0.0, 0.0, 0.0]\nreflection = 1.0\n\
                      [[object]]\nmaterial = \"mirror\"\n\

@@ -7,6 +7,8 @@ mod scenes;
 mod survey;
 
 use crate::harness::*;
+use crate::lobes::closed_forms::cone_share;
+use crate::reference::{Mutation, Tracer};
 use zerkalo::film::Estimator;
 
 const SIZE: [usize; 2] = [64, 48];
@@ -66,54 +68,16 @@ transform = [{{ rotate_z = {TILT} }}, {{ translate = [{x}, {y}, {SHEET_Z}] }}]
     scene
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: [f64; 3]) -> [f64; 3] {
-    a.map(|x| x / dot(a, a).sqrt())
-}
-
-/// Returns the share of the directions in a cone that are inside a half-space through the cone's
-/// apex. `theta` is the half-angle of the cone. `delta` is the angle of its axis above the plane of
-/// the half-space; it is positive inside the half-space.
-fn cone_share(theta: f64, delta: f64) -> f64 {
-    if delta >= theta {
-        1.0
-    } else if delta <= -theta {
-        0.0
-    } else {
-        let below =
-            (delta.sin() / theta.sin()).acos() + theta.cos() * (-delta.tan() / theta.tan()).acos();
-        (PI - below) / (PI * (1.0 - theta.cos()))
-    }
-}
-
-/// Returns the share of the mirror's lobe that hits the bright sheet. The lobe is that of the
-/// camera ray through the point (x, y) of the picture, in pixels.
-fn sheet_share(x: f64, y: f64) -> f64 {
-    let eye = [0.1, 0.05, 1.5];
-    let w = unit([-0.1, -0.05, -1.5]);
-    let u = unit(cross(w, [0.0, 1.0, 0.0]));
-    let v = cross(u, w);
-    let [width, height] = SIZE.map(|n| n as f64);
-    let half = 20f64.to_radians().tan();
-    let (across, up) =
-        (half * width / height * (2.0 * x / width - 1.0), half * (1.0 - 2.0 * y / height));
-    let toward: [f64; 3] = [0, 1, 2].map(|i| w[i] + across * u[i] + up * v[i]);
-    let t = -eye[2] / toward[2];
-    let apex = [0, 1, 2].map(|i| eye[i] + t * toward[i]);
-    let axis = unit([toward[0], toward[1], -toward[2]]);
+/// Returns the share of the mirror's lobe that hits the bright sheet, for the camera ray `eye`,
+/// `toward`.
+fn sheet_share((eye, toward): Line) -> f64 {
+    let apex = eye - toward * (eye.z / toward.z);
+    let axis = toward * DVec3::new(1.0, 1.0, -1.0);
     // Normal, on the sheet's side, of the plane through the apex and the edge.
     let (s, c) = TILT.to_radians().sin_cos();
-    let edge = [-s, c, 0.0];
-    let to_edge = [EDGE_X - apex[0], -apex[1], SHEET_Z];
-    let normal = unit(cross(edge, to_edge));
-    cone_share(ROUGHNESS.atan(), dot(normal, axis).asin())
+    let to_edge = DVec3::new(EDGE_X, 0.0, SHEET_Z) - apex;
+    let normal = DVec3::new(-s, c, 0.0).cross(to_edge).normalize();
+    cone_share(ROUGHNESS.atan(), normal.dot(axis).asin())
 }
 
 /// Returns the true radiance of every pixel. For the box filter it is the mean over the pixel, by
@@ -133,12 +97,15 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
             })
         })
         .collect();
+    let scene = closed_form(filter);
+    let tracer = Tracer::new(&scene, Mutation::None).unwrap();
+    let share = |x: f64, y: f64| sheet_share(tracer.camera_ray(x, y, &mut Numbers::new(1)));
     let mean = |x: f64, y: f64| match filter {
-        Filter::Point => sheet_share(x + 0.5, y + 0.5),
+        Filter::Point => share(x + 0.5, y + 0.5),
         Filter::Box => nodes
             .iter()
             .flat_map(|a| nodes.iter().map(move |b| (a, b)))
-            .map(|((dx, wx), (dy, wy))| wx * wy * sheet_share(x + dx, y + dy))
+            .map(|((dx, wx), (dy, wy))| wx * wy * share(x + dx, y + dy))
             .sum(),
     };
     (0..SIZE[0] * SIZE[1])

@@ -1,7 +1,7 @@
 //! Compound solids: volumes, parity of surfaces along a line, laws of set operations.
 
 use crate::harness::*;
-use zerkalo::primitive::{CsgSolid, CsgTree as Tree};
+use zerkalo::primitive::{CsgSolid, CsgTree as Tree, TorusForm};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::new(x, y, z), radius })
@@ -9,6 +9,10 @@ pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
 
 pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
     Cuboid { center, size }.form()
+}
+
+pub fn torus(ring: f64, tube: f64) -> Form {
+    TorusForm { scene_from_torus: DAffine3::IDENTITY, ring, tube }.into()
 }
 
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
@@ -88,11 +92,12 @@ pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64>
 fn random_solid(numbers: &mut Numbers) -> Form {
     let place = numbers.in_cube(0.8);
     let size = numbers.between(0.3, 1.2);
-    let form = match numbers.below(5) {
+    let form = match numbers.below(6) {
         0 => return Form::Sphere(SphereForm { center: place, radius: size }),
         1 => block([0.0; 3], [1.3, 0.9, 1.1]),
         2 => Form::conical_frustum(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
         3 => ball(0.0, 0.0, 0.0, 1.0),
+        4 => torus(1.0, 0.4),
         _ => Form::conical_frustum(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
     };
     let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
@@ -134,6 +139,10 @@ fn contains(part: &Form, p: DVec3) -> bool {
             (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
         }
         Form::Plane(PlaneForm { normal, offset }) => normal.dot(p) <= *offset,
+        Form::Torus(TorusForm { scene_from_torus, ring, tube }) => {
+            let q = scene_from_torus.inverse().transform_point3(p);
+            (q.x.hypot(q.z) - ring).hypot(q.y) <= *tube
+        }
         _ => unreachable!("no solid"),
     }
 }

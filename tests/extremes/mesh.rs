@@ -3,6 +3,7 @@
 use crate::harness::*;
 use rayon::prelude::*;
 use zerkalo::asset::Mesh;
+use zerkalo::primitive::triangle_mesh;
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
@@ -94,6 +95,11 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
         let lost = closest(&geometry, &lines).iter().filter(|hit| hit.is_none()).count();
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
+                let [together, alone] = [true, false].map(|packet| {
+                    let hit = triangle_mesh::closest_with(mesh, &ray, L::from_f64(L::MAX), packet);
+                    (0..count).map(|i| (hit.t.lane(i), hit.triangle.id_lane(i))).collect::<Vec<_>>()
+                });
+                assert!(together == alone, "{ray:?}: {together:?}, {alone:?}");
                 let blocked =
                     geometry.occluded(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
                 (0..count).filter(|lane| !blocked.lane(*lane)).count()

@@ -1,6 +1,8 @@
 //! Volumes of compounds from the chords of lines.
 
-use crate::extremes::compound::{ball, block, chords, difference, intersection, lines, union};
+use crate::extremes::compound::{
+    ball, block, chords, difference, intersection, lines, torus, union,
+};
 use crate::harness::*;
 
 /// Returns the volume of `form`, which is in the cube from -`half` to `half`, and the standard
@@ -78,6 +80,12 @@ fn extreme_09_volumes() {
             "napkin ring",
             difference(vec![ball(0.0, 0.0, 0.0, 1.0), rod([0.0, 2.0, 0.0], hole)]),
             PI * ring.powi(3) / 6.0,
+        ),
+        ("torus", torus(1.0, 0.4), 2.0 * PI * PI * 0.16),
+        (
+            "half a torus",
+            intersection(vec![torus(0.9, 0.45), half_space(DVec3::X, 0.0)]),
+            PI * PI * 0.9 * 0.45 * 0.45,
         ),
         (
             "Steinmetz",

@@ -52,17 +52,12 @@ fn d5_rectangle_light() {
     );
     let filled = |height: f64| {
         let side = 0.5 * height;
-        let scene = parsed(&format!(
-            "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-             [camera]\neye = [0.0, 0.1, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
-             view_angle.vertical = 0.1\n\
-             [materials.mirror]\nambient = 0.0\ndiffuse = 0.0\nspecular = 0.0\nreflection = 0.7\n\
-             lobe = \"cone\"\nroughness = 0.2\n\
-             [[light]]\nrectangle = {{ center = [0.0, {height:?}, 0.0], size = [{side:?}, {side:?}], \
-             normal = [0.0, -1.0, 0.0] }}\n\
-             [[object]]\nmaterial = \"mirror\"\n\
-             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [0.2, 0.2] }}\n"
-        ));
+        let light = format!(
+            "[[light]]\nrectangle = {{ center = [0.0, {height:?}, 0.0], size = [{side:?}, {side:?}], \
+             normal = [0.0, -1.0, 0.0] }}"
+        );
+        let mirror = "ambient = 0\ndiffuse = 0\nreflection = 0.7\nlobe = \"cone\"\nroughness = 0.2";
+        let scene = receiver(DVec3::Y, mirror, &light);
         (format!("height {height}"), scene, 0.7)
     };
     // A light that fills the cone lobe. Sampled points of the light and reflected rays both find

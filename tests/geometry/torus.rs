@@ -6,7 +6,7 @@
 //! - tori in compounds
 
 use crate::harness::*;
-use zerkalo::primitive::{BoundingVolume, CsgSolid, CsgTree, TorusForm};
+use zerkalo::primitive::{BoundingVolume, TorusForm};
 
 /// Ratios of the tube's radius to the ring's radius.
 const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];
@@ -143,54 +143,6 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Returns the distances of all hits along each line, in ascending order. The lines start outside
-/// of the object.
-fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
-    let mut out = vec![Vec::new(); lines.len()];
-    for (hits, (origin, d)) in out.iter_mut().zip(lines) {
-        let mut from = 0.0;
-        while let Some(hit) = closest(geometry, &[(*origin + *d * from, *d)])[0] {
-            hits.push(from + hit.t);
-            from += hit.t + 1e-9;
-            assert!(hits.len() < 16, "{origin} {d}: {hits:?}");
-        }
-    }
-    out
-}
-
-/// Returns lines along `d` through an even grid of `side` by `side` points. The grid is a square of
-/// half-width `half` around the origin, perpendicular to `d`.
-fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
-    let (u, v) = d.any_orthonormal_pair();
-    let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
-    (0..side * side).map(|i| (u * place(i % side) + v * place(i / side) - d * 5.0, d)).collect()
-}
-
-#[test]
-fn torus_volume_and_projected_area_match_closed_forms() {
-    for tube in [0.1, 0.4, 1.0] {
-        let geometry = geometry::<Double>(&torus(tube));
-        let (half, side) = (1.0 + tube, 300);
-        let cell = (2.0 * half / side as f64).powi(2);
-        let oblique = DVec3::new(0.3, 0.8, -0.5).normalize();
-        for (d, area) in [
-            (DVec3::Y, Some(4.0 * PI * tube)),
-            (DVec3::X, Some(4.0 * tube + PI * tube * tube)),
-            (oblique, None),
-        ] {
-            let hits = all_hits(&geometry, &grid(d, half, side));
-            let pairs = |hits: &Vec<f64>| hits.chunks(2).map(|pair| pair[1] - pair[0]).sum::<f64>();
-            let volume = hits.iter().map(pairs).sum::<f64>() * cell;
-            let expected = 2.0 * PI * PI * tube * tube;
-            assert!((volume / expected - 1.0).abs() < 3e-3, "{tube} {d}: {volume} {expected}");
-            let seen = hits.iter().filter(|hits| !hits.is_empty()).count() as f64 * cell;
-            if let Some(area) = area {
-                assert!((seen / area - 1.0).abs() < 3e-2, "{tube} {d}: {seen} {area}");
-            }
-        }
-    }
-}
-
 /// Checks that a shadow ray from the inner side of the ring across the hole is blocked by the
 /// opposite side.
 #[test]
@@ -231,60 +183,6 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
         check::<Single>(tube);
         check::<Double>(tube);
     }
-}
-
-/// Checks hits on compounds (CSG) of a torus, a ball and a half-space. A line has an odd number of
-/// hits before a point exactly if the point is inside the compound. The test compares both for the
-/// middle of each interval between two hits.
-#[test]
-fn torus_in_compounds_has_two_intervals() {
-    let contains = |part: usize, p: DVec3| match part {
-        0 => height(p, 0.35) <= 0.0,
-        1 => p.distance(DVec3::new(0.9, 0.1, 0.2)) <= 0.5,
-        _ => p.dot(DVec3::new(0.0, 0.6, 0.8)) <= 0.05,
-    };
-    let ball = SphereForm { center: DVec3::new(0.9, 0.1, 0.2), radius: 0.5 };
-    let parts: Vec<Form> = vec![
-        torus(0.35),
-        ball.into(),
-        PlaneForm { normal: DVec3::new(0.0, 0.6, 0.8), offset: 0.05 }.into(),
-    ];
-    let leaves = || vec![CsgTree::Part(0), CsgTree::Part(1)];
-    let mut numbers = Numbers::new(5);
-    let lines: Vec<Line> = (0..3000)
-        .map(|_| {
-            let d = numbers.direction();
-            (numbers.in_cube(1.2) - d * 5.0, d)
-        })
-        .collect();
-    type Inside<'a> = &'a dyn Fn(&[bool; 3]) -> bool;
-    let trees: [(CsgTree, Inside); 4] = [
-        (CsgTree::Union(leaves()), &|c| c[0] || c[1]),
-        (CsgTree::Intersection(leaves()), &|c| c[0] && c[1]),
-        (CsgTree::Difference(leaves()), &|c| c[0] && !c[1]),
-        (CsgTree::Difference(vec![CsgTree::Part(1), CsgTree::Part(0)]), &|c| c[1] && !c[0]),
-    ];
-    let mut several = 0;
-    for (tree, inside) in trees {
-        let swapped = matches!(&tree, CsgTree::Difference(list) if list[0] == CsgTree::Part(1));
-        let used =
-            if swapped { vec![parts[1].clone(), parts[0].clone()] } else { parts[..2].to_vec() };
-        let tree = if swapped { CsgTree::Difference(leaves()) } else { tree };
-        let cut = CsgTree::Intersection(vec![tree, CsgTree::Part(2)]);
-        let used = [used, vec![parts[2].clone()]].concat();
-        let form = Form::Csg(CsgSolid { parts: used, tree: cut });
-        for ((origin, d), hits) in lines.iter().zip(all_hits(&geometry::<Double>(&form), &lines)) {
-            assert!(hits.len().is_multiple_of(2), "{origin} {d} {hits:?}");
-            several += usize::from(hits.len() > 2);
-            let ends = [vec![0.0], hits, vec![12.0]].concat();
-            for (n, gap) in ends.windows(2).enumerate().filter(|(_, gap)| gap[1] - gap[0] > 1e-6) {
-                let p = *origin + *d * (0.5 * (gap[0] + gap[1]));
-                let in_parts = [0, 1, 2].map(|part| contains(part, p));
-                assert_eq!(inside(&in_parts) && in_parts[2], n % 2 == 1, "{origin} {d} {ends:?}");
-            }
-        }
-    }
-    assert!(several > 30, "{several}");
 }
 
 /// Checks bounds, clearance and normals of a torus under three affine maps. The bounds must touch

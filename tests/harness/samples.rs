@@ -21,6 +21,44 @@ pub fn steps(place: &DAffine3) -> String {
     )
 }
 
+/// Keys of a white diffuse material.
+pub const WHITE: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
+
+/// Returns the text of a scene whose only pixel shows a receiver at the origin. `material` has the
+/// keys of the receiver's material. `rest` is the text of further objects and lights; objects may
+/// have the materials `black`, `lamp` (black and emissive) and `front` (the same, one-sided).
+pub fn receiver_text(normal: DVec3, material: &str, rest: &str) -> String {
+    format!(
+        "film = {{ size = [1, 1], filter = \"point\" }}\n\
+         camera = {{ eye = {eye}, direction = {direction}, up = {up}, view_angle.vertical = 0.1 }}\n\
+         [materials.tested]\n{material}\n\
+         [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
+         [materials.lamp]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\n\
+         [materials.front]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\ntwo_sided = false\n\
+         [[object]]\nmaterial = \"tested\"\n\
+         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
+        eye = array(normal * 0.01),
+        direction = array(-normal),
+        up = array(normal.any_orthonormal_vector()),
+        normal = array(normal),
+    )
+}
+
+pub fn receiver(normal: DVec3, material: &str, rest: &str) -> Scene {
+    parsed(&receiver_text(normal, material, rest))
+}
+
+/// Returns the OBJ text of a box between two corners.
+pub fn obj_box(low: DVec3, high: DVec3) -> String {
+    let mut out = String::new();
+    for z in [low.z, high.z] {
+        for (x, y) in [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)] {
+            out += &format!("v {x} {y} {z}\n");
+        }
+    }
+    out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
+}
+
 /// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
 /// `first` on. The values of lanes outside of `active` have no meaning. The order of values is
 /// `[sample][group][channel]`.

@@ -15,4 +15,6 @@ mod transmission;
 
 pub use compare::*;
 pub use exact::*;
+pub use reflection::{facet_density, lambda};
 pub use tracer::{Mutation, Tracer};
+pub use transmission::reflectance;

@@ -34,6 +34,14 @@ fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     [((i - t).sin() / (i + t).sin()).powi(2), ((i - t).tan() / (i + t).tan()).powi(2)]
 }
 
+/// Returns the reflectance of unpolarised light. `c` is the cosine of the angle of incidence.
+pub fn reflectance(c: f64, n_i: f64, n_t: f64) -> f64 {
+    let i = c.clamp(0.0, 1.0).acos();
+    let sin_t = n_i / n_t * i.sin();
+    let t = (sin_t < 1.0).then(|| sin_t.asin());
+    polarised(i, t, n_i, n_t).iter().sum::<f64>() / 2.0
+}
+
 /// Returns the transmitting material that fills `body`. Returns `None` for an opaque body and for a
 /// surface without a volume.
 pub fn medium<'a>(scene: &'a Scene, body: &Body) -> Option<&'a Material> {
