@@ -125,27 +125,6 @@ fn extreme_29_stopped_and_resumed() {
     report(29, "both", "stopped and resumed: the same bytes");
 }
 
-#[test]
-fn sum_of_films_with_disjoint_tiles_is_the_whole_film() {
-    let scene = &scenes()[2].1;
-    let expected = film_of_samples(scene, Precision::Single, 16).bytes();
-    let pool = pool(2);
-    let films: Vec<Film> = (0..3)
-        .map(|share| {
-            let mut rendering = begin(scene, SEED, Precision::Single);
-            for replicate in [0, 1] {
-                let mut wave = wave(&rendering.film, replicate, 0, 16);
-                wave.jobs.retain(|job| job.tile % 3 == share);
-                trace(&mut rendering, &wave, &pool);
-            }
-            rendering.film
-        })
-        .collect();
-    let mut sum = Film::new(films[0].header().clone());
-    [2, 0, 1].into_iter().for_each(|i| sum.add(&films[i]).unwrap());
-    assert!(sum.bytes() == expected);
-}
-
 /// Checks that packets of one pixel and of several pixels trace the same samples. A wave is a set
 /// of concurrent tracing jobs. Waves of one sample make packets of several pixels; a wave of
 /// sixteen samples makes packets of one pixel.

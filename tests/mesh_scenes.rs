@@ -166,52 +166,6 @@ const VIEW: &str = "
     material = \"matt\"
 ";
 
-fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
-    let [width, height] = scene.film.size.map(|n| n as usize);
-    let world = AnyWorld::compile(scene, &Options { precision, ..Options::default() });
-    let points: Vec<[f64; 2]> = (0..width * height)
-        .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
-        .collect();
-    let mut seen = vec![FirstHit::MISS; points.len()];
-    world.first_hit(&points, &mut seen);
-    seen
-}
-
-#[test]
-fn sphere_mesh_hits_converge_to_sphere() {
-    let desk = Desk::new();
-    desk.put("ball.obj", &ball(200, 400));
-    let sphere =
-        desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
-    let mesh = desk.scene(&(VIEW.to_string() + "shape.mesh = { file = \"ball.obj\" }"));
-    for precision in [Precision::Single, Precision::Double] {
-        let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
-        let mut both = 0;
-        for (a, b) in a.iter().zip(&b) {
-            // The faces are at most 1 - cos(pi / 400) inside the sphere. The difference of the
-            // depths is largest at the silhouette.
-            let (n, m) =
-                (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
-            if a.object.is_some() && b.object.is_some() {
-                both += 1;
-                assert!((a.depth - b.depth).abs() < 0.01, "{a:?} {b:?}");
-                assert!(n.dot(m) > 0.995, "{a:?} {b:?}");
-            } else {
-                assert!(b.object.is_none(), "the mesh lies inside the sphere");
-            }
-        }
-        let sphere_pixels = a.iter().filter(|s| s.object.is_some()).count();
-        assert!(both * 100 > sphere_pixels * 99, "{both} of {sphere_pixels}");
-    }
-    let [sphere, smooth] = [&sphere, &mesh].map(|scene| rendered(scene, 7, Precision::Auto, 16));
-    let [sphere, smooth] = [&sphere, &smooth].map(|r| picture(r, Replicates::Both));
-    let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| {
-        a.iter().zip(b).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>() / a.len() as f64
-    };
-    let apart = difference(&sphere, &smooth);
-    assert!(apart < 1e-3, "{apart}");
-}
-
 /// Checks that a light inside a closed mesh lights no surface outside of it, neither with smooth
 /// nor with flat normals.
 #[test]
@@ -274,37 +228,6 @@ fn flat_normals_show_the_triangles() {
     };
     let (smooth, flat) = (apart(1), apart(2));
     assert!(smooth * 4.0 < flat, "{smooth} {flat}");
-}
-
-#[test]
-fn colours_of_the_file_multiply_the_materials() {
-    let desk = Desk::new();
-    desk.put("two.mtl", "newmtl a\nKd 0.5 0.25 0.0\nnewmtl b\nKd 0 0 0.5\n");
-    let square = "mtllib two.mtl\nv -1 -1 0\nv 0 -1 0\nv 1 -1 0\nv -1 1 0\nv 0 1 0\nv 1 1 0\n";
-    desk.put("two.obj", &format!("{square}usemtl a\nf 1 2 5 4\nusemtl b\nf 2 3 6 5\n"));
-    let text = "
-        film.size = [8, 8]
-        camera = { eye = [0.0, 0.0, 1.0], direction = [0.0, 0.0, -1.0], view_angle.vertical = 40.0 }
-        ambient.color = [1.0, 1.0, 1.0]
-        [materials.m]
-        color = [0.5, 0.5, 1.0]
-        ambient = 1.0
-        diffuse = 0.5
-        [[light]]
-        directional = { direction = [0.0, 0.0, -1.0] }
-        [[object]]
-        material = \"m\"
-        shape.mesh = { file = \"two.obj\" }
-    ";
-    let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Replicates::Both);
-    for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
-        for c in 0..3 {
-            // The ambient light contributes the colour once. The directional light contributes it
-            // with the diffuse coefficient 0.5.
-            let value = expected[c] * 1.5;
-            assert!((pixels[pixel][c] - value).abs() < 1e-4, "{pixel} {:?}", pixels[pixel]);
-        }
-    }
 }
 
 #[test]

@@ -13,5 +13,4 @@ mod prose;
 mod pty;
 mod scene_editing;
 mod scene_files;
-mod session;
 mod stories;

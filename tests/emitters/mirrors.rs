@@ -12,27 +12,9 @@ fn mirror(material: &str, light: &str) -> Scene {
     )
 }
 
-fn sphere(radius: f64) -> String {
-    format!("sphere = {{ center = [0.0, 1.0, 0.0], radius = {radius:?} }}")
-}
-
 /// Returns the solid angle of a sphere whose centre is at unit distance.
 fn solid_angle(radius: f64) -> f64 {
     TAU * (1.0 - (1.0 - radius * radius).sqrt())
-}
-
-#[test]
-fn camera_and_mirror_see_visible_lights_only() {
-    let perfect = "reflection = 0.5\nlobe = \"mirror\"";
-    for (visible, expected) in [(true, 0.5), (false, 0.0)] {
-        let light = format!("{}\nvisible = {visible}", sphere(0.2));
-        let (mean, error) = radiance::<Single>(&mirror(perfect, &light), 64, 1);
-        assert!((mean - expected).abs() < 1e-6 && error < 1e-6, "{visible}: {mean} ± {error}");
-    }
-    let mut direct = mirror(perfect, &sphere(0.2));
-    direct.camera.direction = Some([0.0, 1.0, 0.0]);
-    let (mean, error) = radiance::<Double>(&direct, 64, 1);
-    assert!((mean - 1.0).abs() < 1e-8 && error < 1e-8, "{mean} ± {error}");
 }
 
 /// Checks a rough pane with a cone lobe. The transmitted and the reflected radiance must be 0.7
@@ -42,7 +24,7 @@ fn camera_and_mirror_see_visible_lights_only() {
 #[test]
 fn rough_panes_find_small_lights_on_both_sides() {
     let mut cases = Vec::new();
-    for (roughness, radius) in [(0.1, 1e-3), (0.5, 1e-4), (0.5, 0.05), (0.5, 0.8f64)] {
+    for (roughness, radius) in [(0.1, 1e-3), (0.1, 0.3), (0.5, 1e-4), (0.5, 0.05), (0.5, 0.8f64)] {
         for (coefficient, below) in [("transmission", true), ("reflection", false)] {
             let material = format!(
                 "reflection = 0.0\ntransmission = 1e-6\n{coefficient} = 0.7\nlobe = \"cone\"\n\
@@ -64,19 +46,4 @@ fn rough_panes_find_small_lights_on_both_sides() {
         }
     }
     check_means(&cases, 1 << 14, [2e-3, 1e-6]);
-}
-
-#[test]
-fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
-    let mut cases = Vec::new();
-    for roughness in [0.01, 0.1, 0.5f64] {
-        for radius in [1e-4, 0.05, 0.3, 0.8] {
-            let material = format!("reflection = 0.7\nlobe = \"cone\"\nroughness = {roughness:?}");
-            let cone = TAU * (1.0 - roughness.atan().cos());
-            let expected = 0.7 * (solid_angle(radius) / cone).min(1.0);
-            let name = format!("roughness {roughness}, radius {radius}");
-            cases.push((name, mirror(&material, &sphere(radius)), expected));
-        }
-    }
-    check_means(&cases, 1 << 15, [2e-3, 1e-6]);
 }

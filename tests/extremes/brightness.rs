@@ -192,13 +192,3 @@ fn amplifying_mirrors_give_finite_white() {
         }
     }
 }
-
-#[test]
-fn distant_object_leaves_surface_near_lamp_unchanged() {
-    let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";
-    let far = "\n[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 9e8 }";
-    let alone = below_a_lamp(0.5, [0.0; 3], ball);
-    let both = below_a_lamp(0.5, [0.0; 3], &format!("{ball}{far}"));
-    let [alone, both] = [alone, both].map(|scene| mean(&rendered(&scene, 1, Precision::Double, 8)));
-    assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
-}

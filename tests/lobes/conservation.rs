@@ -173,43 +173,6 @@ fn mirror_is_reciprocal(material: &Material) {
     }
 }
 
-/// Checks Lambert's law in traced paths. The radiance, divided by the cosine of the angle between
-/// the normal and the direction to the light, is 0.5, the albedo, for a light of intensity 1. It
-/// stays the same if the directions to the light and to the eye are exchanged.
-#[test]
-fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
-    assert_eq!(
-        BsdfProperties::LAMBERT,
-        BsdfProperties { reciprocal: true, energy: Energy::Conserving }
-    );
-    let n = tilted_normal();
-    let radiance = |v: Vector, l: Vector| {
-        let eye = combine(&[(5.0, v)]);
-        let text = format!(
-            "camera = {{ eye = {eye:?}, target = [0.0, 0.0, 0.0], up = [0.1, 1.0, 0.2] }}
-             film = {{ size = [1, 1], filter = \"point\" }}
-             light = [{{ directional = {{ direction = {:?} }}, intensity = 1.0 }}]
-             materials.m = {{ color = [0.5, 0.5, 0.5], ambient = 0.0 }}
-             [[object]]
-             material = \"m\"
-             shape.plane = {{ point = [0.0, 0.0, 0.0], normal = {n:?} }}",
-            combine(&[(-1.0, l)])
-        );
-        let world = World::<Double>::new(&parsed(&text));
-        let settings = sobol(1);
-        let sampler = Sampler::new(settings, world.camera_dimensions());
-        trace_packet(&world, &sampler, (0, 0), 0, Double::mask(true))[0][0][0]
-    };
-    for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
-        // A light of intensity 1 gives the irradiance pi on a surface that faces it. `there` and
-        // `back` are therefore pi f = L / cos.
-        let (there, back) = (radiance(v, l) / dot(n, l), radiance(l, v) / dot(n, v));
-        assert!((there - back).abs() < 1e-12, "{there} {back}");
-        // Lambert's law is f = albedo / pi, so that pi f equals the albedo of 0.5.
-        assert!((there - 0.5).abs() < 1e-12, "{there}");
-    }
-}
-
 /// Returns the mean weight of sampled reflections. The angle of incidence is `degrees`, and the
 /// reflections are sampled with 65,536 Sobol points.
 fn mean_weight(material: &Material, degrees: f64) -> f64 {

@@ -22,12 +22,6 @@ pub struct BsdfProperties {
     pub energy: Energy,
 }
 
-impl BsdfProperties {
-    /// Properties of the diffuse model, Lambert's law f = albedo / pi. It is the only model that
-    /// has no name in scene files.
-    pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
-}
-
 pub trait ReflectionModel {
     /// Returns the properties of reflection by this model.
     fn properties(self) -> BsdfProperties;

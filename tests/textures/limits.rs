@@ -269,32 +269,3 @@ fn faces_in_edges_of_a_texture_have_one_color() {
         }
     }
 }
-
-#[test]
-fn textures_do_not_depend_on_packets() {
-    let mut glass = shipped("bump.toml");
-    let plaster = glass.materials.get_mut("plaster").unwrap();
-    (plaster.diffuse, plaster.reflection, plaster.transmission) = (0.0, 1.0, 1.0);
-    plaster.fresnel = Some(Fresnel::Dielectric);
-    let mut smooth = glass.clone();
-    smooth.materials.get_mut("plaster").unwrap().bump = None;
-    let whole = |scene: &Scene| shown(&sized(scene.clone(), [40, 30]), Precision::Single);
-    assert!(whole(&glass) != whole(&smooth), "bumps bend what is seen through glass");
-    let shipped = ["bump.toml", "texture-uv.toml"].map(|name| (name, shipped(name)));
-    for (name, scene) in shipped.into_iter().chain([("bumped glass", glass)]) {
-        let scene = sized(scene, [40, 30]);
-        for precision in [Precision::Single, Precision::Double] {
-            let whole = rendered(&scene, 1, precision, 16);
-            let mut single = begin(&scene, 1, precision);
-            let pool = pool(1);
-            for first in 0..16 {
-                uniform(&mut single, first, 1, &pool);
-            }
-            assert!(
-                picture(&whole, Replicates::Both) == picture(&single, Replicates::Both),
-                "{name}"
-            );
-            assert_eq!(whole.film.bad_samples().count, 0, "{name}");
-        }
-    }
-}
