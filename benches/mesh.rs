@@ -11,10 +11,10 @@ mod common;
 use common::{Random, ball, in_turns, towards};
 use std::hint::black_box;
 use std::time::Instant;
-use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::triangle_mesh;
+use zerkalo::primitive::Mesh;
+use zerkalo::primitive::mesh::intersection;
 
 /// Number of random rays in each measurement.
 const RAYS: usize = 1 << 19;
@@ -79,8 +79,8 @@ fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) ->
             let hits: u32 = rays
                 .iter()
                 .map(|ray| match as_packet {
-                    None => triangle_mesh::closest(mesh, ray, limit),
-                    Some(as_packet) => triangle_mesh::closest_with(mesh, ray, limit, as_packet),
+                    None => intersection::closest(mesh, ray, limit),
+                    Some(as_packet) => intersection::closest_with(mesh, ray, limit, as_packet),
                 })
                 .map(|hit| hit.t.lt(limit).bits().count_ones())
                 .sum();

@@ -3,8 +3,9 @@
 use crate::asset::error::AssetError;
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
-use crate::asset::mesh::{Mesh, TriangleMesh};
+use crate::asset::mesh;
 use crate::asset::radiance_map::RadianceMap;
+use crate::primitive::Mesh;
 use crate::process_memory::missing_memory;
 use crate::value::sort_by_number;
 use std::collections::HashMap;
@@ -170,9 +171,9 @@ impl Assets {
     /// Fails if the file cannot be read or is not a valid mesh.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
-            let needed = key.bytes.saturating_mul(TriangleMesh::parse_bytes(path));
+            let needed = key.bytes.saturating_mul(mesh::parse_bytes(path));
             check_memory(path, "the file", needed)?;
-            let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
+            let triangles = mesh::parse(self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
             let tree = format!("the BVH of {count} triangles");
             check_memory(path, &tree, (count as u64).saturating_mul(BUILD_BYTES))?;

@@ -24,5 +24,5 @@ pub use error::{AssetError, FileLocation};
 pub use file::MAX_BYTES;
 pub use image::{Image, MAX_PIXELS, MAX_SIDE};
 pub use loaded::Loaded;
-pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, TriangleBlock, TriangleMesh};
+pub use mesh::{MAX_TRIANGLES, MAX_VERTICES};
 pub use radiance_map::RadianceMap;

@@ -39,7 +39,7 @@ pub struct Hit<L> {
     /// Distance along the ray; `L::MAX` for a miss.
     pub t: L,
     /// Id of the primitive that the ray hits. Undefined for a miss.
-    pub item: L,
+    pub primitive: L,
     /// Id of the triangle that the ray hits, if the primitive is a mesh. Undefined for other
     /// primitives and for a miss.
     pub triangle: L,
@@ -50,25 +50,25 @@ impl<L: SimdFloat> Hit<L> {
     /// and [`Hit::merge`] accept only hits closer than `t`. A negative `t` marks an inactive lane.
     #[inline(always)]
     pub fn with_t_max(t: L) -> Self {
-        Self { t, item: L::from_id(0), triangle: L::from_id(0) }
+        Self { t, primitive: L::from_id(0), triangle: L::from_id(0) }
     }
 
     /// Replaces the distance, the primitive id and the triangle id of the hits in the lanes of the
     /// mask `lanes`.
     #[inline(always)]
-    pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, triangle): (L, L)) {
+    pub fn take_in(&mut self, lanes: L::Mask, t: L, (primitive, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);
-        self.item = L::select(lanes, item, self.item);
+        self.primitive = L::select(lanes, primitive, self.primitive);
         self.triangle = L::select(lanes, triangle, self.triangle);
     }
 
-    /// Accepts a hit on primitive `item` at distance `t` in the lanes of `mask` where `t` is
+    /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is
     /// positive and smaller than the distance of the hit in `self`.
     #[inline(always)]
-    pub fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
+    pub fn keep_closer(&mut self, mask: L::Mask, t: L, primitive: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
         self.t = L::select(nearer, t, self.t);
-        self.item = L::select(nearer, L::from_id(item), self.item);
+        self.primitive = L::select(nearer, L::from_id(primitive), self.primitive);
     }
 
     /// Accepts the hits of `other` that are closer than those of `self`, or equally close with a
@@ -80,10 +80,10 @@ impl<L: SimdFloat> Hit<L> {
         // The ids are compared only if there is a tie, which is rare. Ids are subnormal numbers if
         // read as floats, and some processors compare subnormal numbers slowly.
         if tie.any() {
-            nearer = nearer | (tie & other.item.lt(self.item));
+            nearer = nearer | (tie & other.primitive.lt(self.primitive));
         }
         self.t = L::select(nearer, other.t, self.t);
-        self.item = L::select(nearer, other.item, self.item);
+        self.primitive = L::select(nearer, other.primitive, self.primitive);
         self.triangle = L::select(nearer, other.triangle, self.triangle);
     }
 }

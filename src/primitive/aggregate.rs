@@ -7,8 +7,8 @@ use crate::primitive::batch::{
     LabelledBatch, PrimitiveBatch, PrimitiveId, SurfacePoint, UvGradients, compile,
 };
 use crate::primitive::form::Form;
-use crate::primitive::item_box::{Acceleration, ItemBox};
-use crate::primitive::mesh_instance::Meshes;
+use crate::primitive::mesh::instance::Meshes;
+use crate::primitive::primitive_box::PrimitiveBox;
 use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
@@ -22,6 +22,31 @@ use std::ops::Range;
 /// list of a tile, the BVH is faster from about 50 primitives on for coherent packets, and from
 /// about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
+
+/// Structure that an [`Aggregate`] uses to test rays against fewer primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AccelerationStructure {
+    /// No structure: primitives are tested one by one. The string is the name of such a list in the
+    /// inventory of the scene.
+    List(&'static str),
+    /// Bounding box of each primitive.
+    Boxes {
+        /// `true`: the boxes are in the object space of their primitives. `false`: the boxes are
+        /// axis-aligned in the scene.
+        oriented: bool,
+    },
+    /// BVH over all primitives with finite bounds.
+    Bvh,
+}
+
+impl AccelerationStructure {
+    /// Returns the faster structure by measurement: a BVH if at least [`BVH_MIN_PRIMITIVES`] of the
+    /// primitives have finite bounds, otherwise a list.
+    pub fn fastest(forms: &[Form]) -> Self {
+        let bounded = forms.iter().filter(|form| form.bounds().is_some()).count();
+        if bounded >= BVH_MIN_PRIMITIVES { Self::Bvh } else { Self::List("list") }
+    }
+}
 
 impl PrimitiveSet {
     /// Returns `true` if the set contains no primitive.
@@ -38,18 +63,17 @@ struct BatchRange<L: SimdFloat> {
     end: u32,
 }
 
-/// All primitives of a scene, compiled for one SIMD type. Primitives are numbered; a primitive of
-/// the aggregate is also called an *item*. Hits have the number of their item.
+/// All primitives of a scene, numbered, compiled for one SIMD type.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
     tree: Option<SceneBvh>,
     /// Primitives in the BVH, each as the index of its batch (the array of its kind) and its number
     /// in the batch.
-    tree_items: Vec<(u32, u32)>,
+    tree_primitives: Vec<(u32, u32)>,
     /// Bounding box of each primitive, which rays are tested against before the primitive itself;
     /// `None` for an infinite primitive. The list is empty if no boxes are used.
-    extents: Vec<Option<ItemBox<L::Scalar>>>,
+    extents: Vec<Option<PrimitiveBox<L::Scalar>>>,
     /// Origin of each primitive: the index of its canonical form in the list given to
     /// [`Aggregate::new`], and the number of the part if the form is a compound.
     source: Vec<PrimitiveId>,
@@ -68,47 +92,33 @@ pub struct PrimitiveSet {
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles the canonical forms `forms` to primitives, with a BVH if at least
-    /// [`BVH_MIN_PRIMITIVES`] of them have finite bounds.
+    /// Compiles the canonical forms `forms` to primitives, with the fastest structure.
     pub fn new(forms: &[Form]) -> Self {
-        Self::accelerated(forms, Acceleration::Auto)
+        Self::with_structure(forms, AccelerationStructure::fastest(forms))
     }
 
-    /// Compiles the canonical forms `forms` to primitives. If `tree` is `true`, a BVH holds all
-    /// bounded primitives; otherwise there is no BVH.
+    /// Compiles the canonical forms `forms` to primitives, with or without a BVH.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
-        Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
+        let list = AccelerationStructure::List("list");
+        Self::with_structure(forms, if tree { AccelerationStructure::Bvh } else { list })
     }
 
-    /// Compiles the canonical forms `forms` to primitives with the acceleration structure
-    /// `acceleration`.
-    pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
-        let is_large =
-            || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
-        let tree = match acceleration {
-            Acceleration::Auto => is_large(),
-            Acceleration::Bvh => true,
-            _ => false,
+    /// Compiles the canonical forms `forms` to primitives with the given structure.
+    pub fn with_structure(forms: &[Form], structure: AccelerationStructure) -> Self {
+        let (tree, how_listed) = match structure {
+            AccelerationStructure::Bvh => (true, "list"),
+            AccelerationStructure::List(name) => (false, name),
+            AccelerationStructure::Boxes { oriented: true } => (false, "boxes of their own"),
+            AccelerationStructure::Boxes { oriented: false } => (false, "boxes"),
         };
-        Self::compiled(forms, acceleration, tree)
-    }
-
-    fn compiled(forms: &[Form], acceleration: Acceleration, tree: bool) -> Self {
         let mut out = Self {
             parts: Vec::new(),
             all: PrimitiveSet::default(),
             tree: None,
-            tree_items: Vec::new(),
+            tree_primitives: Vec::new(),
             extents: Vec::new(),
             source: Vec::new(),
             counts: Vec::new(),
-        };
-        let how_listed = match acceleration {
-            Acceleration::Auto | Acceleration::Bvh => "list",
-            Acceleration::None => "bare list",
-            Acceleration::ScreenBounds => "screen rectangles",
-            Acceleration::Obb => "boxes of their own",
-            Acceleration::Aabb => "boxes",
         };
         let mut bounds = Vec::new();
         for LabelledBatch { batch, sources, noun, detail, infinite } in compile(forms) {
@@ -126,7 +136,7 @@ impl<L: SimdFloat> Aggregate<L> {
             if in_tree {
                 for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
                     bounds.extend(forms[source.form].bounds());
-                    out.tree_items.push((part, i as u32));
+                    out.tree_primitives.push((part, i as u32));
                 }
             } else {
                 out.all.ranges.push((part, 0..sources.len() as u32));
@@ -136,9 +146,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
         out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
-        if matches!(acceleration, Acceleration::Obb | Acceleration::Aabb) {
-            let oriented = acceleration == Acceleration::Obb;
-            let box_of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], oriented);
+        if let AccelerationStructure::Boxes { oriented } = structure {
+            let box_of = |source: &PrimitiveId| PrimitiveBox::new(&forms[source.form], oriented);
             out.extents = out.source.iter().map(box_of).collect();
         }
         out
@@ -161,14 +170,14 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns a set of two groups of primitives: those with the numbers `items`, which must be in
+    /// Returns a set of two groups of primitives: those with the numbers `primitives`, which must be in
     /// the BVH, and all primitives outside of the BVH. Rays are tested against each primitive of
     /// the set, without traversal of the BVH.
-    pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
+    pub fn select_indices(&self, primitives: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
-        for item in items {
-            let part = self.parts.partition_point(|part| part.end <= *item);
-            let i = item - self.parts[part].base;
+        for primitive in primitives {
+            let part = self.parts.partition_point(|part| part.end <= *primitive);
+            let i = primitive - self.parts[part].base;
             ranges.push((part as u32, i..i + 1));
         }
         ranges.sort_unstable_by_key(|(part, range)| (*part, range.start));
@@ -177,8 +186,8 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Returns the numbers of the primitives in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
-        let item = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
-        self.tree_items.iter().map(item).collect()
+        let primitive = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
+        self.tree_primitives.iter().map(primitive).collect()
     }
 
     /// Returns `true` if the aggregate has a BVH.
@@ -243,17 +252,18 @@ impl<L: SimdFloat> Aggregate<L> {
 
     #[inline(never)]
     fn closest_bvh(&self, tree: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
-        tree.traverse(ray, hit.t, |item, limit| {
-            let (part, i) = self.tree_items[item];
+        tree.traverse(ray, hit.t, |primitive, limit| {
+            let (part, i) = self.tree_primitives[primitive];
             let part = &self.parts[part as usize];
             // The limit is widened by rounding errors, so that hits at the distance of the current
             // hit are found, too. Of two hits at the same distance, `merge` keeps the primitive
             // with the lower number.
-            let mut item_hit = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
-            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut item_hit);
+            let mut primitive_hit = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
+            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut primitive_hit);
             // Inactive lanes have a negative limit; here they become misses.
-            item_hit.t = L::select(item_hit.t.gt(L::zero()), item_hit.t, L::from_f64(L::MAX));
-            hit.merge(&item_hit);
+            primitive_hit.t =
+                L::select(primitive_hit.t.gt(L::zero()), primitive_hit.t, L::from_f64(L::MAX));
+            hit.merge(&primitive_hit);
             hit.t
         });
         hit
@@ -266,7 +276,7 @@ impl<L: SimdFloat> Aggregate<L> {
     fn boxed<'a>(
         &'a self,
         set: &'a PrimitiveSet,
-    ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a ItemBox<L::Scalar>>)> {
+    ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a PrimitiveBox<L::Scalar>>)> {
         set.ranges.iter().flat_map(move |(part, range)| {
             let part = &self.parts[*part as usize];
             range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
@@ -349,7 +359,7 @@ impl<L: SimdFloat> Aggregate<L> {
     /// between 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
-        let (part, i) = self.tree_items[number as usize];
+        let (part, i) = self.tree_primitives[number as usize];
         self.parts[part as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
     }
 
@@ -363,35 +373,35 @@ impl<L: SimdFloat> Aggregate<L> {
         mut occluded: L::Mask,
     ) -> L::Mask {
         let limit_of = |occluded| L::select(wanted.and_not(occluded), limit, L::from_f64(-1.0));
-        tree.traverse(ray, limit_of(occluded), |item, left| {
+        tree.traverse(ray, limit_of(occluded), |primitive, left| {
             let open = left.gt(L::zero());
-            let new = self.occluded_by(item as u32, ray, left, open);
+            let new = self.occluded_by(primitive as u32, ray, left, open);
             occluded = occluded | (new & open);
             limit_of(occluded)
         });
         occluded
     }
 
-    /// Returns the hits of the rays with primitive number `item` that are nearer than `limit`. If
-    /// `item` is the first part of a compound, these are the hits with the whole compound.
-    pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
-        let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
-        let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
+    /// Returns the hits of the rays with `primitive` that are nearer than `limit`. If
+    /// `primitive` is the first part of a compound, these are the hits with the whole compound.
+    pub fn closest_to(&self, primitive: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
+        let part = &self.parts[self.parts.partition_point(|part| part.end <= primitive)];
+        let (i, mut hit) = ((primitive - part.base) as usize, Hit::with_t_max(limit));
         part.batch.closest(i..i + 1, part.base, ray, &mut hit);
         hit
     }
 
-    /// Returns the projection of `point` onto the surface of primitive `item`, with the normal
+    /// Returns the projection of `point` onto the surface of `primitive`, with the normal
     /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
     /// the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
-    pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
+    pub fn surface(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
-            if item < part.end {
-                return part.batch.surface((item - part.base) as usize, triangle_tag, point);
+            if primitive < part.end {
+                return part.batch.surface((primitive - part.base) as usize, triangle_tag, point);
             }
         }
-        unreachable!("every item belongs to a part")
+        unreachable!("every primitive belongs to a part")
     }
 
     /// Returns two values: all mesh primitives of the aggregate, and the number of the first one.
@@ -415,38 +425,38 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal of primitive `item` at a hit point. `triangle_tag` is the id of
+    /// Returns the shading normal of `primitive` at a hit point. `triangle_tag` is the id of
     /// the hit triangle if the primitive is a mesh. `at` has two vectors: the hit point, and the
     /// geometric normal on the viewer's side. `direction` is the direction of the rays. The angles
     /// of the shading normal to the geometric normal and to the direction of the viewer are below
     /// 90 degrees.
     pub fn shading_normal(
         &self,
-        (item, triangle_tag): (u32, L),
+        (primitive, triangle_tag): (u32, L),
         at: (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
         match self.meshes() {
-            Some((meshes, base)) if item >= base => {
-                meshes.shading_normal((item - base) as usize, triangle_tag, at, direction)
+            Some((meshes, base)) if primitive >= base => {
+                meshes.shading_normal((primitive - base) as usize, triangle_tag, at, direction)
             }
             _ => at.1,
         }
     }
 
-    /// Returns the colour that the mesh file of primitive `item` gives to the triangle with the id
+    /// Returns the colour that the mesh file of `primitive` gives to the triangle with the id
     /// `triangle_tag`. Returns `None` if the primitive is no mesh, or if the file has no colours.
-    pub fn color(&self, item: u32, triangle_tag: L) -> Option<Vec3<L>> {
+    pub fn color(&self, primitive: u32, triangle_tag: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
-        (item >= base).then(|| meshes.color((item - base) as usize, triangle_tag))?
+        (primitive >= base).then(|| meshes.color((primitive - base) as usize, triangle_tag))?
     }
 
-    /// Returns the texture coordinates that the geometry of primitive `item` defines at `point`;
+    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`;
     /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
     /// primitive is a mesh.
-    pub fn uv(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
-        part.batch.uv((item - part.base) as usize, triangle_tag, point)
+    pub fn uv(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        let part = &self.parts[self.parts.partition_point(|part| part.end <= primitive)];
+        part.batch.uv((primitive - part.base) as usize, triangle_tag, point)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg::Compounds;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
-use crate::primitive::mesh_instance::Meshes;
+use crate::primitive::mesh::instance::Meshes;
 use crate::primitive::parallelogram::Parallelogram;
 use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;
@@ -64,10 +64,10 @@ pub trait Primitive<L: SimdFloat> {
 }
 
 macro_rules! batches {
-    ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
+    ($($(#[$doc:meta])+ $kind:ident($primitive:ident)),+ $(,)?) => {
         /// Batch: all primitives of one kind, compiled for one SIMD type.
         pub enum PrimitiveBatch<L: SimdFloat> {
-            $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
+            $($(#[$doc])+ $kind(Vec<$primitive<L::Scalar>>),)+
             /// Batch of compound solids (CSG). Each part of a compound counts as a primitive.
             Compounds(Compounds<L::Scalar>),
             /// Batch of triangle meshes; each mesh is one primitive.
@@ -77,10 +77,10 @@ macro_rules! batches {
         /// Evaluates one of three expressions for a [`PrimitiveBatch`]: the first for an array of
         /// primitives, the second for compounds, the third for meshes.
         macro_rules! each {
-            ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
+            ($batch:expr, $primitives:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
                 match $batch {
-                    $(PrimitiveBatch::$kind($items) => $value,)+
+                    $(PrimitiveBatch::$kind($primitives) => $value,)+
                     PrimitiveBatch::Compounds($compounds) => $other,
                     PrimitiveBatch::Meshes($meshes) => $third,
                 }
@@ -92,11 +92,11 @@ macro_rules! batches {
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
-                let items = forms.iter().enumerate().filter_map(|(form, f)| {
-                    Some((PrimitiveId { form, part: 0 }, $item::new(f)?))
+                let primitives = forms.iter().enumerate().filter_map(|(form, f)| {
+                    Some((PrimitiveId { form, part: 0 }, $primitive::new(f)?))
                 });
-                let (sources, items): (Vec<_>, Vec<_>) = items.unzip();
-                out.extend(LabelledBatch::new(PrimitiveBatch::$kind(items), sources, forms));
+                let (sources, primitives): (Vec<_>, Vec<_>) = primitives.unzip();
+                out.extend(LabelledBatch::new(PrimitiveBatch::$kind(primitives), sources, forms));
             )+
             let sources_of = |wanted: fn(&Form) -> bool| -> Vec<_> {
                 let matching = forms.iter().enumerate().filter(|(_, f)| wanted(f));
@@ -142,7 +142,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
-            items => closest(&items[range.clone()], base + range.start as u32, ray, hit),
+            primitives => closest(&primitives[range.clone()], base + range.start as u32, ray, hit),
             compounds => compounds.closest(range, base, ray, hit),
             meshes => meshes.closest(range, base, ray, hit));
     }
@@ -158,37 +158,42 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
         wanted: L::Mask,
     ) -> L::Mask {
         each!(self,
-            items => occluded(&items[range], ray, limit, wanted),
+            primitives => occluded(&primitives[range], ray, limit, wanted),
             compounds => compounds.occluded(range, ray, limit, wanted),
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// Returns the projection of `point` onto the surface of primitive `item`, with the normal
+    /// Returns the projection of `point` onto the surface of `primitive`, with the normal
     /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
     /// the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
-    pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
+    pub fn surface(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
-            items => items[item].surface(point),
-            compounds => compounds.surface(item, point),
-            meshes => meshes.surface(item, triangle_tag, point))
+            primitives => primitives[primitive].surface(point),
+            compounds => compounds.surface(primitive, point),
+            meshes => meshes.surface(primitive, triangle_tag, point))
     }
 
-    /// Returns the texture coordinates that the geometry of primitive `item` defines at `point`;
+    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`;
     /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
     /// primitive is a mesh.
-    pub fn uv(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    pub fn uv(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         each!(self,
-            items => items[item].uv(point),
-            compounds => compounds.uv(item, point),
-            meshes => meshes.uv(item, triangle_tag, point))
+            primitives => primitives[primitive].uv(point),
+            compounds => compounds.uv(primitive, point),
+            meshes => meshes.uv(primitive, triangle_tag, point))
     }
 }
 
 #[inline(always)]
-fn closest<L: SimdFloat>(items: &[impl Primitive<L>], first: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-    for (tag, item) in (first..).zip(items) {
-        if let Some((t, meets)) = item.intersect(ray) {
+fn closest<L: SimdFloat>(
+    primitives: &[impl Primitive<L>],
+    first: u32,
+    ray: &Ray<L>,
+    hit: &mut Hit<L>,
+) {
+    for (tag, primitive) in (first..).zip(primitives) {
+        if let Some((t, meets)) = primitive.intersect(ray) {
             hit.keep_closer(meets, t, tag);
         }
     }
@@ -196,14 +201,14 @@ fn closest<L: SimdFloat>(items: &[impl Primitive<L>], first: u32, ray: &Ray<L>, 
 
 #[inline(always)]
 fn occluded<L: SimdFloat>(
-    items: &[impl Primitive<L>],
+    primitives: &[impl Primitive<L>],
     ray: &Ray<L>,
     limit: L,
     wanted: L::Mask,
 ) -> L::Mask {
     let mut occluded = L::mask(false);
-    for item in items {
-        if let Some((t, meets)) = item.intersect(ray) {
+    for primitive in primitives {
+        if let Some((t, meets)) = primitive.intersect(ray) {
             occluded = occluded | (meets & t.gt(L::zero()) & t.lt(limit));
             if wanted.and_not(occluded).none() {
                 break;

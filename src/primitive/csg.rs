@@ -55,9 +55,9 @@ macro_rules! leaves {
 
         /// Evaluates one expression for the solid in any variant of [`CsgLeaf`].
         macro_rules! each {
-            ($solid:expr, $item:ident => $value:expr) => {
+            ($solid:expr, $primitive:ident => $value:expr) => {
                 match $solid {
-                    $(CsgLeaf::$kind($item) => $value,)+
+                    $(CsgLeaf::$kind($primitive) => $value,)+
                 }
             };
         }
@@ -359,7 +359,7 @@ impl<S: Float> Compounds<S> {
                 let ahead = changed & seen.t.gt(L::zero());
                 let nearer = ahead & seen.t.lt(hit.t);
                 hit.t = L::select(nearer, seen.t, hit.t);
-                hit.item = L::select(nearer, seen.tag, hit.item);
+                hit.primitive = L::select(nearer, seen.tag, hit.primitive);
                 open = open.and_not(ahead);
             }
             // In these lanes all further surfaces are farther than the hit.

@@ -9,7 +9,7 @@ use crate::primitive::conical_frustum::ConicalFrustumForm;
 use crate::primitive::convex_polyhedron::ConvexPolyhedronForm;
 use crate::primitive::csg_tree::CsgSolid;
 use crate::primitive::ellipsoid::EllipsoidForm;
-use crate::primitive::mesh_instance::MeshForm;
+use crate::primitive::mesh::instance::MeshForm;
 use crate::primitive::parallelogram::ParallelogramForm;
 use crate::primitive::plane::PlaneForm;
 use crate::primitive::sphere::SphereForm;

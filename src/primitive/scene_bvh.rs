@@ -6,7 +6,7 @@ use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
 use crate::bvh::single::traverse_rays;
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::item_box::padded;
+use crate::primitive::primitive_box::padded;
 use glam::DVec3;
 
 /// Coherence limit of the scene's BVH: it determines which packets of rays traverse the BVH as a
@@ -28,7 +28,7 @@ const COHERENCE_LIMIT: f64 = 1.5;
 pub struct SceneBvh {
     boxes: Bvh8,
     /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
-    items: Vec<u32>,
+    primitives: Vec<u32>,
     /// Bound for coherent packets, divided by the number of lanes: the largest length of the
     /// difference between the directions of a ray and of the packet's first active ray.
     turn: f64,
@@ -48,15 +48,15 @@ impl SceneBvh {
         };
         let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(bounds.len(), corners, 1, BuildQuality::MEDIUM);
-        let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
+        let primitives = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
         let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
         let high = bounds.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);
         let turn = COHERENCE_LIMIT / (bounds.len() as f64).sqrt();
-        Self { boxes, items, turn, shift: turn * (high - low).max_element() }
+        Self { boxes, primitives, turn, shift: turn * (high - low).max_element() }
     }
 
-    /// Calls `leaf(item, limit)` for the primitives whose boxes a ray may enter at a distance up to
-    /// its `limit`, approximately from near to far. `item` is the position of the primitive's box
+    /// Calls `leaf(primitive, limit)` for the primitives whose boxes a ray may enter at a distance up to
+    /// its `limit`, approximately from near to far. `primitive` is the position of the primitive's box
     /// in the list given to [`SceneBvh::new`]. `leaf` returns the new limits. Boxes entered at
     /// exactly the limit are visited, too. Lanes whose limit is not positive are inactive.
     #[inline(always)]
@@ -78,7 +78,7 @@ impl SceneBvh {
         let boxes = &self.boxes;
         if self.is_coherent(ray, wanted) {
             let bounds = PacketBounds::around(&packet, wanted);
-            let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
+            let leaf = |number: usize, limit| leaf(self.primitives[number] as usize, limit);
             return with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
                 traverse_packet(boxes, (&packet, bounds.as_ref()), limit, stack, leaf)
             });
@@ -88,7 +88,7 @@ impl SceneBvh {
             let number_of = L::from_f64(lane as f64);
             let lane_mask = numbers.le(number_of) & numbers.ge(number_of);
             let limit = L::select(lane_mask, L::splat(limit), L::from_f64(-1.0));
-            leaf(self.items[number] as usize, limit).lane(lane)
+            leaf(self.primitives[number] as usize, limit).lane(lane)
         };
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
             traverse_rays(boxes, (&packet, limit), wanted, stack, |_| (), leaf)

@@ -5,6 +5,7 @@
 //! without such an edit. A render session (the rendering thread) therefore validates the scene that
 //! it is given.
 
+mod acceleration;
 mod asset_resolver;
 mod builtin;
 mod contents_hash;
@@ -20,9 +21,9 @@ mod recovery;
 mod settings;
 mod validate;
 
-pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
+pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
 pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};

@@ -1,6 +1,6 @@
 //! Settings of the whole picture: film, integrator, background, ambient light.
 
-use crate::primitive::Acceleration;
+use crate::scene::Acceleration;
 use crate::value::{Color, choices, description};
 
 description! {

@@ -1,7 +1,7 @@
 //! Triangle meshes from files.
 
-use crate::asset::{AssetError, Loaded, Mesh, TriangleMesh};
-use crate::primitive::{Form, MeshForm};
+use crate::asset::{AssetError, Loaded};
+use crate::primitive::{Form, Mesh, MeshForm, TriangleMesh};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{ValidationError, choices, description};
 use glam::{DAffine3, DVec3};

@@ -24,7 +24,7 @@ pub(crate) use field::names;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::{Fnv1a64, fnv1a64};
 pub use number_range::{NumberRange, number};
-pub use order::{ascending, insertion_sort, sort_by_number, total_order};
+pub use order::{ascending, sort_by_number, total_order};
 pub use round::{floor_log10, round_fine, round_nice, round_significant, rounded_to, turned};
 pub use text::{sanitized, truncated};
 pub(crate) use toml_value::{TableReader, choice, one_of, only_entry, written};

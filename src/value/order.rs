@@ -1,7 +1,7 @@
 //! Stable sorting with little machine code.
 //!
 //! The sorts of the standard library are compiled for each type of items and keys, into 8 KB each.
-//! The functions of this module sort numbers only, or few items.
+//! The functions of this module sort numbers only.
 
 /// Sorts `items` by ascending keys. Items with equal keys keep their order.
 pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
@@ -18,18 +18,6 @@ pub fn ascending(keys: Vec<i64>) -> Vec<usize> {
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Sorts the few `items` by ascending keys. Items with equal keys keep their order. The time grows
-/// with the square of the number of items.
-pub fn insertion_sort<T>(items: &mut [T], key: impl Fn(&T) -> f64) {
-    for end in 1..items.len() {
-        let mut i = end;
-        while i > 0 && key(&items[i]).total_cmp(&key(&items[i - 1])).is_lt() {
-            items.swap(i - 1, i);
-            i -= 1;
-        }
-    }
-}
-
 /// Converts `x` to an integer. The integers of two numbers have the order that [`f64::total_cmp`]
 /// gives the numbers.
 pub fn total_order(x: f64) -> i64 {
@@ -40,7 +28,7 @@ pub fn total_order(x: f64) -> i64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{insertion_sort, sort_by_number, total_order};
+    use super::{sort_by_number, total_order};
 
     #[test]
     fn items_with_equal_numbers_keep_their_order() {
@@ -48,11 +36,8 @@ mod tests {
             [3, -1, 3, 0, -1, i64::MIN].into_iter().zip(0..).collect();
         let mut sorted = items.clone();
         sorted.sort_by_key(|(key, _)| *key);
-        let mut few = items.clone();
         sort_by_number(&mut items, |(key, _)| *key);
         assert_eq!(items, sorted);
-        insertion_sort(&mut few, |(key, _)| *key as f64);
-        assert_eq!(few, sorted);
     }
 
     #[test]

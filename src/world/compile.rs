@@ -6,9 +6,9 @@ use crate::lanes::{Float, SimdFloat};
 use crate::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
-    Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
+    AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
-use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
+use crate::scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
@@ -363,9 +363,9 @@ impl<S: Float> CompiledCulling<S> {
                     if scene.trace.ray_types >= RayTypes::Shadows {
                         light_buffers = culler.light_buffers(geometry);
                     }
-                    let project = |item: u32| {
-                        let form = form_of(&geometry.sources()[item as usize]);
-                        (item, ScreenBounds::project(form, camera))
+                    let project = |primitive: u32| {
+                        let form = form_of(&geometry.sources()[primitive as usize]);
+                        (primitive, ScreenBounds::project(form, camera))
                     };
                     let bounds = geometry.in_tree().into_iter().map(project);
                     let size = scene.film.size.map(|n| n as usize);
@@ -416,7 +416,15 @@ impl<L: SimdFloat> World<L> {
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye());
         let recentered = moved.as_ref().unwrap_or(recentered);
-        let geometry = Aggregate::accelerated(&recentered.forms, scene.trace.acceleration);
+        let structure = match scene.trace.acceleration {
+            Acceleration::Auto => AccelerationStructure::fastest(&recentered.forms),
+            Acceleration::None => AccelerationStructure::List("bare list"),
+            Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
+            Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
+            Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
+            Acceleration::Bvh => AccelerationStructure::Bvh,
+        };
+        let geometry = Aggregate::with_structure(&recentered.forms, structure);
         let primitives = geometry.sources();
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let material_of = |id: &PrimitiveId| materials.material(id);

@@ -180,7 +180,7 @@ impl CompiledObjects<'_> {
         if hit.t >= f64::MAX {
             return None;
         }
-        let normal = alone.surface(hit.item.id_lane(0), hit.triangle, ray.at(hit.t)).normal;
+        let normal = alone.surface(hit.primitive.id_lane(0), hit.triangle, ray.at(hit.t)).normal;
         Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
     }
 

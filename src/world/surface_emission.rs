@@ -137,11 +137,11 @@ impl<S: Float> SurfaceEmission<S> {
     ) -> L::Mask {
         let lift = L::splat(self.lift) * L::from_f64(CONTACT_LIFTS);
         let mut covered = L::mask(false);
-        for (item, flat) in touching {
+        for (primitive, flat) in touching {
             let limit = L::select(lanes, L::from_f64(L::MAX), L::from_f64(-1.0));
-            let hit = geometry.closest_to(*item, ray, limit);
+            let hit = geometry.closest_to(*primitive, ray, limit);
             let mut found = lanes & hit.t.lt(limit);
-            while let Some((part, part_lanes)) = next_distinct(hit.item, found) {
+            while let Some((part, part_lanes)) = next_distinct(hit.primitive, found) {
                 found = found.and_not(part_lanes);
                 let normal = geometry.surface(part, hit.triangle, ray.at(hit.t)).normal;
                 // The cosine is positive where a ray leaves a solid, because normals point
@@ -167,10 +167,10 @@ impl<S: Float> SurfaceEmission<S> {
         [self.sampled, self.sources.len() - self.sampled]
     }
 
-    /// Returns the emission of primitive `item`. Returns `None` if it emits nothing.
+    /// Returns the emission of `primitive`. Returns `None` if it emits nothing.
     #[inline(always)]
-    pub fn of_item(&self, item: u32) -> Option<&EmissiveSource<S>> {
-        let source = *self.source_of.get(item as usize)?;
+    pub fn of_primitive(&self, primitive: u32) -> Option<&EmissiveSource<S>> {
+        let source = *self.source_of.get(primitive as usize)?;
         Some(&self.sources[source? as usize])
     }
 
@@ -203,8 +203,8 @@ fn touching_objects(
     let emits: HashSet<usize> = objects.iter().map(|(form, ..)| *form).collect();
     let mut touching: HashMap<usize, Vec<(u32, bool)>> = HashMap::new();
     let mut first = vec![0; forms.len()];
-    for (item, source) in (0..).zip(primitives).filter(|(_, source)| source.part == 0) {
-        first[source.form] = item;
+    for (primitive, source) in (0..).zip(primitives).filter(|(_, source)| source.part == 0) {
+        first[source.form] = primitive;
     }
     let is_behind = |form: usize| forms[form].is_flat() || is_entered(form);
     let wanted = |a: usize, b: usize| {

@@ -127,8 +127,8 @@ fn coincident_faces_show_the_first_part() {
         let line = (from, (at - from).normalize());
         let (ray, _) = packets::<Single>(&[line]).next().unwrap();
         let hit = geometry.closest(&ray, geometry.all());
-        let item = geometry.sources()[hit.item.id_lane(0) as usize];
-        assert_eq!((item.form, item.part), (0, 0), "{line:?}");
+        let primitive = geometry.sources()[hit.primitive.id_lane(0) as usize];
+        assert_eq!((primitive.form, primitive.part), (0, 0), "{line:?}");
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::harness::*;
 use rayon::prelude::*;
-use zerkalo::asset::Mesh;
-use zerkalo::primitive::triangle_mesh;
+use zerkalo::primitive::Mesh;
+use zerkalo::primitive::mesh::intersection;
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
@@ -96,7 +96,7 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
                 let [together, alone] = [true, false].map(|packet| {
-                    let hit = triangle_mesh::closest_with(mesh, &ray, L::from_f64(L::MAX), packet);
+                    let hit = intersection::closest_with(mesh, &ray, L::from_f64(L::MAX), packet);
                     (0..count).map(|i| (hit.t.lane(i), hit.triangle.id_lane(i))).collect::<Vec<_>>()
                 });
                 assert!(together == alone, "{ray:?}: {together:?}, {alone:?}");

@@ -57,7 +57,11 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
             if !hit_mask.lane(i) {
                 continue;
             }
-            assert!(hit.item.id_lane(i) == ray_hit.item.id_lane(0), "item: {}", context());
+            assert!(
+                hit.primitive.id_lane(i) == ray_hit.primitive.id_lane(0),
+                "primitive: {}",
+                context()
+            );
             let s = surface(&narrow, &ray, &ray_hit);
             let equal = same3(packet_surface.point, s.point, i)
                 && same3(packet_surface.normal, s.normal, i)

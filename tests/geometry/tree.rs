@@ -3,7 +3,7 @@
 
 use crate::geometry::bits::{any_line, forms};
 use crate::harness::*;
-use zerkalo::primitive::Acceleration;
+use zerkalo::primitive::AccelerationStructure;
 
 /// Returns `count` random primitives of every kind, crowded in a cube of half-width 10. In half of
 /// the cases they are on a lattice, where many faces are coplanar.
@@ -34,15 +34,19 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
 
 fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
     let list = Aggregate::<L>::with_tree(forms, false);
-    for acceleration in [Acceleration::Bvh, Acceleration::Obb, Acceleration::Aabb] {
-        let other = Aggregate::<L>::accelerated(forms, acceleration);
-        compare_with(seed, (acceleration.name(), count), (&list, &other), lines);
+    for structure in [
+        AccelerationStructure::Bvh,
+        AccelerationStructure::Boxes { oriented: true },
+        AccelerationStructure::Boxes { oriented: false },
+    ] {
+        let other = Aggregate::<L>::with_structure(forms, structure);
+        compare_with(seed, (structure, count), (&list, &other), lines);
     }
 }
 
 fn compare_with<L: SimdFloat>(
     seed: u64,
-    (acceleration, count): (&str, usize),
+    (structure, count): (AccelerationStructure, usize),
     (list, tree): (&Aggregate<L>, &Aggregate<L>),
     lines: &[Line],
 ) {
@@ -59,22 +63,25 @@ fn compare_with<L: SimdFloat>(
         for i in 0..lanes {
             let context = || {
                 let (o, d) = (packet.origin.lane(i), packet.direction.lane(i));
-                format!("{} {acceleration}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
+                format!(
+                    "{} {structure:?}, seed {seed}, {count} primitives, ray {o:?} {d:?}",
+                    L::NAME
+                )
             };
             let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
             assert!(s == t, "{}: list {s}, tree {t}", context());
             assert!(
-                s >= L::MAX || a.item.id_lane(i) == b.item.id_lane(i),
+                s >= L::MAX || a.primitive.id_lane(i) == b.primitive.id_lane(i),
                 "{}: at {s} list hits {}, tree {}",
                 context(),
-                a.item.id_lane(i),
-                b.item.id_lane(i)
+                a.primitive.id_lane(i),
+                b.primitive.id_lane(i)
             );
         }
         assert_eq!(
             c.bits(),
             d.bits(),
-            "{} {acceleration}, seed {seed}, {count} items: blocked",
+            "{} {structure:?}, seed {seed}, {count} primitives: blocked",
             L::NAME
         );
     }

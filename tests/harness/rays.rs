@@ -44,13 +44,13 @@ pub fn surface<L: SimdFloat>(
         SurfacePoint { point: ray.at(hit.t), normal: Vec3::zero(), max_coordinate: L::zero() };
     let mut pending = hit.t.lt(L::from_f64(L::MAX));
     while pending.any() {
-        let item = hit.item.id_lane(pending.bits().trailing_zeros() as usize);
-        let item_mask = pending & hit.item.id_eq(item);
-        let one = geometry.surface(item, hit.triangle, ray.at(hit.t));
-        all.point = Vec3::select(item_mask, one.point, all.point);
-        all.normal = Vec3::select(item_mask, one.normal, all.normal);
-        all.max_coordinate = L::select(item_mask, one.max_coordinate, all.max_coordinate);
-        pending = pending.and_not(item_mask);
+        let primitive = hit.primitive.id_lane(pending.bits().trailing_zeros() as usize);
+        let primitive_mask = pending & hit.primitive.id_eq(primitive);
+        let one = geometry.surface(primitive, hit.triangle, ray.at(hit.t));
+        all.point = Vec3::select(primitive_mask, one.point, all.point);
+        all.normal = Vec3::select(primitive_mask, one.normal, all.normal);
+        all.max_coordinate = L::select(primitive_mask, one.max_coordinate, all.max_coordinate);
+        pending = pending.and_not(primitive_mask);
     }
     all
 }
@@ -65,7 +65,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
         out.extend((0..count).map(|i| {
             hit_mask.lane(i).then(|| LineHit {
                 t: hit.t.lane(i).to_f64(),
-                form: geometry.sources()[hit.item.id_lane(i) as usize].form,
+                form: geometry.sources()[hit.primitive.id_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
                 normal: to_dvec3(surface.normal, i),
             })

@@ -40,7 +40,8 @@ fn check_slab<L: SimdFloat>() -> f64 {
             let from = ray.origin;
             for (n_i, n_t) in [(1.0, n), (n, 1.0)] {
                 let hit = geometry.closest(&ray, geometry.all());
-                let surface = geometry.surface(hit.item.id_lane(0), hit.triangle, ray.at(hit.t));
+                let surface =
+                    geometry.surface(hit.primitive.id_lane(0), hit.triangle, ray.at(hit.t));
                 let entering = number(surface.normal.dot(ray.direction)) < 0.0;
                 assert_eq!(entering, n_i == 1.0 && number(ray.origin.z) > 0.0, "{n} {i}");
                 let normal = if entering { surface.normal } else { -surface.normal };

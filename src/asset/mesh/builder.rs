@@ -3,8 +3,9 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::normals::smooth;
-use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES};
+use crate::primitive::TriangleMesh;
+use crate::primitive::mesh::smooth;
 use glam::DVec3;
 use std::collections::HashMap;
 

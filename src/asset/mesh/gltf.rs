@@ -8,8 +8,8 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
+use crate::primitive::TriangleMesh;
 use crate::value::truncated;
 use base64::Engine;
 use glam::{DAffine3, DMat4, DVec3};

@@ -6,8 +6,8 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::Builder;
+use crate::primitive::TriangleMesh;
 use crate::value::truncated;
 use std::cell::RefCell;
 use std::io::{BufRead, Read};

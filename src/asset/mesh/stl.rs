@@ -4,8 +4,8 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
+use crate::primitive::TriangleMesh;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
 /// Number of bytes of the header of a binary STL file.

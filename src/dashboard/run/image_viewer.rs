@@ -4,12 +4,14 @@ use crate::dashboard::message::Message;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::image_upload::ImageUpload;
+use crate::dashboard::run::shrink::shrunk;
 use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
-use crate::film::Display;
+use crate::film::{Display, png_of_rgb, read_exr, read_png};
+use crate::terminal::cells::Raster;
 use crate::terminal::image::{ImageViewport, Protocol, ViewerImage};
 use crate::terminal::{Capabilities, cell_px};
 use crossbeam_channel::Sender;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -38,13 +40,35 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
 pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
     let (requested, failed) = (path.clone(), results.clone());
     let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
-        let image = ViewerImage::read(&path, &display, &viewport).map(Arc::new);
+        let image = viewer_image(&path, &display, &viewport).map(Arc::new);
         // Sending fails only at the end of the program, when the receiver is gone.
         let _ = results.send(Message::ViewerImage(path, image));
     });
     if let Err(error) = started {
         let _ = failed.send(Message::ViewerImage(requested, Err(error.to_string())));
     }
+}
+
+/// Reads the image at `path`, then scales and encodes it for `viewport`. `display` converts the
+/// linear light of an EXR file to 8-bit levels.
+fn viewer_image(
+    path: &Path,
+    display: &Display,
+    viewport: &ImageViewport,
+) -> Result<ViewerImage, String> {
+    let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
+        let picture = read_exr(path)?;
+        (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
+    } else {
+        read_png(path)?
+    };
+    let layout = viewport.layout(size)?;
+    let shown = shrunk(&Raster { width: size[0], height: size[1], pixels }, layout.shown);
+    let halves = shrunk(&shown, layout.halves);
+    ViewerImage::encode(viewport, layout, &shown, halves, |image| {
+        let size = layout.shown.map(|n| n as u32);
+        png_of_rgb(size, image.pixels.as_flattened()).map_err(|error| error.to_string())
+    })
 }
 
 impl Dashboard {

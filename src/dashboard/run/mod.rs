@@ -15,6 +15,7 @@ mod input;
 mod job_control;
 mod latency;
 mod shared_file;
+mod shrink;
 mod signals;
 mod watch_runner;
 mod worker;

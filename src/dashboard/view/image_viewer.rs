@@ -33,7 +33,7 @@ pub fn draw(
     row.put(&short_name(&viewed.path), theme.text()).put("  ", theme.dim());
     row.put(&important, theme.text()).put("  ·  any key returns", theme.accent());
     row.put(more, theme.dim());
-    let place = image.place;
+    let place = image.layout.place;
     if viewed.sent >= 1.0 && image.placeholder(0).is_some() {
         for at in place.intersection(buffer.area).positions() {
             if let Some((symbol, color)) = image.placeholder(at.y - place.y) {
@@ -51,10 +51,10 @@ pub fn draw(
 /// hint names the command that lists what the terminal needs to show sharper images. The hint is
 /// empty if the terminal supports an image protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
-    let [width, height] = image.size;
+    let [width, height] = image.layout.size;
     let whole = format!("{width}×{height}");
-    let size = match image.shown {
-        [w, h] if [w, h] == image.size => whole,
+    let size = match image.layout.shown {
+        [w, h] if [w, h] == image.layout.size => whole,
         _ if image.protocol == Protocol::Blocks => format!("{whole} in half blocks"),
         [w, h] => format!("{w}×{h} of {whole}"),
     };

@@ -70,7 +70,9 @@ impl View {
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
             let cells = image_viewer::draw(model, viewed, &theme, buffer);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
-                (Some(cells), Some(image)) => picture::visible_mask(&cells, image.place, buffer),
+                (Some(cells), Some(image)) => {
+                    picture::visible_mask(&cells, image.layout.place, buffer)
+                }
                 _ => (Rect::ZERO, Vec::new()),
             };
             return None;

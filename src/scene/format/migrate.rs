@@ -2,7 +2,7 @@
 //! are called former words. Reading treats a former word like the present word; saving writes the
 //! present word.
 
-use crate::primitive::Acceleration;
+use crate::scene::Acceleration;
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::{line_column, subject_in};

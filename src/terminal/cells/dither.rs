@@ -5,7 +5,7 @@
 //! sorted by lightness, and the position of the pixel in an ordered pattern selects one of them.
 
 use crate::terminal::cells::Raster;
-use crate::terminal::cells::oklab::{code, linear};
+use crate::terminal::cells::oklab::{level, linear};
 use crate::terminal::cells::palette_quantisation::{nearest_xterm, xterm_lightness, xterm_rgb};
 
 /// Number of palette colours that are mixed for a pixel, one per position of the dither pattern.
@@ -45,7 +45,7 @@ fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
     let mut missing = [0.0f32; 3];
     let mut mixed = [0; MIXED];
     for index in &mut mixed {
-        let goal = [0, 1, 2].map(|c| code(target[c] + STRENGTH * missing[c]));
+        let goal = [0, 1, 2].map(|c| level(target[c] + STRENGTH * missing[c]));
         *index = nearest_xterm(goal);
         let chosen = linear(xterm_rgb(*index));
         (0..3).for_each(|c| missing[c] += target[c] - chosen[c]);

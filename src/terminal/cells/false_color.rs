@@ -93,7 +93,7 @@ fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     loop {
         let linear = linear_from_oklab(lightness, chroma * hue.cos(), chroma * hue.sin());
         if chroma < 0.005 || linear.iter().all(|c| (0.0..=1.0).contains(c)) {
-            return linear.map(|c| crate::terminal::cells::oklab::code(c as f32));
+            return linear.map(|c| crate::terminal::cells::oklab::level(c as f32));
         }
         chroma *= 0.95;
     }

@@ -1,6 +1,6 @@
 //! Picture cells in 16 colours, or without colours, with shading glyphs of different density.
 
-use crate::terminal::cells::oklab::{Oklab, code, linear};
+use crate::terminal::cells::oklab::{Oklab, level, linear};
 use crate::terminal::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
 use crate::terminal::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
 use ratatui::style::Color;
@@ -83,7 +83,7 @@ pub fn nearest(rgb: [u8; 3]) -> u8 {
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
-    let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
+    let shade = SHADED.nearest([0, 1, 2].map(|c| level(0.5 * (a[c] + b[c]))));
     // If the halves have similar colours, a half block gains too little over a shading glyph.
     if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];

@@ -12,8 +12,7 @@ mod palette_quantisation;
 
 pub use false_color::{NO_HIT, Scale, difference, magnitude, normal_color, object_color};
 pub use mosaic::blocks;
-pub use oklab::Oklab;
-pub(crate) use oklab::{code, linear};
+pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
 use palette_quantisation::xterm_rgb;
 use ratatui::style::Color;

@@ -1,6 +1,6 @@
 //! Mosaic: an image of large blocks, each of one colour, which needs few bytes.
 
-use crate::terminal::cells::oklab::{code, linear};
+use crate::terminal::cells::oklab::{level, linear};
 
 /// Replaces the colour of each half cell by the mean of its block, in linear light. A half cell is
 /// the upper or lower half of a terminal cell, and a block is a square of `side` x `side` half
@@ -21,7 +21,7 @@ pub fn blocks(pixels: &[Option<[u8; 3]>], width: usize, side: usize) -> Vec<Opti
         }
     }
     let means: Vec<_> =
-        sums.iter().map(|(sum, n)| (*n > 0).then(|| sum.map(|s| code(s / *n as f32)))).collect();
+        sums.iter().map(|(sum, n)| (*n > 0).then(|| sum.map(|s| level(s / *n as f32)))).collect();
     (0..pixels.len()).map(|i| pixels[i].and_then(|_| means.get(block(i)).copied()?)).collect()
 }
 

@@ -3,7 +3,6 @@
 //! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
 //! linear sRGB as he published them in 2021.
 
-use crate::value::linear_from_srgb;
 use std::sync::LazyLock;
 
 /// Colour in the OKLab colour space.
@@ -18,18 +17,22 @@ pub struct Oklab {
 }
 
 /// Linear light, 0..=1, of each 8-bit sRGB level (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
+static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|level| match level as f64 / 255.0 {
+        level if level <= 0.04045 => (level / 12.92) as f32,
+        level => ((level + 0.055) / 1.055).powf(2.4) as f32,
+    })
+});
 
 /// Converts 8-bit sRGB to linear light, 0..=1.
-pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
+pub fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let table = &*LINEAR;
-    rgb.map(|code| table[usize::from(code)])
+    rgb.map(|level| table[usize::from(level)])
 }
 
 /// Converts linear light to the nearest 8-bit sRGB level, by the distance in linear light. `linear`
 /// is clamped to 0..=1.
-pub(crate) fn code(linear: f32) -> u8 {
+pub fn level(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
     let below = above.saturating_sub(1);
@@ -110,11 +113,11 @@ mod tests {
     #[test]
     fn levels_and_linear_light_round_trip() {
         for c in 0..=255u8 {
-            assert_eq!(code(linear([c; 3])[0]), c);
+            assert_eq!(level(linear([c; 3])[0]), c);
         }
-        assert_eq!([code(-1.0), code(2.0), code(f32::NAN)], [0, 255, 0]);
+        assert_eq!([level(-1.0), level(2.0), level(f32::NAN)], [0, 255, 0]);
         // The threshold between two levels is the midpoint of their linear light.
         let [low, high] = [100, 101].map(|c| linear([c; 3])[0]);
-        assert_eq!([code(0.51 * low + 0.49 * high), code(0.49 * low + 0.51 * high)], [100, 101]);
+        assert_eq!([level(0.51 * low + 0.49 * high), level(0.49 * low + 0.51 * high)], [100, 101]);
     }
 }

@@ -1,21 +1,17 @@
-//! Images for the viewer of exported pictures. An image is read from its file and encoded for the
-//! terminal by kitty's protocol, by sixel, or as half blocks.
+//! Images for the viewer of exported pictures, encoded for the terminal by kitty's protocol, by sixel,
+//! or as half blocks.
 //!
 //! An image is sent in slices within the byte budget of a frame, because a transfer can take
 //! seconds and a key must take effect in tenths of a second. Existing widgets for images send an
 //! image as a whole and are therefore not used.
 
 mod kitty;
-mod shrink;
 mod sixel;
 mod transfer;
 
-use crate::film::{Display, png_of_rgb, read_exr, read_png};
 use crate::terminal::cells::Raster;
 use crate::terminal::{Capabilities, Multiplexer};
 use ratatui::layout::Rect;
-use shrink::shrunk;
-use std::path::Path;
 pub use transfer::Transfer;
 
 /// Largest width and height of a sixel image in pixels if the terminal reports no limit: the limit
@@ -58,21 +54,30 @@ pub struct ImageViewport {
     pub max_bytes: Option<f64>,
 }
 
+/// Size and place of an image in an [`ImageViewport`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageLayout {
+    /// Width and height of the image in the file, in pixels.
+    pub size: [usize; 2],
+    /// Width and height of the displayed image, in pixels; at most `size`.
+    pub shown: [usize; 2],
+    /// Width and height of the half blocks that show the image, in pixels of half blocks. If the
+    /// image is also shown by an image protocol, they fill only the cells that it covers fully.
+    pub halves: [usize; 2],
+    /// Cells that the image covers, fully or in part.
+    pub place: Rect,
+}
+
 /// Image that was scaled and encoded for the screen of an [`ImageViewport`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
     /// Columns and rows of the screen for which the image was scaled and encoded.
     pub screen: [u16; 2],
-    /// Width and height of the image in the file, in pixels.
-    pub size: [usize; 2],
-    /// Width and height of the displayed image, in pixels.
-    pub shown: [usize; 2],
     /// Protocol by which the image is shown.
     pub protocol: Protocol,
-    /// Cells that the image covers, fully or in part.
-    pub place: Rect,
-    /// Half blocks that show the image. If the image is also shown by an image protocol, the half
-    /// blocks fill only the cells that the image covers fully.
+    /// Size and place of the image on the screen.
+    pub layout: ImageLayout,
+    /// Half blocks that show the image.
     pub raster: Raster,
     /// Bytes that show the image by the protocol. Empty for [`Protocol::Blocks`].
     pub transfer: Transfer,
@@ -107,30 +112,60 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns two sizes in pixels as `[width, height]`: first the largest size of an image on the
-    /// screen, then the size of a cell. If the image is shown by half blocks, a pixel is half of a
-    /// cell.
-    fn px(&self) -> ([usize; 2], [usize; 2]) {
-        let cell = match self.protocol {
+    /// Returns width and height of a cell in pixels. If the image is shown by half blocks, a pixel is
+    /// half of a cell.
+    fn cell(&self) -> [usize; 2] {
+        match self.protocol {
             Protocol::Blocks => [1, 2],
             _ => self.cell_px.unwrap_or(CELL_PX).map(|px| usize::from(px.max(1))),
-        };
+        }
+    }
+
+    /// Returns the largest width and height of an image on the screen, in pixels.
+    fn largest(&self) -> [usize; 2] {
+        let cell = self.cell();
         let rows = match self.protocol {
             Protocol::KittyThroughTmux => (self.screen[1] - 1).min(kitty::MAX_ROWS),
             _ => self.screen[1] - 1,
         };
-        let mut largest = [usize::from(self.screen[0]) * cell[0], usize::from(rows) * cell[1]];
-        if let Protocol::Sixel(_) = self.protocol {
-            let limit = self.sixel_px.map_or([SIXEL_PX; 2], |px| px.map(usize::from));
-            largest = [0, 1].map(|i| largest[i].min(limit[i]));
+        let largest = [usize::from(self.screen[0]) * cell[0], usize::from(rows) * cell[1]];
+        match self.protocol {
+            Protocol::Sixel(_) => {
+                let limit = self.sixel_px.map_or([SIXEL_PX; 2], |px| px.map(usize::from));
+                [0, 1].map(|i| largest[i].min(limit[i]))
+            }
+            _ => largest,
         }
-        (largest, cell)
+    }
+
+    /// Returns size and place of an image of `size` (width, height) pixels.
+    ///
+    /// # Errors
+    /// Fails if the image is empty or the screen is too small.
+    pub fn layout(&self, size: [usize; 2]) -> Result<ImageLayout, String> {
+        if size.contains(&0) || self.screen[1] < 2 {
+            return Err("the screen is too small for a picture".to_string());
+        }
+        let (cell, shown) = (self.cell(), self.fitting(size));
+        let [width, height] = [0, 1].map(|i| shown[i].div_ceil(cell[i]) as u16);
+        let x = self.screen[0].saturating_sub(width) / 2;
+        let y = (self.screen[1] - 1).saturating_sub(height) / 2;
+        let halves = match self.protocol {
+            Protocol::Blocks => shown,
+            _ => {
+                // In cells at the edges of the image, half blocks would remain visible beside the
+                // image.
+                let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
+                [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])]
+            }
+        };
+        Ok(ImageLayout { size, shown, halves, place: Rect { x, y, width, height } })
     }
 
     /// Returns the displayed size in pixels of an image of `size` pixels, scaled down to fit on the
     /// screen. Images are never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
-        let (largest, _) = self.px();
+        let largest = self.largest();
         let [width, height] = size.map(|n| n as f64);
         let mut scale = f64::min(largest[0] as f64 / width, largest[1] as f64 / height).min(1.0);
         if let (Some(bytes), true) = (self.max_bytes, self.protocol != Protocol::Blocks) {
@@ -141,57 +176,31 @@ impl ImageViewport {
 }
 
 impl ViewerImage {
-    /// Reads the image at `path`, then scales and encodes it for `viewport`. `display` converts the
-    /// linear light of an EXR file to 8-bit levels.
+    /// Encodes an image for `viewport`, in which it has `layout`. `image` has the displayed size and
+    /// `raster` the size of the half blocks. `png` encodes `image` as a PNG file, if the protocol
+    /// sends one.
     ///
     /// # Errors
-    /// Fails if the file cannot be read or the screen is too small.
-    pub fn read(path: &Path, display: &Display, viewport: &ImageViewport) -> Result<Self, String> {
-        let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
-            let picture = read_exr(path)?;
-            (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
-        } else {
-            read_png(path)?
-        };
-        Self::of(size, &pixels, viewport)
-    }
-
-    /// Scales and encodes an image of `size` (width, height) pixels for `viewport`. `pixels` are
-    /// row by row.
-    fn of(size: [usize; 2], pixels: &[[u8; 3]], viewport: &ImageViewport) -> Result<Self, String> {
-        if size.contains(&0) || viewport.screen[1] < 2 {
-            return Err("the screen is too small for a picture".to_string());
-        }
-        let (_, cell) = viewport.px();
-        let shown = viewport.fitting(size);
-        let small = shrunk(pixels, size, shown);
-        let [width, height] = [0, 1].map(|i| shown[i].div_ceil(cell[i]) as u16);
-        let x = viewport.screen[0].saturating_sub(width) / 2;
-        let y = (viewport.screen[1] - 1).saturating_sub(height) / 2;
-        let place = Rect { x, y, width, height };
-        let transfer = match viewport.protocol {
+    /// Fails if the image cannot be encoded.
+    pub fn encode(
+        viewport: &ImageViewport,
+        layout: ImageLayout,
+        image: &Raster,
+        raster: Raster,
+        png: impl FnOnce(&Raster) -> Result<Vec<u8>, String>,
+    ) -> Result<Self, String> {
+        let ImageViewport { protocol, screen, cell_px, .. } = *viewport;
+        let transfer = match protocol {
             Protocol::Blocks => Transfer::default(),
-            Protocol::Sixel(colors) => sixel::transfer(&small, shown[0], place, cell[1], colors)?,
+            Protocol::Sixel(colors) => {
+                sixel::transfer(image, layout.place, viewport.cell()[1], colors)?
+            }
             Protocol::Kitty | Protocol::KittyThroughTmux => {
-                let size = shown.map(|n| n as u32);
-                let png = png_of_rgb(size, small.as_flattened()).map_err(|e| e.to_string())?;
-                let through_tmux = viewport.protocol == Protocol::KittyThroughTmux;
-                kitty::transfer(&png, place, viewport.cell_px.is_none(), through_tmux)
+                let through_tmux = protocol == Protocol::KittyThroughTmux;
+                kitty::transfer(&png(image)?, layout.place, cell_px.is_none(), through_tmux)
             }
         };
-        let raster = match viewport.protocol {
-            Protocol::Blocks => Raster { width: shown[0], height: shown[1], pixels: small },
-            _ => {
-                // Half blocks fill only cells that the image will cover completely. In cells at the
-                // edges of the image they would remain visible beside the image.
-                let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
-                let halves = [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])];
-                let pixels = shrunk(&small, shown, halves);
-                Raster { width: halves[0], height: halves[1], pixels }
-            }
-        };
-        let ImageViewport { protocol, screen, .. } = *viewport;
-        Ok(Self { screen, size, shown, protocol, place, raster, transfer })
+        Ok(Self { screen, protocol, layout, raster, transfer })
     }
 
     /// Returns `(text, color)` for each cell in row `row` of `place`. `text` is a placeholder
@@ -242,17 +251,20 @@ mod tests {
         {
             for size in [[64, 48], [1100, 300], [1, 700], [999, 2]] {
                 let viewport = ImageViewport { protocol, ..WINDOW };
-                let pixels = vec![[9, 8, 7]; size[0] * size[1]];
-                let image = ViewerImage::of(size, &pixels, &viewport).unwrap();
-                let Rect { x, y, width, height } = image.place;
-                assert!(x + width <= 100 && y + height <= 30, "{:?}", image.place);
+                let layout = viewport.layout(size).unwrap();
+                let plain =
+                    |[width, height]: [usize; 2]| Raster::from_fn(width, height, |_| [9; 3]);
+                let (image, raster) = (plain(layout.shown), plain(layout.halves));
+                let png = |image: &Raster| Ok(vec![0; image.pixels.len()]);
+                let image = ViewerImage::encode(&viewport, layout, &image, raster, png).unwrap();
+                let Rect { x, y, width, height } = layout.place;
+                assert!(x + width <= 100 && y + height <= 30, "{:?}", layout.place);
                 assert!((100 - width).abs_diff(2 * x) <= 1 && (30 - height).abs_diff(2 * y) <= 1);
                 assert!(image.raster.width <= width.into());
                 assert!(image.raster.height <= 2 * usize::from(height));
                 assert_eq!(image.transfer.bytes.is_empty(), protocol == Protocol::Blocks);
-                assert!(image.raster.pixels.iter().all(|p| *p == [9, 8, 7]));
             }
         }
-        assert!(ViewerImage::of([0, 5], &[], &WINDOW).is_err());
+        assert!(WINDOW.layout([0, 5]).is_err());
     }
 }

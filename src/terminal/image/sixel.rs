@@ -1,5 +1,6 @@
 //! Sixel: an image is sent in horizontal strips, each with its own palette.
 
+use crate::terminal::cells::Raster;
 use crate::terminal::image::transfer::Transfer;
 use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
@@ -9,16 +10,14 @@ use ratatui::layout::Rect;
 /// its own, and xterm keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
-/// Returns the bytes that show an image at `place`. `pixels` are the pixels of the image in rows of
-/// `width`. `cell_height` is the height of a cell in pixels. The image is sent in strips of one or
+/// Returns the bytes that show `image` at `place`. `cell_height` is the height of a cell in pixels. The image is sent in strips of one or
 /// more rows of cells; `colors` is the largest number of colours of a strip. Other output can be
 /// sent between strips.
 ///
 /// # Errors
 /// Fails if the image is empty.
 pub fn transfer(
-    pixels: &[[u8; 3]],
-    width: usize,
+    image: &Raster,
     place: Rect,
     cell_height: usize,
     colors: u16,
@@ -26,7 +25,8 @@ pub fn transfer(
     let mut transfer = Transfer { divisible: true, destroys: true, ..Transfer::default() };
     let rows = place.height.div_ceil(MAX_STRIPS).max(1);
     let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
-    let strips = pixels.chunks(width.max(1) * cell_height * usize::from(rows));
+    let width = image.width;
+    let strips = image.pixels.chunks(width.max(1) * cell_height * usize::from(rows));
     for (strip, row) in strips.zip((place.y..).step_by(usize::from(rows))) {
         let rgba: Vec<u8> = strip.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
         let strip = sixel_encode(&rgba, width, strip.len() / width, &options)
@@ -45,9 +45,9 @@ mod tests {
     fn strips_decode_to_the_image() {
         let (width, height) = (50, 100);
         let pixel = |i: usize| [(5 * (i % width)) as u8, (2 * (i / width)) as u8, 90];
-        let pixels: Vec<_> = (0..width * height).map(pixel).collect();
+        let image = Raster::from_fn(width, height, pixel);
         let place = Rect { x: 2, y: 3, width: 7, height: 7 };
-        let transfer = transfer(&pixels, width, place, 16, 256).unwrap();
+        let transfer = transfer(&image, place, 16, 256).unwrap();
         let text = String::from_utf8(transfer.bytes.clone()).unwrap();
         let strips: Vec<_> = text.split("\x1b[").skip(1).collect();
         assert_eq!((strips.len(), transfer.stops.len()), (7, 7));
@@ -62,11 +62,12 @@ mod tests {
             let drawn = image.pixels[..].chunks_exact(4).filter(|pixel| pixel[3] > 0);
             shown.extend(drawn.map(|p| [p[0], p[1], p[2]]));
         }
-        assert_eq!(shown.len(), pixels.len());
+        assert_eq!(shown.len(), image.pixels.len());
         let difference = |(a, b): (&[u8; 3], &[u8; 3])| {
             (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0
         };
-        let mean = shown.iter().zip(&pixels).map(difference).sum::<f64>() / pixels.len() as f64;
+        let total: f64 = shown.iter().zip(&image.pixels).map(difference).sum();
+        let mean = total / shown.len() as f64;
         assert!(mean < 6.0, "mean error of {mean} levels");
     }
 
@@ -74,8 +75,8 @@ mod tests {
     fn number_of_strips_is_bounded() {
         for rows in 1..70 {
             let place = Rect { x: 0, y: 0, width: 1, height: rows };
-            let pixels = vec![[1, 2, 3]; 6 * 6 * usize::from(rows)];
-            let transfer = transfer(&pixels, 6, place, 6, 16).unwrap();
+            let image = Raster::from_fn(6, 6 * usize::from(rows), |_| [1, 2, 3]);
+            let transfer = transfer(&image, place, 6, 16).unwrap();
             assert!(transfer.stops.len() <= usize::from(MAX_STRIPS), "{rows}");
         }
     }

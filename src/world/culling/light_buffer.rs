@@ -12,9 +12,9 @@ use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 /// the light. If more primitives overlap the cell, those closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for a primitive against which all shadow rays are tested,
+/// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested,
 /// because it can occlude even shadow rays that start on the outside of the primitive itself.
-const NO_ITEM: u32 = u32::MAX;
+const NO_PRIMITIVE: u32 = u32::MAX;
 
 /// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a
 /// square of a grid over the projection from the light, that is, a range of directions from the
@@ -55,7 +55,7 @@ pub(crate) struct Occluder {
     pub ball: BoundingSphere,
     /// Id of the primitive if shadow rays that start on its outside cannot hit it again. `None` if
     /// they can.
-    pub exempt_item: Option<u32>,
+    pub exempt_primitive: Option<u32>,
 }
 
 #[derive(Clone, Copy)]
@@ -63,8 +63,8 @@ struct Entry<S> {
     /// Index of the occluding primitive among those in the scene's BVH.
     number: u32,
     /// Id of the primitive if it cannot occlude shadow rays that start on its own outside;
-    /// [`NO_ITEM`] if it can.
-    exempt_item: u32,
+    /// [`NO_PRIMITIVE`] if it can.
+    exempt_primitive: u32,
     /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
     /// a point light. For a directional light it is the coordinate of the point along the direction
     /// in which the light travels, with 0 at the origin.
@@ -107,14 +107,14 @@ impl<S: Float> LightBuffer<S> {
         let mut overflowed = 0;
         for number in order {
             let near = S::from_f64(near[number]);
-            let exempt_item = occluders[number].exempt_item.unwrap_or(NO_ITEM);
+            let exempt_primitive = occluders[number].exempt_primitive.unwrap_or(NO_PRIMITIVE);
             // Number of cells that hold the occluder, minus the number of cells that are too full
             // for it.
             let mut balance = 0;
             for cell in rects[number].iter().flat_map(|rect| rect.cells(side)) {
                 if counts[cell] < MAX_PER_CELL {
                     counts[cell] += 1;
-                    placed.push((cell, Entry { number: number as u32, exempt_item, near }));
+                    placed.push((cell, Entry { number: number as u32, exempt_primitive, near }));
                     balance += 1;
                 } else {
                     complete_to[cell] =
@@ -136,7 +136,7 @@ impl<S: Float> LightBuffer<S> {
             cell
         };
         let mut cells: Vec<Cell<S>> = counts.iter().zip(&complete_to).map(cell).collect();
-        let empty = Entry { number: 0, exempt_item: NO_ITEM, near: S::default() };
+        let empty = Entry { number: 0, exempt_primitive: NO_PRIMITIVE, near: S::default() };
         let mut entries = vec![empty; placed.len()];
         for (cell, entry) in placed {
             entries[cells[cell].end as usize] = entry;
@@ -147,7 +147,7 @@ impl<S: Float> LightBuffer<S> {
 
     /// Returns the lanes of `active` whose ray is occluded: it hits a primitive nearer than
     /// `t_max`. The result equals that of [`Aggregate::occluded`] for `candidates`, the possible
-    /// occluders. The rays start on the primitives with the ids `start_item`. In the lanes
+    /// occluders. The rays start on the primitives with the ids `start_primitive`. In the lanes
     /// `starts_outside` they start on the outside of these primitives.
     ///
     /// The rays are passed by reference, because with a copy of them the render of the scene
@@ -157,7 +157,7 @@ impl<S: Float> LightBuffer<S> {
         &self,
         geometry: &Aggregate<L>,
         ray: &Ray<L>,
-        (start_item, starts_outside): (L, L::Mask),
+        (start_primitive, starts_outside): (L, L::Mask),
         t_max: L,
         active: L::Mask,
         candidates: &PrimitiveSet,
@@ -169,8 +169,10 @@ impl<S: Float> LightBuffer<S> {
         let mut remaining = active.and_not(occluded | use_bvh);
         let (cell, depth) = self.projection.lookup(ray, t_max, self.side);
         // Primitive on whose outside all rays start, if there is a single one.
-        let common_start = match next_distinct(start_item, active) {
-            Some((item, lanes)) if active.and_not(lanes & starts_outside).none() => Some(item),
+        let common_start = match next_distinct(start_primitive, active) {
+            Some((primitive, lanes)) if active.and_not(lanes & starts_outside).none() => {
+                Some(primitive)
+            }
             _ => None,
         };
         while remaining.any() {
@@ -190,7 +192,7 @@ impl<S: Float> LightBuffer<S> {
                 if entry.near > max_depth {
                     break;
                 }
-                if common_start == Some(entry.exempt_item) {
+                if common_start == Some(entry.exempt_primitive) {
                     continue;
                 }
                 let unoccluded = active.and_not(occluded);
@@ -224,7 +226,10 @@ mod tests {
     }
 
     fn occluders(balls: &[BoundingSphere]) -> Vec<Occluder> {
-        (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, exempt_item: Some(i) }).collect()
+        (0..)
+            .zip(balls)
+            .map(|(i, ball)| Occluder { ball: *ball, exempt_primitive: Some(i) })
+            .collect()
     }
 
     /// Checks that the light buffer of `target` and the BVH find the same shadows for rays from
@@ -272,14 +277,14 @@ mod tests {
             let normal = |a: usize| L::from_fn(|i| L::Scalar::from_f64(normals[i][a]));
             let facing = Vec3::new(normal(0), normal(1), normal(2)).dot(direction);
             let active = facing.gt(L::zero());
-            let (first_item, second_item) =
+            let (first_primitive, second_primitive) =
                 (L::from_id(ball_of(0) as u32), L::from_id(ball_of(1) as u32));
             let odd = L::from_fn(|i| L::Scalar::from_f64((i % 2) as f64)).gt(L::zero());
-            let (start_item, starts_outside) =
-                (L::select(odd, second_item, first_item), L::mask(round % 6 >= 4));
+            let (start_primitive, starts_outside) =
+                (L::select(odd, second_primitive, first_primitive), L::mask(round % 6 >= 4));
             let all = geometry.all();
             let expected = geometry.occluded(&ray, t_max, active, all) & active;
-            let start = (start_item, starts_outside);
+            let start = (start_primitive, starts_outside);
             let found = buffer.occluded(&geometry, &ray, start, t_max, active, all) & active;
             assert_eq!(found.bits(), expected.bits(), "{target:?}, round {round}");
             count += found.bits().count_ones() as usize;

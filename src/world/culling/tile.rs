@@ -73,8 +73,8 @@ impl CullingMode {
                 Some(culler.candidates(geometry, Some(&frustum)))
             }
             Self::ScreenBounds(bounds) => {
-                let primary =
-                    geometry.select(|item| bounds[item as usize].overlaps(origin, extent));
+                let primary = geometry
+                    .select(|primitive| bounds[primitive as usize].overlaps(origin, extent));
                 Some(TileCandidates { primary, ..TileCandidates::all(geometry, lights) })
             }
             Self::ScreenGrid(grid) => {
@@ -149,9 +149,9 @@ impl FrustumCuller {
         &self,
         geometry: &Aggregate<L>,
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
-        let occluder = |item: u32| Occluder {
-            ball: self.bounds[item as usize].ball,
-            exempt_item: (!self.self_shadowing[item as usize]).then_some(item),
+        let occluder = |primitive: u32| Occluder {
+            ball: self.bounds[primitive as usize].ball,
+            exempt_primitive: (!self.self_shadowing[primitive as usize]).then_some(primitive),
         };
         let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
         self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
@@ -170,16 +170,16 @@ impl FrustumCuller {
             None => Some(bound.ball),
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
-        let primary = geometry.select(|item| parts[item as usize].is_some());
+        let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
         // Selects the primitives that can occlude one light from the visible part of at least one
         // primitive. `occludes` tests one possible occluder and one visible part.
         let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
-            geometry.select(|item| {
-                let item = item as usize;
+            geometry.select(|primitive| {
+                let primitive = primitive as usize;
                 let may_occlude_part = |(other, part): (usize, &Option<BoundingSphere>)| {
                     part.is_some_and(|part| {
-                        (other != item || self.self_shadowing[item])
-                            && occludes(&self.bounds[item], &part)
+                        (other != primitive || self.self_shadowing[primitive])
+                            && occludes(&self.bounds[primitive], &part)
                     })
                 };
                 parts.iter().enumerate().any(may_occlude_part)

@@ -52,7 +52,7 @@ enum SurfaceKind {
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
     /// Id of the touching primitive. For a compound, the id of its first part.
-    item: u32,
+    primitive: u32,
     /// Distance \[scene units\] within which the surfaces of a primitive and of the one that
     /// touches it count as coincident. It is larger at points with larger rounding errors; see
     /// [`Contact::tie`].
@@ -65,10 +65,10 @@ struct Contact<S> {
 }
 
 impl<S: Float> Contact<S> {
-    fn new(item: u32, form: &Form, tie: f64) -> Self {
+    fn new(primitive: u32, form: &Form, tie: f64) -> Self {
         let (low, high) = unbounded_box(form);
         let [low, high] = [low, high].map(|corner| corner.to_array().map(S::from_f64));
-        Self { item, tie: S::from_f64(tie), low, high }
+        Self { primitive, tie: S::from_f64(tie), low, high }
     }
 
     /// Returns the distance within which the surfaces of a primitive and of the one that touches it
@@ -116,7 +116,7 @@ pub(crate) struct CoincidentState<L: SimdFloat> {
     /// Lanes whose rays start on a surface that may coincide with others.
     pub lanes: L::Mask,
     /// Ids of the primitives on which the rays start, by lane.
-    pub item: L,
+    pub primitive: L,
     /// Points on the primitives at which the rays start.
     pub point: Vec3<L>,
     /// Unit normals of the start surfaces, on the side to which the rays leave.
@@ -132,7 +132,7 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub lanes: L::Mask,
     /// Lanes whose start surface coincides with another one.
     pub touching: L::Mask,
-    pub item: L,
+    pub primitive: L,
     pub triangle: L,
     pub layer: L,
     /// Distance between the surface and the origins of rays that leave it. It is so large that the
@@ -151,7 +151,7 @@ impl<L: SimdFloat> CoincidentState<L> {
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
-            item: L::select(mask, yes.item, no.item),
+            primitive: L::select(mask, yes.primitive, no.primitive),
             point: Vec3::select(mask, yes.point, no.point),
             axis: Vec3::select(mask, yes.axis, no.axis),
             layer: L::select(mask, yes.layer, no.layer),
@@ -175,11 +175,11 @@ impl<S: Float> Contacts<S> {
     ) -> Option<Self> {
         let mut first = vec![0; forms.len()];
         let mut transmits = vec![false; forms.len()];
-        for (item, source) in (0..).zip(primitives) {
+        for (primitive, source) in (0..).zip(primitives) {
             if source.part == 0 {
-                first[source.form] = item;
+                first[source.form] = primitive;
             }
-            transmits[source.form] |= transparent[item as usize];
+            transmits[source.form] |= transparent[primitive as usize];
         }
         let mut touching = vec![Vec::new(); forms.len()];
         for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
@@ -195,10 +195,10 @@ impl<S: Float> Contacts<S> {
             return None;
         }
         let count = forms.len() as f64;
-        let kind = |(item, source): (usize, &PrimitiveId)| {
+        let kind = |(primitive, source): (usize, &PrimitiveId)| {
             let flat = forms[source.form].is_flat();
             let number = source.form as f64;
-            let (kind, layer) = match (priority_of[item], flat, transparent[item]) {
+            let (kind, layer) = match (priority_of[primitive], flat, transparent[primitive]) {
                 (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
                 (0, true, false) => (SurfaceKind::Sheet, 0.0),
                 (0, false, _) => (SurfaceKind::Opaque, 4.0 * count + number),
@@ -213,32 +213,32 @@ impl<S: Float> Contacts<S> {
         Some(Self { contacts, kinds })
     }
 
-    /// Returns the lanes whose `point`, on the primitive `items`, may be on a second primitive as
+    /// Returns the lanes whose `point`, on `primitives`, may be on a second primitive as
     /// well. Points outside of the bounding boxes of all other primitives are excluded, because
     /// most primitives touch others only in small regions.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
-        items: L,
+        primitives: L,
         point: Vec3<L>,
         lanes: L::Mask,
     ) -> L::Mask {
         let rounding = rounding(point);
         let (mut near, mut remaining) = (L::mask(false), lanes);
-        while let Some((item, item_lanes)) = next_distinct(items, remaining) {
-            for contact in &self.contacts[item as usize] {
-                near = near | (item_lanes & contact.is_near(point, rounding));
+        while let Some((primitive, primitive_lanes)) = next_distinct(primitives, remaining) {
+            for contact in &self.contacts[primitive as usize] {
+                near = near | (primitive_lanes & contact.is_near(point, rounding));
             }
-            remaining = remaining.and_not(item_lanes);
+            remaining = remaining.and_not(primitive_lanes);
         }
         near
     }
 
-    /// Returns the layer of primitive `item`: its position in the order in which a ray crosses
+    /// Returns the layer of `primitive`: its position in the order in which a ray crosses
     /// coincident surfaces. `before` is the layer of the surface from which the rays come. `leaves`
     /// selects rays that leave the primitive, along its outward normal.
-    fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
-        let (kind, layer) = &self.kinds[item as usize];
+    fn layer<L: SimdFloat<Scalar = S>>(&self, primitive: u32, leaves: L::Mask, before: L) -> L {
+        let (kind, layer) = &self.kinds[primitive as usize];
         let layer = L::splat(*layer);
         let is_negative = match kind {
             SurfaceKind::Pane => before.lt(L::zero()),
@@ -260,7 +260,7 @@ impl<S: Float> Contacts<S> {
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
-            item: coincident.item,
+            primitive: coincident.primitive,
             triangle: L::from_id(0),
             layer: L::from_f64(L::MAX),
             offset: L::zero(),
@@ -283,14 +283,16 @@ impl<S: Float> Contacts<S> {
         let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
         let mut remaining = coincident.lanes;
-        while let Some((item, item_lanes)) = next_distinct(coincident.item, remaining) {
-            layer = L::select(item_lanes, self.layer(item, leaves, before), layer);
-            remaining = remaining.and_not(item_lanes);
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(coincident.primitive, remaining)
+        {
+            layer = L::select(primitive_lanes, self.layer(primitive, leaves, before), layer);
+            remaining = remaining.and_not(primitive_lanes);
         }
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
-            item: coincident.item,
+            primitive: coincident.primitive,
             triangle: L::from_id(0),
             layer,
             offset: L::zero(),
@@ -314,10 +316,12 @@ impl<S: Float> Contacts<S> {
     ) {
         let rounding = rounding(coincident.point);
         let mut remaining = coincident.lanes;
-        while let Some((item, item_lanes)) = next_distinct(coincident.item, remaining) {
-            remaining = remaining.and_not(item_lanes);
-            for contact in &self.contacts[item as usize] {
-                let near = item_lanes & contact.is_near(coincident.point, rounding);
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(coincident.primitive, remaining)
+        {
+            remaining = remaining.and_not(primitive_lanes);
+            for contact in &self.contacts[primitive as usize] {
+                let near = primitive_lanes & contact.is_near(coincident.point, rounding);
                 if near.none() {
                     continue;
                 }
@@ -327,9 +331,9 @@ impl<S: Float> Contacts<S> {
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
-                let hit = geometry.closest_to(contact.item, &ray, limit);
+                let hit = geometry.closest_to(contact.primitive, &ray, limit);
                 let mut found = near & hit.t.lt(limit);
-                while let Some((other, other_lanes)) = next_distinct(hit.item, found) {
+                while let Some((other, other_lanes)) = next_distinct(hit.primitive, found) {
                     found = found.and_not(other_lanes);
                     let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
                     let cosine = normal.dot(coincident.axis);
@@ -350,7 +354,7 @@ impl<S: Float> Contacts<S> {
                     );
                     let nearer = parallel & layer.gt(coincident.layer) & layer.lt(out.layer);
                     out.lanes = out.lanes | nearer;
-                    out.item = L::select(nearer, L::from_id(other), out.item);
+                    out.primitive = L::select(nearer, L::from_id(other), out.primitive);
                     out.triangle = L::select(nearer, hit.triangle, out.triangle);
                     out.layer = L::select(nearer, layer, out.layer);
                 }

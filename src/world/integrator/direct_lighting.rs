@@ -66,7 +66,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             let occluded = if SIMPLE {
                 world.geometry.occluded_linear(&ray, t_max, lit, occluders)
             } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                let start = (interaction.item, interaction.front);
+                let start = (interaction.primitive, interaction.front);
                 buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
             } else {
                 world.geometry.occluded(&ray, t_max, lit, occluders)

@@ -81,9 +81,9 @@ pub(crate) fn surface_emission<L: SimdFloat>(
     out: &mut Radiance<L>,
 ) {
     let mut remaining = interaction.has_bsdf;
-    while let Some((item, lanes)) = next_distinct(interaction.item, remaining) {
+    while let Some((primitive, lanes)) = next_distinct(interaction.primitive, remaining) {
         remaining = remaining.and_not(lanes);
-        let Some(source) = world.emission.of_item(item) else { continue };
+        let Some(source) = world.emission.of_primitive(primitive) else { continue };
         let mut radiance = path.throughput;
         if let Some(light) = &source.light
             && path.lobe_density.lt(L::from_f64(L::MAX)).any()

@@ -57,18 +57,18 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     let valid_lanes = (1 << points.len()) - 1;
     let mut remaining = hit.t.lt(L::from_f64(L::MAX)).bits() & valid_lanes;
     while remaining != 0 {
-        let item = hit.item.id_lane(remaining.trailing_zeros() as usize);
-        let lanes = hit.item.id_eq(item).bits() & remaining;
+        let primitive = hit.primitive.id_lane(remaining.trailing_zeros() as usize);
+        let lanes = hit.primitive.id_eq(primitive).bits() & remaining;
         remaining &= !lanes;
-        let normal = world.geometry.surface(item, hit.triangle, hit_points).normal;
+        let normal = world.geometry.surface(primitive, hit.triangle, hit_points).normal;
         let facing = normal.dot(direction);
-        let bsdf = &world.bsdfs[world.bsdf_of[item as usize] as usize];
+        let bsdf = &world.bsdfs[world.bsdf_of[primitive as usize] as usize];
         for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes >> l & 1 != 0) {
             let front = facing.lane(lane).to_f64() < 0.0;
             let side = if front { 1.0 } else { -1.0 };
             let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;
             *hit = FirstHit {
-                object: Some(world.geometry.sources()[item as usize].form as u32),
+                object: Some(world.geometry.sources()[primitive as usize].form as u32),
                 depth: depth.lane(lane).to_f64() as f32,
                 normal: [axis(normal.x), axis(normal.y), axis(normal.z)],
                 reflects: world.depth > 0 && bsdf.reflection.is_some() && (front || bsdf.two_sided),

@@ -22,7 +22,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// primitive itself points.
     pub front: L::Mask,
     /// Ids of the primitives that are hit.
-    pub item: L,
+    pub primitive: L,
     /// Index of each hit point's BSDF in the world's list, stored as an id (see
     /// [`SimdFloat::from_id`]).
     bsdf: L,
@@ -125,10 +125,10 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     first: (u32, L::Mask),
     active: L::Mask,
 ) -> SurfaceInteraction<L> {
-    let (item, lanes) = first;
+    let (primitive, lanes) = first;
     let remaining = active.and_not(lanes);
     if remaining.none() {
-        interact_one::<_, SIMPLE>(world, ray, hit, item, lanes)
+        interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes)
     } else {
         interact_mixed::<_, SIMPLE>(world, ray, hit, first, remaining)
     }
@@ -146,36 +146,36 @@ fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     mut remaining: L::Mask,
 ) -> SurfaceInteraction<L> {
     let mut interaction = interact_one::<_, SIMPLE>(world, ray, hit, first, first_lanes);
-    while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
-        interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, item, lanes));
+    while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+        interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes));
         remaining = remaining.and_not(lanes);
     }
     interaction
 }
 
 /// Computes the surface properties at the hits of `lanes`, which must all be hits on the primitive
-/// `item`.
+/// `primitive`.
 #[inline(always)]
 fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     ray: &Ray<L>,
     hit: &Hit<L>,
-    item: u32,
+    primitive: u32,
     lanes: L::Mask,
 ) -> SurfaceInteraction<L> {
-    let surface = world.geometry.surface(item, hit.triangle, ray.at(hit.t));
+    let surface = world.geometry.surface(primitive, hit.triangle, ray.at(hit.t));
     // At a silhouette edge, rounding of the hit point may select a face that points away from the
     // ray. If rays hit the primitive only from outside, the hit counts as a hit on the front in any
     // case.
-    let outside_only = L::mask(world.outside_only[item as usize]);
+    let outside_only = L::mask(world.outside_only[primitive as usize]);
     let front = outside_only | surface.normal.dot(ray.direction).lt(L::zero());
     let geometric = Vec3::select(front, surface.normal, -surface.normal);
-    let index = world.bsdf_of[item as usize];
+    let index = world.bsdf_of[primitive as usize];
     let bsdf = &world.bsdfs[index as usize];
     let mut normal = geometric;
     // The points are built at each use, because a shared instance would be spilled to memory in
     // worlds without textures.
-    let shading_points = || ShadingPoints { item, triangle: hit.triangle, surface, lanes };
+    let shading_points = || ShadingPoints { primitive, triangle: hit.triangle, surface, lanes };
     if !SIMPLE && world.smooth {
         normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);
     }
@@ -196,7 +196,7 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
         point: surface.point,
         offset: surface.ray_offset(),
         front: front & lanes,
-        item: hit.item,
+        primitive: hit.primitive,
         bsdf: L::from_id(index),
         diffuse,
         has_bsdf,

@@ -76,8 +76,8 @@ impl<L: SimdFloat> MediumStack<L> {
         let hit = solid.closest(ray, solid.all());
         let mut remaining = hit.t.lt(L::from_f64(L::MAX));
         let mut inside = L::mask(false);
-        while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
-            let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
+        while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+            let normal = solid.surface(primitive, hit.triangle, ray.at(hit.t)).normal;
             inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
             remaining = remaining.and_not(lanes);
         }
@@ -261,10 +261,12 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let outer = lanes & interaction.front;
         let mut priority = L::zero();
         let mut remaining = lanes;
-        while let Some((item, item_lanes)) = next_distinct(interaction.item, remaining) {
-            let of_item = L::from_f64(f64::from(self.priority_of[item as usize]));
-            priority = L::select(item_lanes, of_item, priority);
-            remaining = remaining.and_not(item_lanes);
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(interaction.primitive, remaining)
+        {
+            let of_primitive = L::from_f64(f64::from(self.priority_of[primitive as usize]));
+            priority = L::select(primitive_lanes, of_primitive, priority);
+            remaining = remaining.and_not(primitive_lanes);
         }
         let solid = priority.gt(L::zero());
         let (outside, within) = (media.without(priority), media.with(priority));

@@ -49,7 +49,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             visible_emitters(world, path, hit.t, active, None, out);
         }
         active = active & is_hit;
-        let Some(first) = next_distinct(hit.item, active) else { return counts };
+        let Some(first) = next_distinct(hit.primitive, active) else { return counts };
         let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
         if EMITTERS && !world.emission.is_empty() {
             surface_emission(world, path, &hit, &interaction, out);

@@ -20,13 +20,13 @@ struct SurfaceTexture<S> {
 /// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
     /// Texture and bump map of each primitive. `None` for primitives with neither.
-    of_item: Vec<Option<SurfaceTexture<L::Scalar>>>,
+    of_primitive: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
 /// Hit points of a packet on one primitive, at which textures are evaluated.
 pub(crate) struct ShadingPoints<L: SimdFloat> {
     /// Id of the primitive.
-    pub item: u32,
+    pub primitive: u32,
     /// Ids of the triangles that are hit, if the primitive is a mesh.
     pub triangle: L,
     /// Hit points, with outward normals.
@@ -75,7 +75,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         // The texture spaces of the latest object are cached, because the primitives of an object
         // are adjacent.
         let mut spaces: (usize, Vec<TextureSpace>) = (usize::MAX, Vec::new());
-        let of_item = primitives.iter().map(|id| {
+        let of_primitive = primitives.iter().map(|id| {
             let material = material_of(id);
             if !has_texture(material) {
                 return None;
@@ -106,11 +106,11 @@ impl<L: SimdFloat> SurfaceTextures<L> {
                 bump: bump.and_then(|b| Some((mapping_of(&b.placement()), BumpMap::new(b)?))),
             })
         });
-        Some(Self { of_item: of_item.collect() })
+        Some(Self { of_primitive: of_primitive.collect() })
     }
 
     fn textures(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
-        self.of_item.iter().flatten()
+        self.of_primitive.iter().flatten()
     }
 
     /// Returns `true` if the albedo of some primitive has a texture.
@@ -144,7 +144,7 @@ fn coordinates<L: SimdFloat>(
 ) -> TexCoord<L> {
     let surface = &points.surface;
     if mapping.wants_uv()
-        && let Some(mesh_uv) = geometry.uv(points.item, points.triangle, surface.point)
+        && let Some(mesh_uv) = geometry.uv(points.primitive, points.triangle, surface.point)
     {
         let [u, v] = mesh_uv.uv;
         let [grad_u, grad_v] = mesh_uv.gradients;
@@ -155,9 +155,9 @@ fn coordinates<L: SimdFloat>(
 
 fn surface_texture<L: SimdFloat>(
     world: &World<L>,
-    item: u32,
+    primitive: u32,
 ) -> Option<&SurfaceTexture<L::Scalar>> {
-    world.surface_textures.as_ref()?.of_item[item as usize].as_ref()
+    world.surface_textures.as_ref()?.of_primitive[primitive as usize].as_ref()
 }
 
 /// Returns the factor by which vertex colour and texture multiply the albedo of the BSDF. Returns
@@ -167,9 +167,9 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     world: &World<L>,
     points: &ShadingPoints<L>,
 ) -> Option<Vec3<L>> {
-    let vertex_color = world.geometry.color(points.item, points.triangle);
+    let vertex_color = world.geometry.color(points.primitive, points.triangle);
     let Some((mapping, texture)) =
-        surface_texture(world, points.item).and_then(|texture| texture.albedo.as_ref())
+        surface_texture(world, points.primitive).and_then(|texture| texture.albedo.as_ref())
     else {
         return vertex_color;
     };
@@ -197,9 +197,10 @@ pub(crate) fn shading_normal<L: SimdFloat>(
     direction: Vec3<L>,
 ) -> Vec3<L> {
     let surface = (points.surface.point, geometric);
-    let normal = world.geometry.shading_normal((points.item, points.triangle), surface, direction);
+    let normal =
+        world.geometry.shading_normal((points.primitive, points.triangle), surface, direction);
     let Some((mapping, bump)) =
-        surface_texture(world, points.item).and_then(|texture| texture.bump.as_ref())
+        surface_texture(world, points.primitive).and_then(|texture| texture.bump.as_ref())
     else {
         return normal;
     };

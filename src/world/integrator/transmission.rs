@@ -148,7 +148,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let next = contacts.next(&world.geometry, &coincident, media);
             let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
-            hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
+            hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
             behind = Some(next);
         }
         let absorbing = Media { nested_dielectrics: self.nested_dielectrics, stack: media };
@@ -164,13 +164,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
         let lanes = active & is_hit;
-        let Some(first) = next_distinct(hit.item, lanes) else { return false };
+        let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
         let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
         let mut coincident = None;
         if let Some(contacts) = &self.nested_dielectrics.contacts {
             let behind_lanes = behind.as_ref().map_or(L::mask(false), |next| next.lanes);
-            let contact_lanes =
-                contacts.near(interaction.item, interaction.point, lanes.and_not(behind_lanes));
+            let contact_lanes = contacts.near(
+                interaction.primitive,
+                interaction.point,
+                lanes.and_not(behind_lanes),
+            );
             if behind.is_some() || contact_lanes.any() {
                 let lanes = (lanes, contact_lanes);
                 let hits = (&mut hit, &mut interaction);
@@ -343,14 +346,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(next.offset.masked(coincident_lanes));
         }
         if contact_lanes.any() {
-            let (item, point, axis) = (interaction.item, interaction.point, -interaction.geometric);
+            let (primitive, point, axis) =
+                (interaction.primitive, interaction.point, -interaction.geometric);
             let coincident =
-                CoincidentState { lanes: contact_lanes, item, point, axis, layer: L::zero() };
+                CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
             let first =
                 contacts.first(&self.world.geometry, &coincident, !interaction.front, media);
             if first.lanes.any() {
-                hit.take_in(first.lanes, hit.t, (first.item, first.triangle));
-                if let Some(distinct) = next_distinct(hit.item, lanes) {
+                hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
+                if let Some(distinct) = next_distinct(hit.primitive, lanes) {
                     *interaction =
                         interact::<_, false>(self.world, &path.ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
@@ -366,7 +370,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
         let coincident = CoincidentState {
             lanes: coincident_lanes,
-            item: interaction.item,
+            primitive: interaction.primitive,
             point: interaction.point,
             axis: -interaction.geometric,
             layer,

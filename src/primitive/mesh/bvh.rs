@@ -2,10 +2,8 @@
 //! structure-of-arrays layout. A single ray is intersected with all eight at once; a packet of rays
 //! is intersected with one triangle after the other.
 
-use crate::asset::mesh::TriangleMesh;
-use crate::asset::mesh::normals::smooth;
-use crate::bvh::build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
-use crate::value::insertion_sort;
+use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
+use crate::primitive::mesh::{TriangleMesh, smooth};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -146,7 +144,7 @@ impl Mesh {
                     }
                 }
             }
-            insertion_sort(&mut stack[first..], |(_, bound)| *bound);
+            stack[first..].sort_by(|(_, a), (_, b)| a.total_cmp(b));
         }
         best
     }

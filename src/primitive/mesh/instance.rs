@@ -4,7 +4,6 @@
 //! Coordinates of a mesh are in single precision for every SIMD type; computation has the precision
 //! of the lanes.
 
-use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
 use crate::primitive::batch::{SurfacePoint, UvGradients};
@@ -12,10 +11,9 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
 };
 use crate::primitive::form::{Form, cast_compiled};
-use crate::primitive::item_box::ItemBox;
 use crate::primitive::keep_visible;
-use crate::primitive::triangle_mesh;
-use crate::value::insertion_sort;
+use crate::primitive::mesh::{Mesh, intersection};
+use crate::primitive::primitive_box::PrimitiveBox;
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -28,7 +26,7 @@ const EXTENT_PER_DETAIL: f64 = 64.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshForm {
     /// Triangles in the space of the mesh.
-    pub mesh: Arc<asset::Mesh>,
+    pub mesh: Arc<Mesh>,
     /// Map from the space of the mesh to the scene.
     pub scene_from_mesh: DAffine3,
     /// `true` if shading normals are interpolated between vertices.
@@ -150,7 +148,7 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
 }
 
 /// Returns the distance between `point` and the closest triangle of the mesh, in scene units.
-fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
+fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
     // Lower bound of the ratio of a length in the scene to the same length in mesh space.
@@ -187,16 +185,16 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
             }
         }
         // The nearest box is last and popped first.
-        insertion_sort(&mut stack[first..], |(_, distance)| -distance);
+        stack[first..].sort_by(|(_, a), (_, b)| b.total_cmp(a));
     }
     least
 }
 
 /// Mesh placed in the scene, compiled for ray intersection.
 struct MeshInstance<S> {
-    mesh: Arc<asset::Mesh>,
+    mesh: Arc<Mesh>,
     /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
-    extent: ItemBox<S>,
+    extent: PrimitiveBox<S>,
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
     /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
@@ -211,7 +209,7 @@ struct MeshInstance<S> {
 /// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive. A hit holds
 /// the id of the mesh and the id of the triangle.
 pub struct Meshes<S> {
-    items: Vec<MeshInstance<S>>,
+    primitives: Vec<MeshInstance<S>>,
 }
 
 /// Corners of one mesh triangle per lane, in the space of the mesh.
@@ -237,7 +235,7 @@ impl<S: Float> MeshInstance<S> {
         let outer = form.max_coordinate();
         Some(Self {
             mesh: mesh.clone(),
-            extent: ItemBox::new(form, false)?,
+            extent: PrimitiveBox::new(form, false)?,
             mesh_from_scene: columns.map(|c| c.to_array().map(S::from_f64)),
             center: scene_from_mesh.transform_point3(middle).to_array().map(S::from_f64),
             mesh_center: middle.to_array().map(S::from_f64),
@@ -362,7 +360,7 @@ impl<L: SimdFloat> Triangle<L> {
 impl<S: Float> Meshes<S> {
     /// Compiles the meshes among the canonical forms `forms`, in order.
     pub fn new(forms: &[Form]) -> Self {
-        Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
+        Self { primitives: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
     /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
@@ -375,18 +373,18 @@ impl<S: Float> Meshes<S> {
         ray: &Ray<L>,
         hit: &mut Hit<L>,
     ) {
-        for (tag, item) in (base + range.start as u32..).zip(&self.items[range]) {
-            let near = item.extent.meets(ray, hit.t);
+        for (tag, primitive) in (base + range.start as u32..).zip(&self.primitives[range]) {
+            let near = primitive.extent.meets(ray, hit.t);
             if near.none() {
                 continue;
             }
-            let (inner, length) = item.ray(ray);
+            let (inner, length) = primitive.ray(ray);
             // The distance limit in mesh space is enlarged by the rounding error of the transform.
             // Whether a hit is closer than earlier hits is decided below by distances in the scene.
             // The result therefore does not depend on the order of the primitives.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
-            let found = triangle_mesh::closest(&item.mesh, &inner, limit);
+            let found = intersection::closest(&primitive.mesh, &inner, limit);
             let hit_mask = found.t.lt(limit);
             let before = hit.t;
             hit.keep_closer(hit_mask, found.t / length, tag);
@@ -405,49 +403,49 @@ impl<S: Float> Meshes<S> {
         wanted: L::Mask,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for item in &self.items[range] {
+        for primitive in &self.primitives[range] {
             let open = wanted.and_not(occluded);
             if open.none() {
                 break;
             }
-            let open = open & item.extent.meets(ray, limit);
+            let open = open & primitive.extent.meets(ray, limit);
             if open.none() {
                 continue;
             }
-            let (inner, length) = item.ray(ray);
+            let (inner, length) = primitive.ray(ray);
             let limit = L::select(open, limit * length, L::from_f64(-1.0));
-            occluded = occluded | triangle_mesh::occluded(&item.mesh, &inner, limit);
+            occluded = occluded | intersection::occluded(&primitive.mesh, &inner, limit);
         }
         occluded
     }
 
-    /// Returns the projection of `point` onto the plane of the hit triangle of mesh `item`, with
+    /// Returns the projection of `point` onto the plane of the hit triangle of `primitive`, with
     /// the normal of the triangle. `point` is the computed hit point of a ray, with rounding
     /// errors. `triangle_tag` is the id of the triangle.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
-        item: usize,
+        primitive: usize,
         triangle_tag: L,
         point: Vec3<L>,
     ) -> SurfacePoint<L> {
-        let item = &self.items[item];
-        let triangle = item.triangle(triangle_tag);
+        let primitive = &self.primitives[primitive];
+        let triangle = primitive.triangle(triangle_tag);
         // The normal is divided by its largest component. Otherwise the square of its length would
         // overflow for large triangles and underflow for small ones.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
         let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
-        let height = flat.dot(item.point(point) - triangle.corners[0]);
-        let normal = item.normal(flat);
+        let height = flat.dot(primitive.point(point) - triangle.corners[0]);
+        let normal = primitive.normal(flat);
         let inverse = L::one() / normal.length_squared().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
-        SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
+        SurfacePoint { point, normal, max_coordinate: L::splat(primitive.reach) }
     }
 
-    /// Returns the shading normal of mesh `item` at the hit point `point` on the triangle with the
+    /// Returns the shading normal of `primitive` at the hit point `point` on the triangle with the
     /// id `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
     /// direction of the rays.
     ///
@@ -456,37 +454,37 @@ impl<S: Float> Meshes<S> {
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
-        item: usize,
+        primitive: usize,
         triangle_tag: L,
         (point, normal): (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
-        let item = &self.items[item];
-        if !item.smooth {
+        let primitive = &self.primitives[primitive];
+        if !primitive.smooth {
             return normal;
         }
-        let weights = item.triangle(triangle_tag).weights(item.point(point));
-        let [a, b, c] = item.vertices(triangle_tag, item.mesh.smooth_normals());
-        let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
+        let weights = primitive.triangle(triangle_tag).weights(primitive.point(point));
+        let [a, b, c] = primitive.vertices(triangle_tag, primitive.mesh.smooth_normals());
+        let smooth = primitive.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
         // replaces it by `normal`.
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates of mesh `item` at `point` in the triangle with the id
+    /// Returns the texture coordinates of `primitive` at `point` in the triangle with the id
     /// `triangle_tag`; `None` if the mesh file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
-        item: usize,
+        primitive: usize,
         triangle_tag: L,
         point: Vec3<L>,
     ) -> Option<UvGradients<L>> {
-        let item = &self.items[item];
-        let triangle = item.triangle(triangle_tag);
-        let corners = item.pairs(triangle_tag, item.mesh.mesh().uvs.as_deref()?);
-        let weights = triangle.weights(item.point(point));
+        let primitive = &self.primitives[primitive];
+        let triangle = primitive.triangle(triangle_tag);
+        let corners = primitive.pairs(triangle_tag, primitive.mesh.mesh().uvs.as_deref()?);
+        let weights = triangle.weights(primitive.point(point));
         let gradient = triangle.gradients();
         let along = |k: usize| {
             let [a, b, c] = corners.map(|pair| pair[k]);
@@ -497,11 +495,15 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the colour of the triangle with the id `triangle_tag` of mesh `item`; `None` if the
+    /// Returns the colour of the triangle with the id `triangle_tag` of `primitive`; `None` if the
     /// mesh file has no colours.
     #[inline(never)]
-    pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, triangle_tag: L) -> Option<Vec3<L>> {
-        let mesh = self.items[item].mesh.mesh();
+    pub fn color<L: SimdFloat<Scalar = S>>(
+        &self,
+        primitive: usize,
+        triangle_tag: L,
+    ) -> Option<Vec3<L>> {
+        let mesh = self.primitives[primitive].mesh.mesh();
         mesh.color(0)?;
         let number = |lane| (triangle_tag.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
@@ -512,12 +514,12 @@ impl<S: Float> Meshes<S> {
 
     /// Returns `true` if some mesh has interpolated normals.
     pub fn is_smooth(&self) -> bool {
-        self.items.iter().any(|item| item.smooth)
+        self.primitives.iter().any(|primitive| primitive.smooth)
     }
 
     /// Returns `true` if some mesh has vertex or face colours.
     pub fn is_colored(&self) -> bool {
-        self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
+        self.primitives.iter().any(|primitive| primitive.mesh.mesh().color(0).is_some())
     }
 }
 

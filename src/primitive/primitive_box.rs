@@ -5,54 +5,10 @@ use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::form::Form;
-use crate::value::choices;
 use glam::DVec3;
 
-choices! {
-    /// Acceleration structure. Every choice renders the same image; only speed differs.
-    pub enum Acceleration {
-        /// the fastest by measurement: `bvh` in scenes with many objects, otherwise a list for each
-        /// tile of the picture
-        Auto = "auto",
-        /// every ray tests every primitive
-        None = "none",
-        /// screen bounds of each primitive, for camera rays
-        ScreenBounds = "screen-bounds",
-        /// oriented bounding boxes: one per primitive, in its own space
-        Obb = "obb",
-        /// axis-aligned bounding boxes: one per primitive, in the scene's space
-        Aabb = "aabb",
-        /// a bounding volume hierarchy
-        Bvh = "bvh",
-    }
-}
-
-impl Acceleration {
-    /// Returns the name of this acceleration structure in scene files and on the command line.
-    pub fn name(self) -> &'static str {
-        Self::CHOICES[self as usize].name
-    }
-
-    /// Returns the former name of this structure; `None` if its name has not changed. Scene files
-    /// and the command line still accept the former name.
-    pub fn former_name(self) -> Option<&'static str> {
-        match self {
-            Self::Auto | Self::None => None,
-            Self::ScreenBounds => Some("projected"),
-            Self::Obb => Some("object"),
-            Self::Aabb => Some("world"),
-            Self::Bvh => Some("hierarchy"),
-        }
-    }
-
-    /// Returns the structure whose name or former name is `name`; `None` if there is none.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
-    }
-}
-
 /// Bounding box of one primitive.
-pub struct ItemBox<S> {
+pub struct PrimitiveBox<S> {
     low: [S; 3],
     high: [S; 3],
     /// Object space of the box; `None` if its axes are those of the scene.
@@ -87,7 +43,7 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
 /// not 0.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
-impl<S: Float> ItemBox<S> {
+impl<S: Float> PrimitiveBox<S> {
     /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
     /// object space, the box is in that space. Returns `None` for a form without finite bounds.
     pub fn new(form: &Form, oriented: bool) -> Option<Self> {

@@ -5,7 +5,6 @@
 //! by the same operations in both cases. Both therefore find the same triangle at the same
 //! distance.
 
-use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
 use crate::bvh::packet::{
@@ -13,6 +12,7 @@ use crate::bvh::packet::{
 };
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
+use crate::primitive::mesh::{Mesh, TriangleBlock};
 
 /// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
 /// whole. The rays of other packets traverse it separately.
