@@ -16,13 +16,13 @@ use common::{Random, in_turns};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
-use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
-use zerkalo::render::pass::{self, PassContext};
-use zerkalo::render::wave::{Job, Wave};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Acceleration, Document, Object, Scene};
-use zerkalo::shape::{Shape, Sphere};
-use zerkalo::world::{AnyWorld, Options};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
+use zerkalo_render::pass::{self, PassContext};
+use zerkalo_render::wave::{Job, Wave};
+use zerkalo_scene::shape::{Shape, Sphere};
+use zerkalo_scene::{Acceleration, Document, Object, Scene};
+use zerkalo_world::{AnyWorld, Options};
 
 /// Picture size of the scene of the reflecting tracks when its number of balls varies, in pixels.
 const SIZE: [u32; 2] = [640, 480];

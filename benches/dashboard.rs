@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
-use zerkalo::scene::BUILT_IN;
+use zerkalo_scene::BUILT_IN;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];

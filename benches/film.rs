@@ -3,7 +3,7 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use zerkalo::film::{
+use zerkalo_render::film::{
     Depth, Display, Estimator, Film, Header, ImageData, ImageOutput, LightWeights, TILE_PIXELS,
     Thumbnail, Tone, WholeFilm,
 };

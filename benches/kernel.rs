@@ -17,15 +17,15 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use glam::DVec3;
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
-use zerkalo::bvh::Ray;
-use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form, SphereForm};
-use zerkalo::render::pass::{self, PassContext};
-use zerkalo::render::wave::{Job, Wave};
-use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
-use zerkalo::scene::Scene;
-use zerkalo::world::{AnyWorld, Options, Precision, World};
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::{Aggregate, Form, SphereForm};
+use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
+use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
+use zerkalo_render::pass::{self, PassContext};
+use zerkalo_render::wave::{Job, Wave};
+use zerkalo_scene::Scene;
+use zerkalo_world::{AnyWorld, Options, Precision, World};
 
 const SAMPLING: SampleSettings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
 

@@ -11,10 +11,10 @@ mod common;
 use common::{Random, ball, in_turns, towards};
 use std::hint::black_box;
 use std::time::Instant;
-use zerkalo::bvh::Ray;
-use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::primitive::Mesh;
-use zerkalo::primitive::mesh::intersection;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::mesh::intersection;
 
 /// Number of random rays in each measurement.
 const RAYS: usize = 1 << 19;

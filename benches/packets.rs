@@ -17,16 +17,16 @@ use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use zerkalo::bvh::Ray;
-use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
-use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::primitive::Mesh;
-use zerkalo::primitive::{Aggregate, Form, MeshForm};
-use zerkalo::render::pass::{self, PassContext};
-use zerkalo::render::wave::{Job, Wave};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::scene::{Document, Scene};
-use zerkalo::world::World;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
+use zerkalo_render::pass::{self, PassContext};
+use zerkalo_render::wave::{Job, Wave};
+use zerkalo_scene::{Document, Scene};
+use zerkalo_world::World;
 
 /// Number of rays of each measurement.
 const RAYS: usize = 1 << 15;

@@ -4,8 +4,8 @@
 use crate::harness::*;
 use std::fs::File;
 use std::io::BufReader;
-use zerkalo::film::TILE_PIXELS;
-use zerkalo::world::TracedPacket;
+use zerkalo_render::film::TILE_PIXELS;
+use zerkalo_world::TracedPacket;
 
 /// Side of the square picture in pixels.
 const SIDE: u32 = 16384;

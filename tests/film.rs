@@ -4,7 +4,7 @@ use crate::harness::*;
 use proptest::prelude::*;
 use std::fs::File;
 use std::io::BufReader;
-use zerkalo::film::{
+use zerkalo_render::film::{
     Depth, ImageData, ImageOutput, InvalidSample, Tile, TileHandle, WholeFilm, lattice_pixels,
     quantised_8, quantised_16,
 };

@@ -2,8 +2,8 @@
 //! colours, and files that are invalid or change.
 
 use crate::harness::*;
-use zerkalo::scene::SceneFile;
-use zerkalo::scene::edit::{add_object, set};
+use zerkalo_scene::SceneFile;
+use zerkalo_scene::edit::{add_object, set};
 
 /// Returns a tube around a trefoil knot, made of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {

@@ -2,10 +2,10 @@
 //! the noise that a plan promises.
 
 use crate::harness::*;
-use zerkalo::film::Noise;
-use zerkalo::render::plan::ShardRender;
-use zerkalo::render::schedule::USUAL_SLOPE;
-use zerkalo::render::{Options, SyncRender};
+use zerkalo_render::film::Noise;
+use zerkalo_render::plan::ShardRender;
+use zerkalo_render::schedule::USUAL_SLOPE;
+use zerkalo_render::{Options, SyncRender};
 
 const THREADS: usize = 2;
 

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each bench uses its part")]
 
 use std::time::Instant;
-use zerkalo::primitive::TriangleMesh;
+use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Returns the processor time of this thread in seconds. Other programs on the machine affect it
 /// less than the wall-clock time. On systems without `/proc/thread-self/schedstat`, returns the

@@ -27,8 +27,8 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
 use tunnel::Tunnel;
-use zerkalo::scene::BUILT_IN;
-use zerkalo::terminal::cells::Oklab;
+use zerkalo_scene::BUILT_IN;
+use zerkalo_terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];

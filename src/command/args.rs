@@ -1,13 +1,13 @@
 //! Command-line arguments, parsed by clap. Doc comments of arguments are their help texts.
 
 use crate::dashboard::run::{Colors, TerminalSetup};
-use crate::film::{Depth, Display, Tone};
+use zerkalo_render::film::{Depth, Display, Tone};
 use crate::measure::Experiment;
-use crate::render::plan::MAX_SHARDS;
-use crate::sampling::SamplerKind;
-use crate::scene::{Acceleration, Scene};
-use crate::terminal::Environment;
-use crate::world::{self, Precision};
+use zerkalo_render::plan::MAX_SHARDS;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_terminal::Environment;
+use zerkalo_world::{self as world, Precision};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;

@@ -1,11 +1,11 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
 use crate::command::{Failure, warn};
-use crate::disk::{Existing, WriteError, check_writable};
-use crate::film::file::is_film_file;
-use crate::render::EncodedCheckpoint;
-use crate::render::export::Provenance;
-use crate::render::session::Session;
+use zerkalo_scene::disk::{Existing, WriteError, check_writable};
+use zerkalo_render::film::file::is_film_file;
+use zerkalo_render::EncodedCheckpoint;
+use zerkalo_render::export::Provenance;
+use zerkalo_render::session::Session;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;

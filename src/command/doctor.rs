@@ -4,11 +4,11 @@
 use crate::command::{Failure, print_line};
 use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
-use crate::scene::{kept_in, state_folder};
-use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
-use crate::terminal::image::Protocol;
-use crate::terminal::{Capabilities, Environment, Multiplexer};
-use crate::value::sanitized;
+use zerkalo_scene::{kept_in, state_folder};
+use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
+use zerkalo_terminal::image::Protocol;
+use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
+use zerkalo_scene::value::sanitized;
 use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};

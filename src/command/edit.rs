@@ -1,21 +1,21 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
-use crate::asset::Assets;
+use zerkalo_scene::asset::Assets;
 use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{DEFAULT_STOP, Ended, Setup, run as run_dashboard};
-use crate::disk::open_regular;
-use crate::film::Display;
-use crate::film::file::is_film_file;
-use crate::render::schedule::Settings;
-use crate::render::{Checkpoint, Options};
-use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
-use crate::terminal::Environment;
-use crate::value::sanitized;
-use crate::world::{self, Precision};
+use zerkalo_scene::disk::open_regular;
+use zerkalo_render::film::Display;
+use zerkalo_render::film::file::is_film_file;
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
+use zerkalo_terminal::Environment;
+use zerkalo_scene::value::sanitized;
+use zerkalo_world::{self as world, Precision};
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};

@@ -2,10 +2,10 @@
 
 use crate::command::args::InfoArgs;
 use crate::command::{Failure, print_line, read_scene};
-use crate::film::FileMetadata;
-use crate::render::SampleInputs;
-use crate::render::export::{scene_hash, settings_text};
-use crate::render::plan::{BASE, Part, Plan, is_plan_file};
+use zerkalo_render::film::FileMetadata;
+use zerkalo_render::SampleInputs;
+use zerkalo_render::export::{scene_hash, settings_text};
+use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
 use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {

@@ -1,6 +1,6 @@
 //! Progress messages while meshes and images of a scene are loaded.
 
-use crate::asset::{Assets, LoadProgress};
+use zerkalo_scene::asset::{Assets, LoadProgress};
 use crate::command::warn;
 use std::io::IsTerminal;
 use std::sync::Arc;

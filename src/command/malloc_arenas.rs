@@ -16,7 +16,7 @@ const VARIABLE: &str = "MALLOC_ARENA_MAX";
 pub fn limit() {
     use std::os::unix::process::CommandExt;
     use std::process::Command;
-    if !crate::process_memory::address_space_is_limited() || std::env::var_os(VARIABLE).is_some() {
+    if !zerkalo_scene::process_memory::address_space_is_limited() || std::env::var_os(VARIABLE).is_some() {
         return;
     }
     let mut arguments = std::env::args_os();

@@ -4,9 +4,9 @@
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::{Failure, print_line};
-use crate::render::export::update_metadata;
-use crate::render::plan::Merged;
-use crate::render::session::Report;
+use zerkalo_render::export::update_metadata;
+use zerkalo_render::plan::Merged;
+use zerkalo_render::session::Report;
 
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let output = FilmOutput::new(&args.output, args.bits)?;

@@ -25,9 +25,9 @@ mod watch;
 pub use cpu::require as require_cpu;
 pub use malloc_arenas::limit as limit_arenas;
 
-use crate::scene::{Document, Scene};
-use crate::value::sanitized;
-use crate::world::{self, Precision, requires_double};
+use zerkalo_scene::{Document, Scene};
+use zerkalo_scene::value::sanitized;
+use zerkalo_world::{self as world, Precision, requires_double};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};

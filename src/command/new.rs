@@ -1,8 +1,8 @@
 //! `zerkalo new`: writes a starter scene to a new file.
 
 use crate::command::{Failure, print_line};
-use crate::disk::{Existing, replace_file};
-use crate::scene::starter;
+use zerkalo_scene::disk::{Existing, replace_file};
+use zerkalo_scene::starter;
 use std::io::Write;
 use std::path::Path;
 

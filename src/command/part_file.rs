@@ -3,13 +3,13 @@
 
 use crate::command::Failure;
 use crate::command::progress::noise;
-use crate::disk::{Existing, WriteError, check_writable};
-use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use crate::film::{Depth, Film, ImageOutput};
-use crate::render::RenderState;
-use crate::render::export::{Provenance, film_header};
-use crate::render::plan::Part;
-use crate::render::session::Report;
+use zerkalo_scene::disk::{Existing, WriteError, check_writable};
+use zerkalo_render::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
+use zerkalo_render::film::{Depth, Film, ImageOutput};
+use zerkalo_render::RenderState;
+use zerkalo_render::export::{Provenance, film_header};
+use zerkalo_render::plan::Part;
+use zerkalo_render::session::Report;
 use std::path::{Path, PathBuf};
 
 /// Output of a film: a film file or a picture file.

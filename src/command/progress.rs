@@ -1,6 +1,6 @@
 //! Progress of a render on stderr: a bar if stderr is a terminal, otherwise lines for a log.
 
-use crate::render::session::Report;
+use zerkalo_render::session::Report;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;

@@ -3,10 +3,10 @@
 
 use crate::command::args::RenderArgs;
 use crate::command::{Failure, warn};
-use crate::process_memory::{available_memory, megabytes, resident_memory};
-use crate::render::memory_budget::{Regions, check, divide};
-use crate::scene::Scene;
-use crate::world::AnyWorld;
+use zerkalo_scene::process_memory::{available_memory, megabytes, resident_memory};
+use zerkalo_render::memory_budget::{Regions, check, divide};
+use zerkalo_scene::Scene;
+use zerkalo_world::AnyWorld;
 
 /// Name of the memory limit in messages if `--memory` allows less memory than is available.
 const OPTION: &str = "--memory";

@@ -4,7 +4,7 @@ use crate::command::Failure;
 use crate::command::args::WatchArgs;
 use crate::command::edit::{conclude, terminal_environment};
 use crate::dashboard::run::watch as watch_films;
-use crate::render::plan::WatchedFilms;
+use zerkalo_render::plan::WatchedFilms;
 use std::io;
 
 pub fn run(args: &WatchArgs) -> Result<(), Failure> {

@@ -1,6 +1,6 @@
 //! History of the picture's estimated error, for the convergence plot.
 
-use crate::render::session::Report;
+use zerkalo_render::session::Report;
 
 /// Point of the convergence plot: render time, and noise of the picture at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]

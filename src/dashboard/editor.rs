@@ -1,6 +1,6 @@
 //! Text editor for one line, as in fields and prompts of the dashboard.
 
-use crate::terminal::event::{Code, Key};
+use zerkalo_terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
 
 /// Largest length of the edited text in characters. It suffices for a path and keeps editing fast.

@@ -1,12 +1,12 @@
 //! Messages that `update` receives, and effects that it returns.
 
-use crate::film::{Display, LinearImage};
-use crate::render::schedule::Stop;
-use crate::render::session::{Snapshot, View, WatchReport};
-use crate::scene::{SaveError, Scene, SceneErrors};
-use crate::terminal::event::{Key, Mouse};
-use crate::terminal::flow::LinkStatus;
-use crate::terminal::image::ViewerImage;
+use zerkalo_render::film::{Display, LinearImage};
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::{Snapshot, View, WatchReport};
+use zerkalo_scene::{SaveError, Scene, SceneErrors};
+use zerkalo_terminal::event::{Key, Mouse};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;

@@ -2,7 +2,7 @@
 //! them.
 
 use crate::dashboard::convergence::Convergence;
-use crate::render::session::{QUALITIES, Report};
+use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each of the noise targets [`QUALITIES`].
 pub const LOOKS: [&str; QUALITIES.len()] = [

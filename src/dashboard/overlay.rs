@@ -4,10 +4,10 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::model::FieldList;
 use crate::dashboard::update::UpdateContext;
-use crate::render::session::QUALITIES;
-use crate::scene::Scene;
-use crate::scene::edit::Target;
-use crate::terminal::image::ViewerImage;
+use zerkalo_render::session::QUALITIES;
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::Target;
+use zerkalo_terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 

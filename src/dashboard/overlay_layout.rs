@@ -4,7 +4,7 @@ use crate::dashboard::layout::BORDER;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
-use crate::render::session::QUALITIES;
+use zerkalo_render::session::QUALITIES;
 use ratatui::layout::Rect;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 

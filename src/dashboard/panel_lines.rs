@@ -4,9 +4,9 @@
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
-use crate::scene::Scene;
-use crate::scene::edit::{Property, Target, Widget, outline as subjects, rows};
-use crate::value::truncated;
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
+use zerkalo_scene::value::truncated;
 
 /// Line of a list in a panel or form: a heading or an entry.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,7 +143,7 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
         property: property.clone(),
         component,
         label,
-        value: crate::value::sanitized(value),
+        value: zerkalo_scene::value::sanitized(value),
         swatch: property.color.filter(|_| component.unwrap_or(0) == 0),
     };
     if property.components.len() < 2 {
@@ -206,7 +206,7 @@ pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use zerkalo_scene::built_in;
 
     #[test]
     fn every_target_has_outline_line_and_fields() {

@@ -1,8 +1,8 @@
 //! Simulated reports of the renderer for tests.
 
-use crate::film::{Mse, Noise};
-use crate::render::schedule::Spp;
-use crate::render::session::{QUALITIES, Report, State};
+use zerkalo_render::film::{Mse, Noise};
+use zerkalo_render::schedule::Spp;
+use zerkalo_render::session::{QUALITIES, Report, State};
 
 /// Creates a report of the renderer after `spp` samples in each of ten thousand pixels.
 /// `generation` is the number of the scene's version, and `noise_codes` the estimated noise in

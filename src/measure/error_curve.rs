@@ -4,7 +4,7 @@
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
 use crate::measure::reference_image::{Errors, Reference};
-use crate::render::SyncRender;
+use zerkalo_render::SyncRender;
 use std::io;
 
 /// Point of an error curve: the error of a render after some samples, against a reference picture.

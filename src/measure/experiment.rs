@@ -1,12 +1,12 @@
 //! Experiments: settings that trade speed for accuracy are varied one at a time.
 
-use crate::film::Display;
-use crate::material::Lobe;
-use crate::render::schedule::{Settings, Stop};
-use crate::render::{Options, SyncRender};
-use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{Acceleration, RayTypes, Scene};
-use crate::world::{self, AnyWorld, Precision};
+use zerkalo_render::film::Display;
+use zerkalo_scene::material::Lobe;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_scene::{Acceleration, RayTypes, Scene};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -290,7 +290,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::built_in;
+    use zerkalo_scene::built_in;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {

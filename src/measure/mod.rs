@@ -15,7 +15,7 @@ mod reference_image;
 mod result;
 mod run;
 #[cfg(test)]
-#[path = "../film/test_random.rs"]
+#[path = "../../crates/render/src/film/test_random.rs"]
 mod test_random;
 
 pub use convergence_order::Slope;

@@ -1,6 +1,6 @@
 //! Errors of pictures against a reference picture.
 
-use crate::film::{Display, Film, LightWeights, Replicates};
+use zerkalo_render::film::{Display, Film, LightWeights, Replicates};
 
 /// Number that is added to the squared reference value in the denominator of the relative error, so
 /// that the error stays bounded at dark pixels. The relative error is relMSE = mean((x - r)^2 /

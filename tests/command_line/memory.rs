@@ -90,7 +90,7 @@ fn lights_are_merged_first() {
         pictures.push(fs::read(desk.path(&name)).unwrap());
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2], "regions differ");
-    let read = |name: &str| zerkalo::film::read_png(&desk.path(name)).unwrap().1;
+    let read = |name: &str| zerkalo_render::film::read_png(&desk.path(name)).unwrap().1;
     let pairs = || read("whole.png").into_iter().zip(read(&format!("{}.png", least + 1)));
     let farthest = pairs().flat_map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]))).max();
     assert!(farthest <= Some(1), "{farthest:?} levels");

@@ -5,7 +5,7 @@ use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
 use crate::harness::*;
 use std::time::SystemTime;
-use zerkalo::render::plan::{WatchedFilms, WatchedShards, WatchedState};
+use zerkalo_render::plan::{WatchedFilms, WatchedShards, WatchedState};
 
 fn open(desk: &Desk, names: &[&str]) -> Result<WatchedFilms, String> {
     let paths: Vec<PathBuf> = names.iter().map(|name| desk.path(name)).collect();
@@ -64,7 +64,7 @@ fn parts_are_added_as_they_appear() {
     merge(&desk, &parts, "merged.zk");
     assert!(films.film().unwrap().bytes() == film(&desk, "merged.zk").bytes());
     let merged = FilmReader::open(&desk.path("merged.zk")).unwrap();
-    let entry = |header: &zerkalo::film::file::FilmFileHeader| {
+    let entry = |header: &zerkalo_render::film::file::FilmFileHeader| {
         header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
     };
     assert_eq!(entry(films.header().unwrap()), entry(merged.header()));
@@ -92,9 +92,9 @@ fn unfinished_shards_are_running_and_then_late() {
     header.chunks.insert(*b"PART", text.replace("complete", "unfinished").into_bytes());
     let empty = Film::new(whole.film.clone());
     let mut pieces = vec![header.encode()];
-    let tiles = 0..zerkalo::film::file::tile_chunks(&empty);
-    pieces.extend(tiles.map(|i| zerkalo::film::file::encode_tiles(&empty, i)));
-    pieces.push(zerkalo::film::file::encode_end(&empty, &pieces));
+    let tiles = 0..zerkalo_render::film::file::tile_chunks(&empty);
+    pieces.extend(tiles.map(|i| zerkalo_render::film::file::encode_tiles(&empty, i)));
+    pieces.push(zerkalo_render::film::file::encode_end(&empty, &pieces));
     let complete = fs::read(desk.path("job-1.zk")).unwrap();
     let mut films = open(&desk, &["job.plan"]).unwrap();
     replace(&desk, "job-1.zk", &pieces.concat());
@@ -117,7 +117,7 @@ fn unfinished_shards_are_running_and_then_late() {
     header.chunks.insert(*b"PART", text.into_bytes());
     pieces[0] = header.encode();
     pieces.pop();
-    pieces.push(zerkalo::film::file::encode_end(&empty, &pieces));
+    pieces.push(zerkalo_render::film::file::encode_end(&empty, &pieces));
     replace(&desk, "job-1.zk", &pieces.concat());
     assert!(films.poll());
     assert!(refusal(&films).contains("its 0 samples are not the"), "{}", refusal(&films));

@@ -9,7 +9,7 @@ mod survey;
 use crate::harness::*;
 use crate::lobes::closed_forms::cone_share;
 use crate::reference::{Mutation, Tracer};
-use zerkalo::film::Estimator;
+use zerkalo_render::film::Estimator;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;

@@ -8,7 +8,7 @@ use crate::error_estimates::coverage::Balls;
 use crate::error_estimates::rays::{Point, ray_ratio};
 use crate::error_estimates::scenes::{Sample, balls_text, scene};
 use crate::harness::*;
-use zerkalo::render::schedule::Schedule;
+use zerkalo_render::schedule::Schedule;
 
 /// Number of samples per pixel at which the survey ends a picture that has not reached its noise
 /// target.

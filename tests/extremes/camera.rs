@@ -1,7 +1,7 @@
 //! Extremes of cameras and of orthonormal frames.
 
 use crate::harness::*;
-use zerkalo::camera::PerspectiveCamera;
+use zerkalo_scene::camera::PerspectiveCamera;
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
@@ -131,7 +131,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
             normals[2 % L::WIDTH] = [0.0, 0.0, -1.0 - e];
             normals[3 % L::WIDTH] = [0.0, -0.0, 1.0];
         }
-        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo::lanes::Float::from_f64));
+        let n = Vec3::<L>::from_fn(|i| normals[i].map(zerkalo_kernel::lanes::Float::from_f64));
         let frame = Frame::around(n);
         for i in 0..L::WIDTH {
             let [t, b, n] = [frame.t, frame.b, frame.n].map(|v| to_dvec3(v, i));

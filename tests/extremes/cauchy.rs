@@ -4,8 +4,8 @@
 //! (Cauchy, Crofton).
 
 use crate::harness::*;
-use zerkalo::primitive::{HalfSpace, ParallelogramForm};
-use zerkalo::shape::{Prism, Pyramid};
+use zerkalo_kernel::primitive::{HalfSpace, ParallelogramForm};
+use zerkalo_scene::shape::{Prism, Pyramid};
 
 /// Returns the area of one face of a polyhedron. The corners on the face are sorted around their
 /// mean.

@@ -1,7 +1,7 @@
 //! Compound solids: volumes, parity of surfaces along a line, laws of set operations.
 
 use crate::harness::*;
-use zerkalo::primitive::{CsgSolid, CsgTree as Tree, TorusForm};
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree as Tree, TorusForm};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::new(x, y, z), radius })

@@ -82,7 +82,7 @@ fn length_of_directions_does_not_change_the_picture() {
     // Other factors change the last digits, which an 8-bit picture does not show.
     let green_values = |scene: &Scene| {
         let rendering = rendered(scene, 1, Precision::Single, 4);
-        let picture = picture(&rendering, zerkalo::film::Replicates::Both);
+        let picture = picture(&rendering, zerkalo_render::film::Replicates::Both);
         picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
     };
     let expected = green_values(&base);

@@ -2,8 +2,8 @@
 
 use crate::harness::*;
 use rayon::prelude::*;
-use zerkalo::primitive::Mesh;
-use zerkalo::primitive::mesh::intersection;
+use zerkalo_kernel::primitive::Mesh;
+use zerkalo_kernel::primitive::mesh::intersection;
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if

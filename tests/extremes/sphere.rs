@@ -1,7 +1,7 @@
 //! Spheres seen from afar, from inside, as ground, and at the limb.
 
 use crate::harness::*;
-use zerkalo::camera::PerspectiveCamera;
+use zerkalo_scene::camera::PerspectiveCamera;
 
 /// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]

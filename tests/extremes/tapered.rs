@@ -1,7 +1,7 @@
 //! Extremes of cylinders, cones and conical frusta.
 
 use crate::harness::*;
-use zerkalo::shape::{Cone, TaperedCylinder, UnitFrustum};
+use zerkalo_scene::shape::{Cone, TaperedCylinder, UnitFrustum};
 
 fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)

@@ -100,7 +100,7 @@ fn extreme_09_volumes() {
         (
             "truncated pyramid",
             difference(vec![
-                zerkalo::shape::Pyramid {
+                zerkalo_scene::shape::Pyramid {
                     corner: [-0.6, -0.5, 0.6],
                     side: 1.2,
                     apex_height: 1.5,

@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::light::{Environment, LightUnit};
+use zerkalo_scene::light::{Environment, LightUnit};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
 /// `mutations`, changed versions of the scene, must disagree.

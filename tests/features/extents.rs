@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::scene::Acceleration;
+use zerkalo_scene::Acceleration;
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {

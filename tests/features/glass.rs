@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::light::SphereLight;
+use zerkalo_scene::light::SphereLight;
 
 #[test]
 fn d6_rough_transmission() {

@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::material::Metal;
+use zerkalo_scene::material::Metal;
 
 /// Checks that the picture of `file` agrees exactly with the reference tracer. The picture of each
 /// of `mutations`, changed versions of the scene, must disagree.

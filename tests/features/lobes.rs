@@ -143,7 +143,7 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
         let (origin, direction) = pixel_ray(&original, centers(FINE)[i]);
         let on_mirror = origin + direction * ((-1.0 - origin.z) / direction.z);
         let mirrored = direction * DVec3::new(1.0, 1.0, -1.0);
-        let spot = |o: &zerkalo::scene::Object| match &o.shape {
+        let spot = |o: &zerkalo_scene::Object| match &o.shape {
             Shape::Sphere(s) => {
                 let to_center = DVec3::from(s.center) - on_mirror;
                 let color = DVec3::from(original.materials[&o.material].color.0);

@@ -58,7 +58,7 @@ fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, dept
 
 /// Checks that the mean radiance of each band of six rows is that of the full ray tree.
 fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
-    let pane = |o: &zerkalo::scene::Object| {
+    let pane = |o: &zerkalo_scene::Object| {
         let Shape::Rectangle(r) = &o.shape else { panic!("not a pane") };
         let m = &original.materials[&o.material];
         Pane {

@@ -4,9 +4,9 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::render::{Options, SyncRender};
-use zerkalo::scene::History;
-use zerkalo::scene::edit::{Edit, EditError};
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_scene::History;
+use zerkalo_scene::edit::{Edit, EditError};
 
 fn options() -> Options {
     render_options(sobol(1))
@@ -269,7 +269,7 @@ fn left_to_right(scene: &Scene) -> f64 {
     scene.camera.eye = [ball.center[0], 9.0, ball.center[2]];
     scene.camera.target = Some([ball.center[0], 0.0, ball.center[2]]);
     scene.camera.up = [0.0, 0.0, -1.0];
-    scene.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(14.0);
+    scene.camera.view_angle = zerkalo_scene::camera::ViewAngle::Vertical(14.0);
     scene.objects.retain(|o| ["floor", "ball"].contains(&o.name.as_str()));
     let floor = number(&scene, "floor") as u32;
     let (hits, pixels) = (first_hits(&scene), without_noise(&scene));

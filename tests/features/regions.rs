@@ -2,8 +2,8 @@
 
 use crate::features::row::*;
 use crate::harness::*;
-use zerkalo::film::Bands;
-use zerkalo::render::RegionRender;
+use zerkalo_render::RegionRender;
+use zerkalo_render::film::Bands;
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;

@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use crate::reference::*;
-use zerkalo::shape::{Difference, Intersection, Union};
+use zerkalo_scene::shape::{Difference, Intersection, Union};
 
 /// Checks that first hits in `file` agree with the formulas of the shapes, and that they disagree
 /// after each mutation. A mutation consists of its name, the name of an object, and the text of the
@@ -232,7 +232,7 @@ fn as_difference(scene: &mut Scene) {
 
 fn replace_operation(
     scene: &mut Scene,
-    combine: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape,
+    combine: impl Fn(Vec<zerkalo_scene::shape::CsgOperand>) -> Shape,
 ) {
     for object in &mut scene.objects {
         let operands = match &object.shape {

@@ -3,10 +3,10 @@
 use crate::features::row::*;
 use crate::harness::*;
 use std::time::SystemTime;
-use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use zerkalo::render::plan::{
-    Part, PartShard, PlannedTile, ShardRender, WatchedFilms, WatchedState,
+use zerkalo_render::film::file::{
+    FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
 };
+use zerkalo_render::plan::{Part, PartShard, PlannedTile, ShardRender, WatchedFilms, WatchedState};
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;

@@ -34,7 +34,7 @@ fn b13_image_texture() {
             ("no image", &|s| s.materials.get_mut("picture").unwrap().texture = None),
             ("one colour", &|s| {
                 let picture = s.materials.get_mut("picture").unwrap();
-                (picture.texture, picture.color) = (None, zerkalo::value::Color([0.5; 3]));
+                (picture.texture, picture.color) = (None, zerkalo_scene::value::Color([0.5; 3]));
             }),
             ("another mapping", &|s| set(s, "picture", "texture.image.mapping", "planar")),
             ("another mapping of the ball", &|s| {

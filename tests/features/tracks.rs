@@ -61,7 +61,7 @@ fn c1_reflecting_tracks() {
             ("half the balls", &|s| s.objects.truncate(201)),
             ("one light", &|s| s.lights.truncate(1)),
             ("the angle across the height", &|s| {
-                s.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(40.0);
+                s.camera.view_angle = zerkalo_scene::camera::ViewAngle::Vertical(40.0);
             }),
         ],
     );

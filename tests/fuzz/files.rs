@@ -3,8 +3,8 @@
 
 use crate::harness::*;
 use png::{BitDepth, ColorType};
-use zerkalo::render::plan::PlannedTile;
-use zerkalo::value::fnv1a64;
+use zerkalo_render::plan::PlannedTile;
+use zerkalo_scene::value::fnv1a64;
 
 /// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {

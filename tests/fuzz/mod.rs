@@ -7,8 +7,8 @@ mod mutate;
 use crate::harness::*;
 use mutate::Random;
 use std::sync::LazyLock;
-use zerkalo::film::file::FilmFileHeader;
-use zerkalo::render::SampleInputs;
+use zerkalo_render::SampleInputs;
+use zerkalo_render::film::file::FilmFileHeader;
 
 /// Number of mutations that are read for each format; `ZERKALO_CASES` sets another one.
 static CASES: LazyLock<u64> = LazyLock::new(|| {

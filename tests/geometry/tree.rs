@@ -3,7 +3,7 @@
 
 use crate::geometry::bits::{any_line, forms};
 use crate::harness::*;
-use zerkalo::primitive::AccelerationStructure;
+use zerkalo_kernel::primitive::AccelerationStructure;
 
 /// Returns `count` random primitives of every kind, crowded in a cube of half-width 10. In half of
 /// the cases they are on a lattice, where many faces are coplanar.

@@ -38,31 +38,33 @@ pub use std::sync::atomic::{AtomicBool, Ordering};
 pub use std::sync::{Arc, Mutex};
 pub use std::time::{Duration, Instant};
 pub use toml::{Table, Value};
-pub use zerkalo::asset::Assets;
-pub use zerkalo::bvh::{Hit, Ray};
-pub use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-pub use zerkalo::disk::Existing;
-pub use zerkalo::film::file::FilmReader;
-pub use zerkalo::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile, Tone};
-pub use zerkalo::lanes::{Double, Float, Frame, Mask, SimdFloat, Single, Vec3};
-pub use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
-pub use zerkalo::material::{Bsdf, Fresnel, Highlight, Lobe, Masking, Material, ReflectionLobe};
-pub use zerkalo::primitive::{
+pub use zerkalo_kernel::bvh::{Hit, Ray};
+pub use zerkalo_kernel::lanes::{Double, Float, Frame, Mask, SimdFloat, Single, Vec3};
+pub use zerkalo_kernel::primitive::{
     Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, MeshForm, PlaneForm,
     SphereForm, SurfacePoint,
 };
-pub use zerkalo::render::export::Provenance;
-pub use zerkalo::render::plan::{Plan, PlanSettings};
-pub use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
-pub use zerkalo::render::session::{Session, State};
-pub use zerkalo::render::{Checkpoint, RenderState};
-pub use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-pub use zerkalo::scene::edit::Target;
-pub use zerkalo::scene::{
+pub use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
+pub use zerkalo_render::export::Provenance;
+pub use zerkalo_render::film::file::FilmReader;
+pub use zerkalo_render::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile, Tone};
+pub use zerkalo_render::plan::{Plan, PlanSettings};
+pub use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
+pub use zerkalo_render::session::{Session, State};
+pub use zerkalo_render::{Checkpoint, RenderState};
+pub use zerkalo_scene::asset::Assets;
+pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
+pub use zerkalo_scene::disk::Existing;
+pub use zerkalo_scene::edit::Target;
+pub use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
+pub use zerkalo_scene::material::{
+    Bsdf, Fresnel, Highlight, Lobe, Masking, Material, ReflectionLobe,
+};
+pub use zerkalo_scene::shape::{CsgOperand, Cuboid, Cylinder, Shape, ShapeDesc};
+pub use zerkalo_scene::value::{Color, Field, TomlValue, ValueType};
+pub use zerkalo_scene::{
     Acceleration, AssetResolver, BUILT_IN, BelowHorizon, Document, FIELDS, Filter, Object,
     RayTypes, Scale, Scene, TransformOp, edit,
 };
-pub use zerkalo::shape::{CsgOperand, Cuboid, Cylinder, Shape, ShapeDesc};
-pub use zerkalo::value::{Color, Field, TomlValue, ValueType};
-pub use zerkalo::world;
-pub use zerkalo::world::{AnyWorld, FirstHit, MAX_GROUPS, Options, Precision, Radiance, World};
+pub use zerkalo_world as world;
+pub use zerkalo_world::{AnyWorld, FirstHit, MAX_GROUPS, Options, Precision, Radiance, World};

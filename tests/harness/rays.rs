@@ -1,8 +1,8 @@
 //! Rays in double precision, traced in packets of any lane type.
 
 use super::*;
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
+use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo_world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);

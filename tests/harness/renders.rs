@@ -2,8 +2,8 @@
 use super::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::ops::Deref;
-use zerkalo::render;
-use zerkalo::render::wave::{Job, Wave, WaveReport};
+use zerkalo_render as render;
+use zerkalo_render::wave::{Job, Wave, WaveReport};
 
 pub fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);

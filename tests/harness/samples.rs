@@ -1,7 +1,7 @@
 //! Single samples of pixels, z-tests of their means, and parts of scene texts.
 
 use super::*;
-use zerkalo::world::Path;
+use zerkalo_world::Path;
 
 /// Returns a vector as a TOML array.
 pub fn array(v: DVec3) -> String {

@@ -15,9 +15,9 @@ use crate::harness::*;
 use pty::{Pty, find, screen};
 use states::{KEYS, SAVE, SCENE, states};
 use std::sync::atomic::AtomicUsize;
-use zerkalo::film::read_exr;
-use zerkalo::scene::Recovery;
-use zerkalo::terminal::{ENTER, LEAVE};
+use zerkalo_render::film::read_exr;
+use zerkalo_scene::Recovery;
+use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
 const RUNS: usize = 100;

@@ -3,8 +3,8 @@
 use crate::harness::*;
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
-use zerkalo::terminal::diff::{FrameDiff, TargetFrame};
-use zerkalo::terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
+use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
+use zerkalo_terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
 /// Simulated connection and terminal. Flow control and the computation of frame differences are the
 /// program's own.

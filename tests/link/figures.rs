@@ -3,7 +3,7 @@
 use crate::harness::*;
 use crate::link::connection::Connection;
 use crate::link::picture::{SCREEN, Work};
-use zerkalo::terminal::diff::TargetFrame;
+use zerkalo_terminal::diff::TargetFrame;
 
 /// Scene seen in a rough mirror, whose picture is noisy everywhere.
 const NOISY: &str = r#"
@@ -214,7 +214,7 @@ fn connection_is_busy_while_differences_wait() {
 /// and a round trip of 0.1 s this is about 0.25 s, the required latency.
 #[test]
 fn keys_wait_for_one_frame_only() {
-    use zerkalo::terminal::flow::PacingMode::{AckClocked, SendQueue};
+    use zerkalo_terminal::flow::PacingMode::{AckClocked, SendQueue};
     let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(shipped);
     let works = scenes.map(|scene| {
         let mut work = Work::new(&scene, 16);

@@ -4,9 +4,9 @@ use crate::harness::*;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo::render::schedule::Schedule;
-use zerkalo::terminal::cells::{Colors, Oklab, PictureCells, Raster};
-use zerkalo::terminal::diff::TargetFrame;
+use zerkalo_render::schedule::Schedule;
+use zerkalo_terminal::cells::{Colors, Oklab, PictureCells, Raster};
+use zerkalo_terminal::diff::TargetFrame;
 
 pub const SCREEN: [u16; 2] = [160, 45];
 /// Area of the picture on the screen: all rows except the last one, which shows text.

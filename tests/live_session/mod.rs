@@ -6,8 +6,8 @@ mod noise;
 
 use crate::harness::*;
 use std::sync::mpsc::channel;
-use zerkalo::film::LinearImage;
-use zerkalo::render::session::{Snapshot, View};
+use zerkalo_render::film::LinearImage;
+use zerkalo_render::session::{Snapshot, View};
 
 const SCENE: &str = r#"
 film.size = [100, 70]

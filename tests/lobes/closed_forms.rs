@@ -4,7 +4,7 @@ use crate::harness::*;
 use crate::lobes::setup::*;
 use crate::lobes::stats::slope;
 use std::f64::consts::FRAC_PI_2;
-use zerkalo::sampling::warp;
+use zerkalo_kernel::sampling::warp;
 
 /// Returns the fraction of a uniform cone of half-angle `theta` in a half-space whose boundary
 /// contains the apex. `delta` is the angle of the axis to the boundary; if it is positive, the axis

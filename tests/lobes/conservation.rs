@@ -5,7 +5,7 @@ use crate::harness::*;
 use crate::lobes::properties::{BsdfProperties, Energy, ReflectionModel, transmission_properties};
 use crate::lobes::setup::*;
 use std::f64::consts::FRAC_PI_2;
-use zerkalo::material::{FIELDS, Interface};
+use zerkalo_scene::material::{FIELDS, Interface};
 
 /// Checks that the words that the scene format accepts and the lists of enum variants have the same
 /// order, so that these tests cover every word.

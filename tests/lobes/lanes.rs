@@ -1,7 +1,7 @@
 //! SIMD types: guarantees beyond the operations of IEEE 754.
 
 use crate::harness::*;
-use zerkalo::lanes::{MAX_WIDTH, SimdU32};
+use zerkalo_kernel::lanes::{MAX_WIDTH, SimdU32};
 
 /// Returns pseudo-random 32-bit number `i`.
 fn noise(i: u32) -> u32 {

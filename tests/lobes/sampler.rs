@@ -4,8 +4,8 @@
 
 use crate::harness::*;
 use crate::lobes::stats::slope;
-use zerkalo::lanes::SimdU32;
-use zerkalo::sampling::CameraDimensions;
+use zerkalo_kernel::lanes::SimdU32;
+use zerkalo_kernel::sampling::CameraDimensions;
 
 fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
     let camera = CameraDimensions { pixel: jitter, lens: false };
@@ -93,10 +93,10 @@ fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
             for replicate in 0..2 {
                 for first in [0u32, 16, 256, 65_536, 0x00ff_fff0, u32::MAX - 15] {
                     for bounce in (0..10).map(Some).chain([None]) {
-                        let pair = |d: &zerkalo::sampling::PacketSampler<'_, Many>| {
+                        let pair = |d: &zerkalo_kernel::sampling::PacketSampler<'_, Many>| {
                             bounce.map_or_else(|| d.pixel(), |b| d.lobe_2d(b))
                         };
-                        let single = |d: &zerkalo::sampling::PacketSampler<'_, One>| {
+                        let single = |d: &zerkalo_kernel::sampling::PacketSampler<'_, One>| {
                             let (u, v) = bounce.map_or_else(|| d.pixel(), |b| d.lobe_2d(b));
                             (bits(u.lane(0).to_f64()), bits(v.lane(0).to_f64()))
                         };

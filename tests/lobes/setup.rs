@@ -1,8 +1,8 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
 use crate::harness::*;
-use zerkalo::material::InterfaceMedia;
-use zerkalo::sampling::CameraDimensions;
+use zerkalo_kernel::sampling::CameraDimensions;
+use zerkalo_scene::material::InterfaceMedia;
 
 pub type Vector = [f64; 3];
 
@@ -54,7 +54,7 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
         ambient: 0.0,
         diffuse: 0.0,
         specular: 1.0,
-        highlight: zerkalo::material::Highlight::CookTorrance,
+        highlight: zerkalo_scene::material::Highlight::CookTorrance,
         reflection: 1.0,
         roughness,
         lobe,
@@ -137,7 +137,7 @@ pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Materi
         alpha: Some(alpha),
         transmission: 1.0,
         ior,
-        fresnel: Some(zerkalo::material::Fresnel::Dielectric),
+        fresnel: Some(zerkalo_scene::material::Fresnel::Dielectric),
         ..reflector(lobe, masking, alpha * 8f64.sqrt())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::harness::*;
 use crate::lobes::setup::*;
-use zerkalo::material::Interface;
+use zerkalo_scene::material::Interface;
 
 fn mean(samples: &[Vector]) -> Vector {
     let all: Vec<_> = samples.iter().map(|s| (1.0 / samples.len() as f64, *s)).collect();

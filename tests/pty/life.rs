@@ -3,7 +3,7 @@
 use super::*;
 use std::io::Write;
 use std::process::{Command, Stdio};
-use zerkalo::terminal::{ENTER, LEAVE, Screen};
+use zerkalo_terminal::{ENTER, LEAVE, Screen};
 
 pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();

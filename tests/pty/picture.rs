@@ -3,7 +3,7 @@
 use super::*;
 use std::io::Cursor;
 use zerkalo::dashboard::layout::{Focus, Layout, Request, layout};
-use zerkalo::terminal::cells::Oklab;
+use zerkalo_terminal::cells::Oklab;
 
 const SIZE: [u16; 2] = [120, 36];
 const FILM: [u32; 2] = [640, 480];

@@ -9,7 +9,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use icy_sixel::SixelImage;
 use terminal::RequestReply;
-use zerkalo::terminal::LEAVE;
+use zerkalo_terminal::LEAVE;
 
 const SIZE: [u16; 2] = [120, 36];
 const CELL: RequestReply = (b"\x1b[16t", "\x1b[6;20;10t");

@@ -4,7 +4,7 @@ use super::life::signal;
 use super::*;
 use crate::harness::*;
 use std::os::unix::fs::PermissionsExt;
-use zerkalo::terminal::{ENTER, LEAVE};
+use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Starts a shell with job control and a plain prompt in the test terminal.
 fn shell(fixture: &Fixture) -> Terminal {

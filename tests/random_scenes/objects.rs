@@ -3,9 +3,9 @@
 use crate::harness::*;
 use crate::random_scenes::words::{chance, direction, list, log, pick, table};
 use std::sync::OnceLock;
-use zerkalo::material;
-use zerkalo::scene::{AssetResolver, Rotate};
-use zerkalo::shape::KINDS;
+use zerkalo_scene::material;
+use zerkalo_scene::shape::KINDS;
+use zerkalo_scene::{AssetResolver, Rotate};
 
 /// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[

@@ -4,9 +4,9 @@ use crate::harness::*;
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::objects::{Stock, emission, library, material, resolved};
 use crate::random_scenes::words::{KeyValue, chance, direction, log, pick, table};
-use zerkalo::primitive::ParallelogramForm;
-use zerkalo::scene::{FilmSettings, IntegratorSettings};
-use zerkalo::value::Description;
+use zerkalo_kernel::primitive::ParallelogramForm;
+use zerkalo_scene::value::Description;
+use zerkalo_scene::{FilmSettings, IntegratorSettings};
 
 /// Random scene, with its text.
 pub struct Random {
@@ -90,7 +90,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         ..Scene::default()
     };
     if chance(numbers, 1, 4) {
-        scene.film.filter = zerkalo::scene::Filter::Point;
+        scene.film.filter = zerkalo_scene::Filter::Point;
     }
     if chance(numbers, 1, 8) {
         scene.film.rays_per_pixel = 8;

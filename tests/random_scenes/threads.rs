@@ -3,7 +3,7 @@
 
 use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use zerkalo::film::Noise;
+use zerkalo_render::film::Noise;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;

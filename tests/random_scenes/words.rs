@@ -2,7 +2,7 @@
 //! keys are included.
 
 use crate::harness::*;
-use zerkalo::value::{DefaultValue, NumberRange};
+use zerkalo_scene::value::{DefaultValue, NumberRange};
 
 /// Function that returns the value of a key. If it returns `None`, the key gets a random value that
 /// the format table allows.

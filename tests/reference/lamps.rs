@@ -4,7 +4,7 @@
 
 use crate::harness::*;
 use crate::reference::tracer::Mutation;
-use zerkalo::light::LightUnit;
+use zerkalo_scene::light::LightUnit;
 
 /// Lamp: a light with a size.
 pub enum Lamp {

@@ -2,7 +2,7 @@
 //! structure.
 
 use crate::harness::*;
-use zerkalo::shape::MeshDesc;
+use zerkalo_scene::shape::MeshDesc;
 
 /// Smallest cosine between the shading normal and the direction to the viewer. Normals at a smaller
 /// cosine are bent towards the viewer.

@@ -7,7 +7,9 @@ use crate::reference::meshes::Triangles;
 use crate::reference::surfaces::Piece;
 use crate::reference::tracer::{Mutation, Tracer};
 use png::BitDepth;
-use zerkalo::material::{Axis, Bump, Mapping, Placement, Texture, TextureFilter as Filter, Wrap};
+use zerkalo_scene::material::{
+    Axis, Bump, Mapping, Placement, Texture, TextureFilter as Filter, Wrap,
+};
 
 /// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;

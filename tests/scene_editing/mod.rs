@@ -10,8 +10,8 @@ mod random;
 use crate::harness::*;
 use layouts::LAYOUTS;
 use proptest::prelude::*;
-use zerkalo::scene::edit::{rename, store_view};
-use zerkalo::shape::{Plane, Sphere};
+use zerkalo_scene::edit::{rename, store_view};
+use zerkalo_scene::shape::{Plane, Sphere};
 
 fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))

@@ -4,8 +4,8 @@ use super::LAYOUTS;
 use crate::harness::*;
 use proptest::prelude::*;
 use std::cell::RefCell;
-use zerkalo::scene::History;
-use zerkalo::scene::edit::{Edit, EditError, Widget};
+use zerkalo_scene::History;
+use zerkalo_scene::edit::{Edit, EditError, Widget};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 

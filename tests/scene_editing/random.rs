@@ -2,9 +2,9 @@
 
 use crate::harness::*;
 use proptest::prelude::*;
-use zerkalo::material::Metal;
-use zerkalo::scene::Rotate;
-use zerkalo::shape::{
+use zerkalo_scene::Rotate;
+use zerkalo_scene::material::Metal;
+use zerkalo_scene::shape::{
     Cone, Cube, Difference, HorizontalRectangle, Intersection, Plane, Prism, Pyramid, Rectangle,
     Sphere, TaperedCylinder, Union, UnitFrustum,
 };

@@ -1,8 +1,8 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
 use crate::harness::*;
-use zerkalo::shape::{KINDS, TransformOp};
-use zerkalo::value::DefaultValue;
+use zerkalo_scene::shape::{KINDS, TransformOp};
+use zerkalo_scene::value::DefaultValue;
 
 const INTRODUCTION: &str = "\
 # Scene files

@@ -2,12 +2,12 @@
 
 use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
-use zerkalo::camera::Focus as LensFocus;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::COMMANDS;
+use zerkalo_scene::camera::Focus as LensFocus;
 
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);

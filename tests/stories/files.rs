@@ -6,7 +6,7 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::update;
-use zerkalo::scene::{SaveError, built_in};
+use zerkalo_scene::{SaveError, built_in};
 
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);
@@ -163,7 +163,7 @@ fn error_in_changed_file_keeps_scene() {
 
 #[test]
 fn built_in_scene_opens_without_file() {
-    let text = zerkalo::scene::BUILT_IN;
+    let text = zerkalo_scene::BUILT_IN;
     let mut model = start(None, text);
     assert_eq!(**model.scene(), built_in());
     let raster = model.layout().unwrap().raster;

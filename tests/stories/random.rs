@@ -6,7 +6,7 @@ use crate::stories::simulated_dashboard::{Desk, ROOM};
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::terminal::event::{Button, Code, Key, MouseKind};
+use zerkalo_terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
 /// Label of the command that quits the program.

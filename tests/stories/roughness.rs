@@ -3,7 +3,7 @@
 
 use crate::harness::*;
 use crate::stories::simulated_dashboard::Desk;
-use zerkalo::render::FirstHitBuffer;
+use zerkalo_render::FirstHitBuffer;
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;

@@ -8,9 +8,9 @@ use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::dashboard::update::update;
-use zerkalo::film::LinearImage;
-use zerkalo::scene::SaveError;
-use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
+use zerkalo_render::film::LinearImage;
+use zerkalo_scene::SaveError;
+use zerkalo_terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
 /// Path of the scene file.
 pub const FILE: &str = "room.toml";

@@ -2,7 +2,7 @@
 
 use crate::harness::*;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::terminal::event::Key;
+use zerkalo_terminal::event::Key;
 
 #[test]
 fn every_key_runs_one_command_per_context() {

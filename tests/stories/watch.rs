@@ -7,8 +7,8 @@ use zerkalo::dashboard::hints::{HelpLine, help};
 use zerkalo::dashboard::key_context::KeyContext;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Message};
 use zerkalo::dashboard::update::commands::COMMANDS;
-use zerkalo::render::session::{WatchReport, WatchedShards, WatchedState};
-use zerkalo::terminal::event::{Button, Mouse, MouseKind};
+use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
+use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 fn shard(number: usize, state: WatchedState) -> WatchedShards {
     WatchedShards {

@@ -3,9 +3,9 @@
 use crate::harness::*;
 use png::{BitDepth, ColorType};
 use std::sync::atomic::AtomicUsize;
-use zerkalo::asset::LoadProgress;
-use zerkalo::scene::SceneFile;
-use zerkalo::scene::edit::{Widget, rows, set, step, toggle};
+use zerkalo_scene::SceneFile;
+use zerkalo_scene::asset::LoadProgress;
+use zerkalo_scene::edit::{Widget, rows, set, step, toggle};
 
 fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
@@ -17,7 +17,7 @@ fn bump_without_height_changes_no_bit() {
     let with_height = |factor: f64| {
         let mut scene = bumpy.clone();
         for material in scene.materials.values_mut() {
-            if let Some(zerkalo::material::Bump::Image(image)) = &mut material.bump {
+            if let Some(zerkalo_scene::material::Bump::Image(image)) = &mut material.bump {
                 image.height *= factor;
             }
         }

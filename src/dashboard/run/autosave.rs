@@ -2,8 +2,8 @@
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::dashboard::model::first_line;
-use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
-use crate::value::sanitized;
+use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
+use zerkalo_scene::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -235,7 +235,7 @@ fn scene(orphan: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, Scen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::starter;
+    use zerkalo_scene::starter;
 
     fn scene(depth: u32) -> Arc<Scene> {
         let mut scene = Scene::parse(starter(), "starter").unwrap();

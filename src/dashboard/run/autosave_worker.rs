@@ -5,7 +5,7 @@ use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::file_worker::Job;
 use crate::dashboard::run::shared_file::SharedFile;
-use crate::scene::{Scene, SceneFile};
+use zerkalo_scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Diagnostics of the terminal and its connection, without visible output.
 
 use crate::dashboard::run::signals::{block, watch};
-use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
-use crate::terminal::{
+use zerkalo_terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
+use zerkalo_terminal::{
     Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, Tty, cell_px,
     cursor_request, query_capabilities, size,
 };

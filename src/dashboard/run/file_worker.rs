@@ -7,7 +7,7 @@ use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use crate::scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
@@ -314,7 +314,7 @@ impl FileWorker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::starter;
+    use zerkalo_scene::starter;
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
     /// it.

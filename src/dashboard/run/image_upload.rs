@@ -1,6 +1,6 @@
 //! Upload of an image for the viewer to the terminal, in parts of limited size.
 
-use crate::terminal::image::ViewerImage;
+use zerkalo_terminal::image::ViewerImage;
 use std::sync::Arc;
 
 /// Largest size of a slice of the image in bytes. It bounds the latency of keys, because no frame

@@ -1,8 +1,8 @@
 //! Conversion of terminal events to messages for the model.
 
 use crate::dashboard::message::Message;
-use crate::terminal::event::{Mouse, MouseKind};
-use crate::terminal::{InputReader, TimedEvent};
+use zerkalo_terminal::event::{Mouse, MouseKind};
+use zerkalo_terminal::{InputReader, TimedEvent};
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;
@@ -68,7 +68,7 @@ pub fn join(queue: &mut Vec<Input>, input: Input) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terminal::event::{Button, Code, Key};
+    use zerkalo_terminal::event::{Button, Code, Key};
 
     fn at(kind: MouseKind, column: u16) -> Input {
         let mouse = Mouse { kind, column, row: 1, modified: false };

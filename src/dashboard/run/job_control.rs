@@ -3,7 +3,7 @@
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
 use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, stop_process};
-use crate::terminal::{TimedEvent, Tty, size};
+use zerkalo_terminal::{TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
 use std::sync::Arc;

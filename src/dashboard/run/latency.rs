@@ -1,7 +1,7 @@
 //! Measurement of input latency: the time from reading an input event until the frame that responds
 //! to the event has been written to the terminal.
 
-use crate::disk;
+use zerkalo_scene::disk;
 use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -24,13 +24,13 @@ mod writer;
 use crate::dashboard::message::{Effect, Exported, Message};
 use crate::dashboard::model::Model;
 use crate::dashboard::update::update;
-use crate::render::plan::WatchedFilms;
-use crate::render::schedule::{Settings, Stop};
-use crate::render::session::{Snapshot, State};
-use crate::render::{Checkpoint, Options};
-use crate::scene::{SceneErrors, SceneFile};
-use crate::terminal::flow::LinkStatus;
-use crate::terminal::{
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::{
     Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
 };
 use crossbeam_channel::{Receiver, after, never, select, unbounded};

@@ -1,6 +1,6 @@
 //! Contents of the scene file as last read or written, shared between threads.
 
-use crate::scene::{Recovery, SceneFile};
+use zerkalo_scene::{Recovery, SceneFile};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// State of the scene file, shared between threads: its contents as last read or written, and the

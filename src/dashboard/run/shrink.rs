@@ -1,7 +1,7 @@
 //! Downscaling of images in linear light.
 
-use crate::film::box_means;
-use crate::terminal::cells::{Raster, level, linear};
+use zerkalo_render::film::box_means;
+use zerkalo_terminal::cells::{Raster, level, linear};
 
 /// Downscales `image` to `size` (width, height), which is not larger. A new pixel covers an area of
 /// the old image. Its value is the mean of this area in linear light.

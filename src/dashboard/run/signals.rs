@@ -1,7 +1,7 @@
 //! Handling of signals that end, stop or continue the program, and of the signal that the terminal
 //! was resized. After a terminating signal the dashboard has a grace period to end by itself.
 
-use crate::terminal::Tty;
+use zerkalo_terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};

@@ -1,6 +1,6 @@
 //! Thread that writes frames to the terminal, so that a slow terminal does not block the dashboard.
 
-use crate::terminal::Tty;
+use zerkalo_terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::sync::Arc;

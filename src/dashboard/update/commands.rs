@@ -9,7 +9,7 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
 use crate::dashboard::update::UpdateContext;
-use crate::terminal::event::Key;
+use zerkalo_terminal::event::Key;
 use HintLine as H;
 
 /// State of the dashboard that selects the hints in the hint line, the last row of the screen.

@@ -4,7 +4,7 @@
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
 use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
-use crate::film::{LinearImage, Tone};
+use zerkalo_render::film::{LinearImage, Tone};
 use std::sync::Arc;
 
 /// Change of the displayed picture's exposure per step, in stops.

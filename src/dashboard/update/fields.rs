@@ -5,7 +5,7 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{FieldLine, walk_fields};
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, Edit, EditError, Widget};
+use zerkalo_scene::edit::{self, Edit, EditError, Widget};
 
 impl UpdateContext<'_> {
     fn set_editor(&mut self, editor: Option<Editor>) {

@@ -5,9 +5,9 @@ use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, first_line, short_name};
 use crate::dashboard::overlay::Answer;
 use crate::dashboard::update::UpdateContext;
-use crate::scene::edit::{Target, outline};
-use crate::scene::{SaveError, Scene, SceneErrors};
-use crate::value::sanitized;
+use zerkalo_scene::edit::{Target, outline};
+use zerkalo_scene::{SaveError, Scene, SceneErrors};
+use zerkalo_scene::value::sanitized;
 use std::path::PathBuf;
 use std::sync::Arc;
 

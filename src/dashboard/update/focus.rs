@@ -4,7 +4,7 @@
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{CompareView, Mode};
 use crate::dashboard::update::{UpdateContext, cycled};
-use crate::scene::edit;
+use zerkalo_scene::edit;
 
 impl UpdateContext<'_> {
     /// Enters `mode`, which determines the effect of the arrow keys, and gives the focus to the

@@ -4,7 +4,7 @@
 use crate::dashboard::model::FieldList;
 use crate::dashboard::overlay::{Form, Overlay, Pick};
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, Edit, EditError, Word};
+use zerkalo_scene::edit::{self, Edit, EditError, Word};
 use std::sync::Arc;
 
 impl UpdateContext<'_> {

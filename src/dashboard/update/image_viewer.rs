@@ -4,7 +4,7 @@ use crate::dashboard::message::Effect;
 use crate::dashboard::model::short_name;
 use crate::dashboard::overlay::{Overlay, ViewedImage};
 use crate::dashboard::update::UpdateContext;
-use crate::terminal::image::ViewerImage;
+use zerkalo_terminal::image::ViewerImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

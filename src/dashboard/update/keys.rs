@@ -7,7 +7,7 @@ use crate::dashboard::model::{FieldList, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
-use crate::terminal::event::{Code, Key};
+use zerkalo_terminal::event::{Code, Key};
 
 /// Returns the character that `key` types. Returns `None` if it types none.
 fn typed(key: Key) -> Option<char> {

@@ -1,10 +1,10 @@
 //! Commands on focus and aperture of the camera.
 
-use crate::camera::{Aperture, Camera};
+use zerkalo_scene::camera::{Aperture, Camera};
 use crate::dashboard::update::mouse::first_hit;
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, bounds};
-use crate::value::{number, round_significant};
+use zerkalo_scene::edit::{self, bounds};
+use zerkalo_scene::value::{number, round_significant};
 
 impl UpdateContext<'_> {
     /// Opens the camera's aperture by `stops` stops; a negative number closes it.

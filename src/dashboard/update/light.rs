@@ -1,8 +1,8 @@
 //! Commands on lights.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{Edit, EditError, Target, step, toggle};
-use crate::value::number;
+use zerkalo_scene::edit::{Edit, EditError, Target, step, toggle};
+use zerkalo_scene::value::number;
 
 impl UpdateContext<'_> {
     pub(super) fn next_light(&mut self) {

@@ -9,8 +9,8 @@ use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{COMMANDS, Command};
-use crate::render::schedule::Stop;
-use crate::render::session::QUALITIES;
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 

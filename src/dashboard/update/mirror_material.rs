@@ -3,8 +3,8 @@
 //! in the scene.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, Edit, EditError, Target};
-use crate::value::{number, truncated};
+use zerkalo_scene::edit::{self, Edit, EditError, Target};
+use zerkalo_scene::value::{number, truncated};
 
 impl UpdateContext<'_> {
     pub(super) fn roughness(&mut self, steps: f64) {

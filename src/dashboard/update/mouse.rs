@@ -6,9 +6,9 @@ use crate::dashboard::model::{Drag, FieldList, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
-use crate::scene::Scene;
-use crate::scene::edit::Target;
-use crate::terminal::event::{Button, Mouse, MouseKind};
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::Target;
+use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
 use ratatui::layout::Rect;
 

@@ -2,7 +2,7 @@
 
 use crate::dashboard::model::Mode;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
-use crate::scene::edit::{self, bounds, step_length};
+use zerkalo_scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
 /// Angle in degrees of one step of turning the selection.

@@ -5,9 +5,9 @@ use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
 use crate::dashboard::overlay::{Overlay, Prompt};
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::render::schedule::Stop;
-use crate::scene::edit::{self, Target};
-use crate::value::{number, truncated};
+use zerkalo_render::schedule::Stop;
+use zerkalo_scene::edit::{self, Target};
+use zerkalo_scene::value::{number, truncated};
 use std::path::PathBuf;
 use std::sync::Arc;
 

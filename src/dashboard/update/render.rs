@@ -6,8 +6,8 @@ use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::prompt::stop_text;
 use crate::dashboard::update::{UpdateContext, cycled};
-use crate::render::schedule::Stop;
-use crate::render::session::QUALITIES;
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::QUALITIES;
 use std::sync::Arc;
 
 impl UpdateContext<'_> {

@@ -1,5 +1,5 @@
 //! Undo coalescing: the rule that decides which successive edits form one undo step.
-//! [`History`](crate::scene::History) merges such edits.
+//! [`History`](zerkalo_scene::History) merges such edits.
 
 use std::time::Duration;
 

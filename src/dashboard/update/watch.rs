@@ -5,11 +5,11 @@ use crate::dashboard::model::{Mode, WatchTable, short_name};
 use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
-use crate::render::schedule::Stop;
-use crate::render::session::{WatchReport, WatchedShards};
-use crate::scene::Scene;
-use crate::terminal::event::{Mouse, MouseKind};
-use crate::value::sanitized;
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::{WatchReport, WatchedShards};
+use zerkalo_scene::Scene;
+use zerkalo_terminal::event::{Mouse, MouseKind};
+use zerkalo_scene::value::sanitized;
 use std::path::Path;
 use std::sync::Arc;
 

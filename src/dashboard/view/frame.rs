@@ -6,7 +6,7 @@ use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use crate::film::Tone;
+use zerkalo_render::film::Tone;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};

@@ -3,7 +3,7 @@
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
+use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;

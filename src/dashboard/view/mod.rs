@@ -23,7 +23,7 @@ mod watch;
 use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use crate::terminal::cells::{Colors, PictureCells};
+use zerkalo_terminal::cells::{Colors, PictureCells};
 use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;

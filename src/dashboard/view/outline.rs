@@ -8,8 +8,8 @@ use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns};
 use crate::dashboard::view::theme::Theme;
-use crate::scene::edit::Target;
-use crate::terminal::cells::object_color;
+use zerkalo_scene::edit::Target;
+use zerkalo_terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
 /// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is hidden.

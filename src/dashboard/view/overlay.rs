@@ -10,7 +10,7 @@ use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
-use crate::render::session::QUALITIES;
+use zerkalo_render::session::QUALITIES;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;

@@ -5,12 +5,12 @@ use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
-use crate::film::{Display, LinearImage, TILE};
-use crate::render::session::{Snapshot, State};
-use crate::terminal::cells::{
+use zerkalo_render::film::{Display, LinearImage, TILE};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_terminal::cells::{
     NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
 };
-use crate::world::FirstHit;
+use zerkalo_world::FirstHit;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;

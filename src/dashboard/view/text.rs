@@ -2,7 +2,7 @@
 //! truncated with an ellipsis.
 
 use crate::dashboard::overlay_layout::wrapped;
-use crate::value::sanitized;
+use zerkalo_scene::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;

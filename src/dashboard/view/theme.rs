@@ -3,7 +3,7 @@
 //! The tones are readable on both dark and light backgrounds. The most important text has the
 //! terminal's default colour.
 
-use crate::terminal::cells::{Colors, nearest_xterm};
+use zerkalo_terminal::cells::{Colors, nearest_xterm};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
 

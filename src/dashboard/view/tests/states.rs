@@ -9,13 +9,13 @@ use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
-use crate::film::{Display, LightWeights, PixelProbe};
-use crate::render::schedule::{Spp, Stop, StoppedBy};
-use crate::render::session::{
+use zerkalo_render::film::{Display, LightWeights, PixelProbe};
+use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
+use zerkalo_render::session::{
     Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
 };
-use crate::scene::edit::{self, Target};
-use crate::scene::{Scene, built_in};
+use zerkalo_scene::edit::{self, Target};
+use zerkalo_scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -231,7 +231,7 @@ pub const STATES: &[Named] = &[
         let edit = edit::delete(m.scene(), &Target::Object(0)).unwrap();
         m.history.record(Arc::new(edit.scene), "delete", false);
         m.display.exposure_ev = 0.75;
-        m.display.tone = crate::film::Tone::Neutral;
+        m.display.tone = zerkalo_render::film::Tone::Neutral;
         m.low_priority = true;
         let size = [1920, 1080];
         m.export = Some(RunningExport { size, progress: 0.43 });
@@ -379,7 +379,7 @@ pub const STATES: &[Named] = &[
         let mut scene = built_in();
         scene.objects[0].name = "鏡の部屋\u{1b}[31m\u{202e} with a name that never ends".into();
         scene.lights[0].name = "\t\n\u{7}".into();
-        m.file.name = crate::value::sanitized("鏡\u{1b}]0;evil\u{7}.toml");
+        m.file.name = zerkalo_scene::value::sanitized("鏡\u{1b}]0;evil\u{7}.toml");
         m.history.record(Arc::new(scene), "names", false);
         m.focus = Focus::Outline;
         m.selection = Target::Object(0);

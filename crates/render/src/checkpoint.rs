@@ -1,0 +1,290 @@
+//! Checkpoints: film files from which a later process continues a render. The result is bit for bit
+//! that of a render without interruption.
+//!
+//! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
+//! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
+//! schedule. `TIME` has the seconds of rendering so far (f64). The seconds are no part of `SCHD`,
+//! because equal renders take different times.
+
+use crate::export::{Provenance, film_header};
+use crate::film::Film;
+use crate::film::file::{
+    Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
+    write_film_file,
+};
+use crate::schedule::{Schedule, Settings};
+use crate::session::Report;
+use crate::{Options, RenderState};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::{Existing, WriteError};
+use zerkalo_world::{self as world, AnyWorld};
+
+const SCENE: Tag = *b"SCEN";
+const SCHEDULE: Tag = *b"SCHD";
+/// Tag of the checkpoint's chunk with the seconds of rendering.
+const CLOCK: Tag = *b"TIME";
+
+/// Version of this program. Another version may trace different samples.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+
+/// Inputs of a film's samples in addition to those in the film's header (size, seed, precision).
+///
+/// Encoding: hash of the contents of meshes and images (u64, 0 for none), then three texts, each
+/// preceded by its length (u32): the program's version, the sampler's name, the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleInputs {
+    /// Hash of the contents of meshes and images, see [`Scene::contents_hash`]. `None` if the scene
+    /// has neither.
+    pub contents_hash: Option<u64>,
+    /// Version of the program that traced the samples.
+    pub program: String,
+    /// Name of the kind of random numbers, see [`SamplerKind::name`].
+    pub sampler: String,
+    /// Scene for which the samples were traced, as text of a scene file.
+    pub scene: String,
+}
+
+impl SampleInputs {
+    /// Creates the inputs of the samples that this version of the program traces for `scene`.
+    pub fn new(scene: &Scene, sampler: SamplerKind) -> Self {
+        Self {
+            contents_hash: scene.contents_hash(),
+            program: PROGRAM.to_string(),
+            sampler: sampler.name().to_string(),
+            scene: scene.to_text(),
+        }
+    }
+
+    /// Encodes the inputs of the render's samples as a chunk of a film file. Returns the tag of the
+    /// chunk and its contents.
+    pub fn encode(&self) -> (Tag, Vec<u8>) {
+        let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
+        for text in [&self.program, &self.sampler, &self.scene] {
+            out.extend((text.len() as u32).to_le_bytes());
+            out.extend(text.bytes());
+        }
+        (SCENE, out)
+    }
+
+    /// Returns `true` if samples that were traced with these inputs are valid for `scene`. The
+    /// lights of `scene` may differ from those of [`Self::scene`] in colour and intensity if the
+    /// film stores their light separately.
+    pub fn fit(&self, scene: &Scene) -> bool {
+        let resolver = scene.resolver.clone();
+        let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
+            return false;
+        };
+        self.contents_hash == compiled.contents_hash()
+            && AnyWorld::compile(&compiled, &world::Options::default())
+                .light_groups()
+                .can_reuse(&compiled, scene)
+    }
+
+    /// Reads the inputs of the samples from the header of a film file. Returns `None` if the header
+    /// has none, or damaged ones.
+    pub fn of(header: &FilmFileHeader) -> Option<Self> {
+        let mut fields = Fields::new(header.chunks.get(&SCENE)?);
+        let hash = fields.u64()?;
+        let [program, sampler, scene] = [fields.text()?, fields.text()?, fields.text()?];
+        let contents_hash = (hash != 0).then_some(hash);
+        fields.is_empty().then_some(Self { contents_hash, program, sampler, scene })
+    }
+}
+
+/// Checkpoint encoded as bytes, so that another thread can write it.
+pub struct EncodedCheckpoint(Vec<Vec<u8>>);
+
+impl EncodedCheckpoint {
+    /// Encodes the state of a render as a checkpoint, on the threads of `pool`. `report` is the
+    /// latest report on this render.
+    pub(super) fn new(
+        state: &RenderState,
+        schedule: &Schedule,
+        report: &Report,
+        provenance: &Provenance,
+        pool: &rayon::ThreadPool,
+    ) -> Self {
+        let film = &state.film;
+        let compiled = state.lighting().compiled();
+        let mut header = film_header(state, report, provenance, state.display());
+        header.chunks.extend([
+            SampleInputs::new(compiled, provenance.sampler).encode(),
+            (SCHEDULE, schedule.encode()),
+            (CLOCK, report.seconds.to_le_bytes().to_vec()),
+        ]);
+        let mut pieces = vec![header.encode()];
+        pool.install(|| {
+            let tiles = (0..tile_chunks(film)).into_par_iter();
+            pieces.par_extend(tiles.map(|index| encode_tiles(film, index)));
+        });
+        pieces.push(encode_end(film, &pieces));
+        Self(pieces)
+    }
+
+    /// Writes the checkpoint to the file at `path`. If there is a file at `path` already,
+    /// `existing` decides: the file is replaced once the new one is complete, or the function
+    /// fails.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written, or if it exists and must not be replaced. An existing
+    /// file is then unchanged.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
+        write_film_file(path, &self.0, existing)
+    }
+}
+
+/// Checkpoint that was read from a file.
+#[derive(Debug)]
+pub struct Checkpoint {
+    path: PathBuf,
+    /// Header of the checkpoint's film file: all contents except for the film.
+    pub header: FilmFileHeader,
+    /// Inputs of the samples: scene, sampler, program version.
+    pub inputs: SampleInputs,
+    film: Film,
+}
+
+/// State of a render that was restored from a checkpoint.
+pub(super) struct Resumed {
+    pub state: RenderState,
+    schedule: Vec<u8>,
+    path: PathBuf,
+    /// Seconds that the render had taken when the checkpoint was written: the sum over all runs of
+    /// the program that continued it.
+    pub seconds: f64,
+    /// `true` if the light weights or the display transform of the resumed render differ from those
+    /// of the checkpoint.
+    pub is_relit: bool,
+}
+
+impl Resumed {
+    /// Restores the schedule of the checkpoint's render, with new settings.
+    ///
+    /// # Errors
+    /// Fails if the state of the schedule does not belong to the film.
+    pub fn schedule(&self, settings: Settings) -> Result<Schedule, ReadError> {
+        let film = &self.state.film;
+        let counts: Vec<_> = (0..film.tile_count()).map(|tile| film.counts(tile)).collect();
+        let mut schedule = self.state.schedule(settings);
+        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| {
+            let what = "the state of its schedule does not belong to its samples";
+            ReadError::new(&self.path, what, "copy it again, or use an older one")
+        })
+    }
+}
+
+impl Checkpoint {
+    /// Reads the checkpoint at `path`.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read, is no checkpoint, or is damaged.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let (header, film) = FilmReader::open(path)?.read()?;
+        let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
+        let Some(inputs) = inputs else {
+            let what = "it is a film without the state of a render";
+            let remedy = "name a file that `zerkalo render --checkpoint` has written";
+            return Err(ReadError::new(path, what, remedy));
+        };
+        Ok(Self { path: path.to_path_buf(), header, inputs, film })
+    }
+
+    /// Returns the random seed and the kind of random numbers of the samples.
+    pub fn sampling(&self) -> SampleSettings {
+        let kind = SamplerKind::from_name(&self.inputs.sampler).unwrap_or(SamplerKind::Sobol);
+        SampleSettings { seed: self.header.film.seed, kind }
+    }
+
+    /// Compiles the checkpoint's scene and restores its render. The picture is then that of
+    /// `scene`, whose lights may differ from those of the checkpoint's scene.
+    ///
+    /// # Errors
+    /// Fails if the samples of the checkpoint are not those of `scene` and `options`.
+    pub(super) fn resume(
+        self,
+        scene: &Arc<Scene>,
+        options: &Options,
+    ) -> Result<Resumed, ReadError> {
+        self.check_options(scene, options)?;
+        let foreign = "name the scene and its files as they were, or render without --resume";
+        let same = scene.to_text() == self.inputs.scene;
+        let compiled = if same {
+            Arc::clone(scene)
+        } else {
+            let read = Scene::parse_in(&self.inputs.scene, "checkpoint", scene.resolver.clone());
+            Arc::new(
+                read.map_err(|e| self.error(format!("its scene cannot be used: {e}"), foreign))?,
+            )
+        };
+        if compiled.contents_hash() != self.inputs.contents_hash {
+            let what = "the meshes or images of the scene have other contents now";
+            return Err(self.error(what, foreign));
+        }
+        let mut state = RenderState::checked(&compiled, options, None)
+            .map_err(|fault| self.error(fault, "correct the scene"))?;
+        let (ours, theirs) = (state.film.header(), &self.header.film);
+        if ours.precision != theirs.precision {
+            let what = format!("its precision is {}, not {}", theirs.precision, ours.precision);
+            return Err(self.error(what, &format!("add --precision {}", theirs.precision)));
+        }
+        if let Err(mismatch) = state.film.check_header(theirs) {
+            return Err(self.error(mismatch.to_string(), foreign));
+        }
+        if !same && !state.try_reuse(scene) {
+            let what = "it is of another scene, which differs in more than its lights";
+            return Err(self.error(what, foreign));
+        }
+        let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
+        let seconds = seconds_of(&self.header);
+        let mut chunks = self.header.chunks;
+        state.film = self.film;
+        Ok(Resumed {
+            state,
+            schedule: chunks.remove(&SCHEDULE).unwrap_or_default(),
+            path: self.path,
+            seconds,
+            is_relit,
+        })
+    }
+
+    /// Checks that size, seed, sampler and program version are those of a render of `scene` with
+    /// `options`.
+    fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
+        let film = &self.header.film;
+        let [width, height] = scene.film.size.map(|n| n as usize);
+        let size = format!("{}x{}", film.width, film.height);
+        let sampler = options.sampling.kind.name();
+        let comparisons = [
+            ("size", size, format!("{width}x{height}"), "--size"),
+            ("seed", film.seed.to_string(), options.sampling.seed.to_string(), "--seed"),
+            ("sampler", self.inputs.sampler.clone(), sampler.to_string(), "--sampler"),
+        ];
+        for (name, theirs, ours, option) in comparisons {
+            if theirs != ours {
+                let what = format!("its {name} is {theirs}, not {ours}");
+                return Err(self.error(what, &format!("add {option} {theirs}")));
+            }
+        }
+        if self.inputs.program != PROGRAM {
+            let program = &self.inputs.program;
+            let what = format!("zerkalo {program} wrote it, and this is {PROGRAM}");
+            let remedy = format!("use zerkalo {program}, whose samples may differ");
+            return Err(self.error(what, &remedy));
+        }
+        Ok(())
+    }
+
+    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
+        ReadError::new(&self.path, what, remedy)
+    }
+}
+
+/// Returns the seconds that the render in a film file had taken; 0 if they are missing or invalid.
+pub(super) fn seconds_of(header: &FilmFileHeader) -> f64 {
+    let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
+    seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite()).unwrap_or(0.0)
+}

@@ -1,0 +1,198 @@
+//! Display transform of radiance to pixel values: exposure, tone curve, sRGB encoding.
+
+use crate::film::srgb_table::SrgbTable;
+use std::fmt;
+use std::str::FromStr;
+use zerkalo_scene::value::srgb_from_linear;
+
+/// Tone curve: maps scene radiance to the linear light that a display emits, as a fraction of the
+/// display's white.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Tone {
+    /// Tone curve that clips each colour channel at 1.
+    #[default]
+    Clip,
+    /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
+    /// 0.04 from all channels, then compresses the colours whose largest channel is above 0.76. It
+    /// keeps hues.
+    Neutral,
+}
+
+impl Tone {
+    /// All tone curves, each with the name that options and scenes use.
+    pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
+}
+
+impl fmt::Display for Tone {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let named = Self::NAMED.iter().find(|(_, tone)| tone == self);
+        f.write_str(named.map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for Tone {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
+        named.map(|(_, tone)| *tone).ok_or_else(|| {
+            let names: Vec<_> = Self::NAMED.iter().map(|(name, _)| *name).collect();
+            format!("tone curve `{text}` is not known; known: {}", names.join(", "))
+        })
+    }
+}
+
+/// Display transform: exposure, then tone curve, then sRGB encoding.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Display {
+    /// Exposure in stops: radiance is multiplied by 2 to the power of this value.
+    pub exposure_ev: f64,
+    /// Tone curve that is applied after the exposure.
+    pub tone: Tone,
+}
+
+impl Display {
+    /// Converts radiance to unrounded sRGB values, 0..=255.
+    pub fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
+        self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
+    }
+
+    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::codes`].
+    /// A lookup table makes this method several times faster than that one.
+    pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
+        self.to_8()(radiance)
+    }
+
+    /// Returns [`Display::codes_8`] as a closure with precomputed constants, for many pixels.
+    pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
+        let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
+        move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
+    }
+
+    /// Converts radiance to linear light of the display, 0..=1: exposure and tone curve without
+    /// sRGB encoding.
+    pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
+        toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
+    }
+
+    /// Returns the factor by which the exposure multiplies radiance: 2 to the power of the exposure
+    /// in stops.
+    pub fn exposure_factor(&self) -> f64 {
+        self.exposure_ev.exp2()
+    }
+}
+
+/// Applies the tone curve `tone` to the linear colour `color`, which includes the exposure. The
+/// result is linear light of the display, 0..=1.
+#[inline(always)]
+pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
+    match tone {
+        Tone::Clip => color.map(|c| c.clamp(0.0, 1.0)),
+        Tone::Neutral => neutral(color).map(|c| c.clamp(0.0, 1.0)),
+    }
+}
+
+/// Applies the Khronos PBR Neutral tone mapper, with the formulas of the specification.
+#[inline(always)]
+fn neutral(color: [f64; 3]) -> [f64; 3] {
+    const F90: f64 = 0.04;
+    const START: f64 = 0.8 - F90;
+    const DESATURATION: f64 = 0.15;
+    let least = color[0].min(color[1]).min(color[2]);
+    let offset = if least < 2.0 * F90 { least - least * least / (4.0 * F90) } else { F90 };
+    let color = color.map(|c| c - offset);
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak < START {
+        return color;
+    }
+    let room = 1.0 - START;
+    let new_peak = 1.0 - room * room / (peak + room - START);
+    let to_white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
+}
+
+/// Converts an unrounded sRGB value, 0..=255, to 16 bits and rounds it; 255 becomes 65535.
+pub fn quantised_16(code: f64) -> u16 {
+    (code * (65535.0 / 255.0)).round() as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::quantised_8;
+    use zerkalo_scene::value::linear_from_srgb;
+
+    #[test]
+    fn srgb_encoding_follows_the_standard() {
+        // The two pieces of the sRGB curve (linear and power) join continuously, and every 8-bit
+        // value round-trips.
+        let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
+        assert!((above - below).abs() < 1e-6 && above > below);
+        for code in 0..=255u8 {
+            let v = f64::from(code) / 255.0;
+            let linear = linear_from_srgb(v);
+            let codes = Display::default().codes([linear; 3]);
+            assert!((codes[0] - f64::from(code)).abs() < 1e-5, "{code}: {codes:?}");
+            assert_eq!(quantised_8(codes[1]), code);
+            assert_eq!(quantised_16(codes[2]), u16::from(code) * 257);
+        }
+        let grey = Display::default().codes([0.5, 0.214_041_14, 0.01]);
+        let expected = [187.515_6, 127.5, 25.463];
+        (0..3).for_each(|c| assert!((grey[c] - expected[c]).abs() < 2e-3, "{grey:?}"));
+    }
+
+    #[test]
+    fn quantisation_rounds_to_nearest_and_stays_in_range() {
+        assert_eq!([0.49, 0.51, 254.49, 254.51].map(quantised_8), [0, 1, 254, 255]);
+        assert_eq!([-3.0, 300.0, f64::NAN].map(quantised_8), [0, 255, 0]);
+        assert_eq!([0.0, 127.5, 255.0].map(quantised_16), [0, 32_768, 65_535]);
+    }
+
+    #[test]
+    fn exposure_multiplies_by_powers_of_two() {
+        let bright = Display { exposure_ev: 3.0, tone: Tone::Clip };
+        let plain = Display::default();
+        assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
+    }
+
+    /// Checks the tone mapper against values of the specification's shader, evaluated by hand in
+    /// double precision.
+    #[test]
+    fn neutral_follows_its_publication() {
+        let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };
+        // The toe of the curve ends at 0.08. A grey g below it becomes 6.25 g^2; a grey above it
+        // becomes g - 0.04.
+        let near = |got: [f64; 3], expected: [f64; 3]| {
+            (0..3).for_each(|c| assert!((got[c] - expected[c]).abs() < 1e-12, "{got:?}"));
+        };
+        near(neutral.shown([0.04; 3]), [0.01; 3]);
+        near(neutral.shown([0.2, 0.5, 0.7]), [0.16, 0.46, 0.66]);
+        // A grey of 4 has the peak 4 - 0.04 = 3.96. It is compressed to 1 - 0.24^2 / (3.96 + 0.24 -
+        // 0.76) = 0.983255813953...
+        let peak = 1.0 - 0.0576 / 3.44;
+        near(neutral.shown([4.0; 3]), [peak; 3]);
+        // The smallest channel of this colour is 0, so nothing is subtracted. The peak of 2 is
+        // compressed to 1 - 0.0576 / 1.48. The colour is then mixed with white of this peak; white
+        // has the weight g.
+        let peak = 1.0 - 0.0576 / 1.48;
+        let g = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
+        near(neutral.shown([2.0, 1.0, 0.0]), [peak, peak / 2.0 * (1.0 + g), peak * g]);
+    }
+
+    #[test]
+    fn tone_curves_rise_and_stay_in_range() {
+        for (name, tone) in Tone::NAMED {
+            assert_eq!((name.parse(), tone.to_string()), (Ok(tone), name.to_string()));
+            let display = Display { exposure_ev: 0.0, tone };
+            let mut last = 0.0;
+            for i in 0..20_000 {
+                let [r, g, b] = display.codes([f64::from(i) * 1e-3; 3]);
+                assert!(r >= last && r <= 255.0 && r == g && g == b, "{name} at {i}");
+                last = r;
+            }
+            assert!(display.codes([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
+        }
+        let unknown = "filmic".parse::<Tone>().unwrap_err();
+        assert_eq!(unknown, "tone curve `filmic` is not known; known: clip, neutral");
+    }
+}

@@ -1,0 +1,401 @@
+//! Reader of film files (`.zk`). It compares every length with the length of the file before it
+//! allocates memory.
+
+use crate::film::display::Display;
+use crate::film::file::encode::CHECKSUM_BYTES;
+use crate::film::file::{
+    DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, TILES, TILES_PER_CHUNK, Tag, VERSION,
+    tile_record,
+};
+use crate::film::light_weights::LightWeights;
+use crate::film::store::{Film, Header};
+use crate::film::{MAX_FILM_GROUPS, TILE};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use zerkalo_scene::disk::open_regular;
+use zerkalo_scene::value::truncated;
+
+/// Smallest number of bytes that a tile takes in a film file: the two sample counts (u32 each) of a
+/// tile without samples.
+const RECORD_BYTES: u64 = 8;
+
+/// Error that makes a film file (`.zk`) unusable.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadError {
+    /// Path of the film file.
+    pub path: PathBuf,
+    /// Description of the error, as a clause of a sentence.
+    pub what: String,
+    /// Advice to the user, as a clause of a sentence.
+    pub remedy: String,
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "cannot use {}: {}; {}", self.path.display(), self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+impl ReadError {
+    /// Creates the error of reading the film file `path`. `what` describes the error, and `remedy`
+    /// advises the user; both are clauses.
+    pub(crate) fn new(path: &Path, what: impl Into<String>, remedy: &str) -> Self {
+        Self { path: path.to_path_buf(), what: what.into(), remedy: remedy.to_string() }
+    }
+}
+
+/// Returns `true` if the file at `path` begins with the magic bytes of film files (`.zk`).
+pub fn is_film_file(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
+}
+
+/// Reader of a film file (`.zk`). It has already read everything before the tiles.
+#[derive(Debug)]
+pub struct FilmReader<R> {
+    input: Input<R>,
+    header: FilmFileHeader,
+    /// First chunk after the header, already read: a `TILE` chunk, or the `DONE` chunk.
+    next: Chunk,
+    checksums: crc32fast::Hasher,
+}
+
+/// Bytes of a film file that remain to be read.
+#[derive(Debug)]
+struct Input<R> {
+    path: PathBuf,
+    bytes: R,
+    /// Number of bytes of the film file that remain to be read.
+    left: u64,
+}
+
+#[derive(Debug)]
+struct Chunk {
+    tag: Tag,
+    contents: Vec<u8>,
+    checksum: [u8; CHECKSUM_BYTES],
+}
+
+impl FilmReader<BufReader<File>> {
+    /// Opens the film file at `path` and reads everything before the tiles.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read, is no film file, or is damaged.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (length, file) = opened.map_err(|e| match e.kind() {
+            ErrorKind::NotFound => ReadError::new(path, "there is no such file", "check its name"),
+            ErrorKind::InvalidInput => ReadError::new(path, e.to_string(), "name a file"),
+            _ => ReadError::new(path, e.to_string(), "check its name and permissions"),
+        })?;
+        Self::new(path, BufReader::with_capacity(1 << 16, file), length)
+    }
+}
+
+impl<R: Read> FilmReader<R> {
+    /// Reads everything before the tiles from `bytes`, the contents of a film file of `length`
+    /// bytes. `path` is the name of the file in errors.
+    ///
+    /// # Errors
+    /// Fails if the bytes cannot be read, are no film file, or are damaged.
+    pub fn new(path: &Path, bytes: R, length: u64) -> Result<Self, ReadError> {
+        let mut input = Input { path: path.to_path_buf(), bytes, left: length };
+        let mut checksums = crc32fast::Hasher::new();
+        let magic = input.take(MAGIC.len() as u64, "its first bytes")?;
+        if magic != MAGIC {
+            return Err(input.error(
+                "it is not a film file",
+                "name a file that `zerkalo render --checkpoint` has written",
+            ));
+        }
+        let version = input.take(4, "its version")?;
+        if version != VERSION.to_le_bytes() {
+            let version = u32::from_le_bytes([version[0], version[1], version[2], version[3]]);
+            return Err(input.error(
+                format!("it has version {version} of the format, and this program reads {VERSION}"),
+                "use the program that wrote it, or render again",
+            ));
+        }
+        checksums.update(&magic);
+        checksums.update(&VERSION.to_le_bytes());
+        let mut next = input.chunk()?;
+        let mut chunks = BTreeMap::new();
+        let mut head = None;
+        let mut metadata = None;
+        while ![TILES, DONE].contains(&next.tag) {
+            checksums.update(&next.tag);
+            checksums.update(&(next.contents.len() as u64).to_le_bytes());
+            checksums.update(&next.contents);
+            checksums.update(&next.checksum);
+            let twice = match next.tag {
+                HEAD => head.replace(next.contents).is_some(),
+                META => metadata.replace(next.contents).is_some(),
+                tag => chunks.insert(tag, next.contents).is_some(),
+            };
+            if twice {
+                return Err(input.damaged("a part of it occurs twice"));
+            }
+            next = input.chunk()?;
+        }
+        let mut header = head
+            .and_then(|head| decode_head(&mut Fields::new(&head), length))
+            .ok_or_else(|| input.damaged("its header has invalid values"))?;
+        header.metadata = metadata
+            .and_then(|metadata| decode_metadata(&mut Fields::new(&metadata)))
+            .ok_or_else(|| input.damaged("its metadata are not readable"))?;
+        header.chunks = chunks;
+        Ok(Self { input, header, next, checksums })
+    }
+
+    /// Returns everything in the file before the tiles: size, scales, seed, light weights,
+    /// metadata.
+    pub fn header(&self) -> &FilmFileHeader {
+        &self.header
+    }
+
+    /// Reads the tiles of the film file. Returns its header and its film.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the file cannot be read or is damaged.
+    pub fn read(self) -> Result<(FilmFileHeader, Film), ReadError> {
+        let mut film = Film::new(self.header.film.clone());
+        let header = self.add_to(&mut film)?;
+        Ok((header, film))
+    }
+
+    /// Adds the samples of the file to `film`. After an error `film` may contain some of them.
+    ///
+    /// # Errors
+    /// Fails if size, scales, seed or precision differ from those of `film`, or if the file cannot
+    /// be read or is damaged.
+    pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, ReadError> {
+        if let Err(mismatch) = film.check_header(&self.header.film) {
+            return Err(self.input.error(mismatch.to_string(), "name a file of the same render"));
+        }
+        let groups = self.header.film.scales.len();
+        self.visit_tiles(|fields, numbers| {
+            for index in numbers {
+                if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
+                    fields.0 = rest;
+                    continue;
+                }
+                let mut tile = film.new_tile(index);
+                tile_record::decode(&mut tile, groups, fields)?;
+                film.add_at(index, tile).ok()?;
+            }
+            fields.is_empty().then_some(())
+        })
+    }
+
+    /// Reads the file to its end and verifies all checksums. It creates no film.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is damaged.
+    pub fn verify(self) -> Result<FilmFileHeader, ReadError> {
+        self.visit_tiles(|_, _| Some(()))
+    }
+
+    /// Calls `visit` for each `TILE` chunk. The arguments are a reader of the chunk's tile records
+    /// and the range of the tiles' numbers. Returns the header of the file. If `visit` returns
+    /// `None` because a record is not valid, the result is an error.
+    fn visit_tiles(
+        self,
+        mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
+    ) -> Result<FilmFileHeader, ReadError> {
+        let Self { mut input, header, mut next, mut checksums } = self;
+        let all = header.film.width.div_ceil(TILE) * header.film.height.div_ceil(TILE);
+        let mut tiles = 0;
+        while next.tag == TILES {
+            let mut fields = Fields::new(&next.contents);
+            let numbers = fields.u32().zip(fields.u32());
+            let numbers =
+                numbers.map(|(first, count)| first as usize..(first as usize + count as usize));
+            let numbers =
+                numbers.filter(|n| n.start == tiles && n.len() <= TILES_PER_CHUNK && n.end <= all);
+            let visited = numbers.and_then(|numbers| {
+                visit(&mut fields, numbers.clone()).map(|()| tiles = numbers.end)
+            });
+            if visited.is_none() {
+                return Err(input.damaged(format!("a tile from {tiles} on has invalid values")));
+            }
+            checksums.update(&next.checksum);
+            next = input.chunk()?;
+        }
+        let mut done = Fields::new(&next.contents);
+        let expected = (all as u64, checksums.finalize());
+        if next.tag != DONE || done.u64().zip(done.u32()) != Some(expected) || !done.is_empty() {
+            return Err(input.damaged("its parts do not belong together"));
+        }
+        if tiles != all {
+            return Err(input.damaged(format!("it has {tiles} tiles of {all}")));
+        }
+        if input.left != 0 {
+            return Err(input.damaged(format!("{} bytes follow its end", input.left)));
+        }
+        Ok(header)
+    }
+}
+
+/// Decodes the `HEAD` chunk of a film file. `length` is the length of the whole file in bytes.
+/// Metadata and further chunks of the result are empty. Returns `None` if a field is not valid, or
+/// if a file of `length` bytes is too short for the tiles of a film with the decoded size.
+fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
+    let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
+    let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
+    let sides = 1..=MAX_SIDE;
+    let possible = sides.contains(&width)
+        && sides.contains(&height)
+        && (1..=MAX_FILM_GROUPS).contains(&groups)
+        && tiles * RECORD_BYTES <= length;
+    if !possible {
+        return None;
+    }
+    let (mut scales, mut weights, mut group_names) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..groups {
+        let scale = fields.f64()?;
+        if !Header::is_valid_scale(scale) {
+            return None;
+        }
+        scales.push(scale);
+        let weight = [fields.f64()?, fields.f64()?, fields.f64()?];
+        if !weight.iter().all(|w| w.is_finite() && *w >= 0.0) {
+            return None;
+        }
+        weights.push(weight);
+        group_names.push(fields.text()?);
+    }
+    let (seed, precision) = (fields.u64()?, fields.text()?);
+    let exposure_ev = fields.f64()?;
+    let tone = fields.text()?.parse().ok()?;
+    let plain = ["single", "double"].contains(&precision.as_str()) && exposure_ev.is_finite();
+    (plain && fields.is_empty()).then(|| FilmFileHeader {
+        film: Header { width, height, scales, seed, precision },
+        weights: LightWeights { weights },
+        group_names,
+        display: Display { exposure_ev, tone },
+        metadata: Vec::new(),
+        chunks: BTreeMap::new(),
+    })
+}
+
+fn decode_metadata(fields: &mut Fields) -> Option<Vec<(String, String)>> {
+    let count = fields.u32()?;
+    let entries = (0..count).map(|_| Some((fields.text()?, fields.text()?)));
+    let entries = entries.collect::<Option<Vec<_>>>()?;
+    fields.is_empty().then_some(entries)
+}
+
+impl<R: Read> Input<R> {
+    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
+        ReadError::new(&self.path, what, remedy)
+    }
+
+    fn damaged(&self, what: impl Into<String>) -> ReadError {
+        self.error(
+            format!("it is damaged or was altered: {}", what.into()),
+            "copy it again, or use an older one",
+        )
+    }
+
+    /// Reads `length` bytes of the film file. `part` names this part of the file in error messages.
+    fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
+        let cut = |input: &Self| {
+            let what = format!("it ends in the middle of {part}: it was not copied as a whole");
+            input.error(what, "copy it again, or use an older one")
+        };
+        if length > self.left {
+            return Err(cut(self));
+        }
+        let mut bytes = Vec::new();
+        let size = usize::try_from(length).unwrap_or(usize::MAX);
+        if bytes.try_reserve_exact(size).is_err() {
+            let what = format!("{part} takes {length} bytes of memory, which the system refuses");
+            return Err(self.error(what, "use a machine with more memory"));
+        }
+        bytes.resize(size, 0);
+        match self.bytes.read_exact(&mut bytes) {
+            Ok(()) => {}
+            // The file has become shorter since it was opened.
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(cut(self)),
+            Err(error) => return Err(self.error(error.to_string(), "check the disk")),
+        }
+        self.left -= length;
+        Ok(bytes)
+    }
+
+    fn chunk(&mut self) -> Result<Chunk, ReadError> {
+        let start = self.take(12, "a part")?;
+        let (tag, length) = start.split_at(4);
+        let tag: Tag = [tag[0], tag[1], tag[2], tag[3]];
+        let name = truncated(&String::from_utf8_lossy(&tag)).to_string();
+        let length = Fields::new(length).u64().unwrap_or(u64::MAX);
+        let contents = self.take(length, &format!("the part {name}"))?;
+        let checksum = self.take(CHECKSUM_BYTES as u64, &format!("the part {name}"))?;
+        let mut expected = crc32fast::Hasher::new();
+        expected.update(&start);
+        expected.update(&contents);
+        if checksum != expected.finalize().to_le_bytes() {
+            return Err(self.damaged(format!("the checksum of its part {name} is wrong")));
+        }
+        let checksum = [checksum[0], checksum[1], checksum[2], checksum[3]];
+        Ok(Chunk { tag, contents, checksum })
+    }
+}
+
+/// Reader of the fields (numbers, texts) in a byte string, from its start. Each method consumes the
+/// bytes that it reads, and returns `None` if there are too few bytes or the value is not valid.
+pub struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    /// Creates a reader of the fields in `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// Returns `true` if no bytes are left to read.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Reads `length` bytes. Returns `None` if fewer are left.
+    pub fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    /// Reads an unsigned 8-bit number. Returns `None` at the end of the bytes.
+    pub fn u8(&mut self) -> Option<u8> {
+        self.take(1).map(|bytes| bytes[0])
+    }
+
+    /// Reads an unsigned 32-bit number, little-endian. Returns `None` if too few bytes are left.
+    pub fn u32(&mut self) -> Option<u32> {
+        self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
+    }
+
+    /// Reads an unsigned 64-bit number, little-endian. Returns `None` if too few bytes are left.
+    pub fn u64(&mut self) -> Option<u64> {
+        self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
+    }
+
+    /// Reads a 64-bit floating-point number, little-endian. Returns `None` if too few bytes are
+    /// left.
+    pub fn f64(&mut self) -> Option<f64> {
+        self.u64().map(f64::from_bits)
+    }
+
+    /// Reads a UTF-8 text that is preceded by its length in bytes (u32). Returns `None` if too few
+    /// bytes are left or they are not UTF-8.
+    pub fn text(&mut self) -> Option<String> {
+        let length = self.u32()? as usize;
+        String::from_utf8(self.take(length)?.to_vec()).ok()
+    }
+}

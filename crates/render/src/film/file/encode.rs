@@ -1,0 +1,114 @@
+//! Writer of film files (`.zk`).
+
+use crate::film::file::{
+    DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
+};
+use crate::film::store::Film;
+use std::io::Write;
+use std::path::Path;
+use zerkalo_scene::disk::{Existing, WriteError, replace_file};
+
+/// Number of bytes of the checksum at the end of a film file's chunk.
+pub(super) const CHECKSUM_BYTES: usize = 4;
+
+impl FilmFileHeader {
+    /// Encodes the part of the film file before the tiles.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
+        out.extend(chunk(HEAD, |head| self.encode_head(head)));
+        out.extend(chunk(META, |meta| {
+            meta.extend((self.metadata.len() as u32).to_le_bytes());
+            for (key, value) in &self.metadata {
+                text(key, meta);
+                text(value, meta);
+            }
+        }));
+        for (tag, contents) in &self.chunks {
+            debug_assert!(![HEAD, META, TILES, DONE].contains(tag), "a chunk with a fixed tag");
+            out.extend(chunk(*tag, |out| out.extend(contents)));
+        }
+        out
+    }
+
+    fn encode_head(&self, out: &mut Vec<u8>) {
+        let film = &self.film;
+        for n in [film.width, film.height, film.scales.len()] {
+            out.extend((n as u32).to_le_bytes());
+        }
+        for (group, scale) in film.scales.iter().enumerate() {
+            out.extend(scale.to_le_bytes());
+            let weights = self.weights.weights.get(group).unwrap_or(&[1.0; 3]);
+            weights.iter().for_each(|weight| out.extend(weight.to_le_bytes()));
+            text(self.group_names.get(group).map_or("", String::as_str), out);
+        }
+        out.extend(film.seed.to_le_bytes());
+        text(&film.precision, out);
+        out.extend(self.display.exposure_ev.to_le_bytes());
+        text(&self.display.tone.to_string(), out);
+    }
+}
+
+/// Returns the number of `TILE` chunks in the film file of `film`.
+pub fn tile_chunks(film: &Film) -> usize {
+    film.tile_count().div_ceil(TILES_PER_CHUNK)
+}
+
+/// Encodes the `TILE` chunk with the number `index`, which must be below [`tile_chunks`]. A tile in
+/// which only some pixels have their first sample is written as a tile without samples.
+pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
+    let first = index * TILES_PER_CHUNK;
+    let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
+    chunk(TILES, |out| {
+        out.extend((first as u32).to_le_bytes());
+        out.extend((count as u32).to_le_bytes());
+        (first..first + count).for_each(|tile| tile_record::encode(film.tile(tile), out));
+    })
+}
+
+/// Encodes the last chunk of a film file. `pieces` are the encoded header and the encoded tile
+/// chunks. The chunk has one checksum of the header's bytes and of the checksums of the tile
+/// chunks.
+pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
+    let mut checksum = crc32fast::Hasher::new();
+    // The header consists of several chunks. The checksum covers all of its bytes. Of each tile
+    // chunk it covers only the checksum at the end.
+    for (i, piece) in pieces.iter().enumerate() {
+        let start = if i == 0 { 0 } else { piece.len() - CHECKSUM_BYTES };
+        checksum.update(&piece[start..]);
+    }
+    let checksum = checksum.finalize();
+    chunk(DONE, |out| {
+        out.extend((film.tile_count() as u64).to_le_bytes());
+        out.extend(checksum.to_le_bytes());
+    })
+}
+
+/// Writes a film file from its encoded pieces: header, tiles, end. `existing` chooses whether an
+/// existing file at `path` is replaced or the call fails. The old file is replaced only when the
+/// new one is complete and stored on the disk.
+///
+/// # Errors
+/// Fails if the file cannot be written, or if it exists and `existing` does not permit replacing
+/// it. An existing file is then unchanged.
+pub fn write_film_file(
+    path: &Path,
+    pieces: &[Vec<u8>],
+    existing: Existing,
+) -> Result<(), WriteError> {
+    replace_file(path, existing, |file| pieces.iter().try_for_each(|piece| file.write_all(piece)))
+}
+
+fn text(text: &str, out: &mut Vec<u8>) {
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(text.as_bytes());
+}
+
+fn chunk(tag: Tag, contents: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut out = [&tag[..], &[0; 8]].concat();
+    contents(&mut out);
+    let length = (out.len() - 12) as u64;
+    out[4..12].copy_from_slice(&length.to_le_bytes());
+    let checksum = crc32fast::hash(&out);
+    out.extend(checksum.to_le_bytes());
+    out
+}

@@ -1,0 +1,110 @@
+//! Film files (`.zk`): a film with all its integer sums, and what is needed to continue its render.
+//!
+//! All numbers are little-endian. A file consists of
+//!
+//! - the magic bytes `89 5A 4B 46 0D 0A 1A 0A`. A transfer in text mode changes them, as in PNG;
+//! - the version of the format (u32);
+//! - chunks. A chunk has a tag (four letters), the length of its contents in bytes (u64), its
+//!   contents, and a CRC-32 (IEEE 802.3, u32) of tag, length and contents.
+//!
+//! | tag | contents |
+//! |---|---|
+//! | `HEAD` | width, height, number of light groups (u32 each); for each group its scale and its weights in red, green, blue (f64 each) and its name; seed (u64); precision; exposure in stops (f64); tone curve |
+//! | `META` | number of entries (u32), then key and value of each, as in the metadata of pictures |
+//! | others | contents that this module does not interpret, in the order of their tags |
+//! | `TILE` | number of the first tile and number of tiles (u32 each), then the records of up to 64 consecutive tiles, row by row |
+//! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
+//!
+//! A text has its length in bytes (u32) before it. A tile record consists of
+//!
+//! - the numbers of samples per pixel in the replicates A and B, the two halves of the samples (u32
+//!   each). If both are 0, the record ends here;
+//! - the number of samples above the largest value that the film can store (u64);
+//! - the number of invalid samples (u64);
+//! - the number of invalid samples whose positions are stored (u8), and for each of them its index
+//!   in the sample sequence, x, y (u32 each) and replicate (u8; 0: A, 1: B);
+//! - the integer sums in planes, in the order replicate, group, channel. A plane begins with the
+//!   number of bytes that its largest sum needs (u8, 0 to 8). The sums of the pixels inside the
+//!   picture follow row by row, each with this number of bytes.
+//!
+//! The file takes about 60 % of the film's size in memory. The encoding takes less time than
+//! writing the other 40 % to disk would.
+
+mod decode;
+mod encode;
+#[cfg(test)]
+mod tests;
+mod tile_record;
+
+pub use decode::{Fields, FilmReader, ReadError, is_film_file};
+pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
+
+use crate::film::display::Display;
+use crate::film::light_weights::LightWeights;
+use crate::film::store::Header;
+use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
+use std::collections::BTreeMap;
+use zerkalo_scene::disk::WriteError;
+
+/// First bytes of a film file.
+const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
+/// Version of the film file format that is written and read.
+const VERSION: u32 = 1;
+/// Number of tiles in a `TILE` chunk of a film file; the last chunk may have fewer.
+const TILES_PER_CHUNK: usize = 64;
+/// Largest width and height, in pixels, of a film that is read from a file.
+const MAX_SIDE: usize = 1 << 17;
+
+/// Tag of a film file's chunk: four ASCII letters.
+pub type Tag = [u8; 4];
+
+const HEAD: Tag = *b"HEAD";
+const META: Tag = *b"META";
+const TILES: Tag = *b"TILE";
+const DONE: Tag = *b"DONE";
+
+/// Contents of a film file except for the tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmFileHeader {
+    /// Size, scales, random seed and precision of the film.
+    pub film: Header,
+    /// Weight of each light group in the picture.
+    pub weights: LightWeights,
+    /// Name of each light group of the film.
+    pub group_names: Vec<String>,
+    /// Display transform with which the noise of the picture was estimated.
+    pub display: Display,
+    /// Keys and values that describe the picture, as in picture files.
+    pub metadata: Vec<(String, String)>,
+    /// Further chunks of the film file by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not
+    /// allowed.
+    pub chunks: BTreeMap<Tag, Vec<u8>>,
+}
+
+impl FilmFileHeader {
+    /// Returns the name of the scene file that was rendered. Returns `None` if the metadata lack it.
+    pub fn source(&self) -> Option<&str> {
+        self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
+    }
+
+    /// Writes the picture of `film` to `output`. `self` must be the header of `film`. `depth` is
+    /// the number of bits per channel of a PNG.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write_picture(
+        &self,
+        film: &Film,
+        depth: Depth,
+        output: &ImageOutput,
+    ) -> Result<(), WriteError> {
+        let picture = ImageData {
+            size: [film.width(), film.height()].map(|n| n as u32),
+            mix: &self.weights,
+            group_names: &self.group_names,
+            display: self.display,
+            depth,
+        };
+        output.write(&picture, &mut WholeFilm { film, metadata: &self.metadata })
+    }
+}

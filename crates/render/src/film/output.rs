@@ -1,0 +1,235 @@
+//! Output of picture files: choice of the format by the file's extension, and replacement of
+//! existing files.
+
+use crate::film::bands::Bands;
+use crate::film::image_data::{ImageData, WriteSeek};
+use crate::film::{exr, png};
+use std::ffi::OsStr;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
+
+/// Picture file format with its encoder.
+struct Format {
+    extension: &'static str,
+    encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
+}
+
+/// Formats of the picture files that can be written.
+static FORMATS: [Format; 2] = [
+    Format { extension: "png", encode: png::encode },
+    Format { extension: "exr", encode: exr::encode },
+];
+
+/// Picture file to be written: a path with the extension of a known format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImageOutput {
+    path: PathBuf,
+    format: usize,
+    existing: Existing,
+}
+
+impl ImageOutput {
+    /// Creates an output for the file `path`. Its extension, in upper or lower case, chooses the
+    /// format. Accesses no file.
+    ///
+    /// # Errors
+    /// Fails if the extension is missing or unknown.
+    pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
+        let path = path.into();
+        let extension = path.extension().map(OsStr::to_string_lossy);
+        let known = extension
+            .as_ref()
+            .and_then(|e| FORMATS.iter().position(|f| e.eq_ignore_ascii_case(f.extension)));
+        match known {
+            Some(format) => Ok(Self { path, format, existing: Existing::Replace }),
+            None => {
+                let known: Vec<_> = FORMATS.iter().map(|f| format!(".{}", f.extension)).collect();
+                Err(WriteError {
+                    kind: ErrorKind::InvalidFilename,
+                    what: match extension {
+                        Some(e) => format!("no picture format has the extension .{e}"),
+                        None => {
+                            "its name has no extension that names the picture format".to_string()
+                        }
+                    },
+                    remedy: format!("known extensions: {}", known.join(", ")),
+                    path,
+                })
+            }
+        }
+    }
+
+    /// Returns an output for the same file that never replaces an existing file. Writing then fails
+    /// if the file exists when the write begins, or when the last row is complete.
+    pub fn create_new(self) -> Self {
+        Self { existing: Existing::Refuse, ..self }
+    }
+
+    /// Returns the path of the picture file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Checks, without changing the picture file, that it can be written. Long renders call this
+    /// method at their start.
+    ///
+    /// # Errors
+    ///
+    /// Returns the error that writing would return now.
+    pub fn check_writable(&self) -> Result<(), WriteError> {
+        Replacement::begin(&self.path, self.existing).map(drop)
+    }
+
+    /// Writes the picture to a temporary file in the same directory, row by row. Renames this file
+    /// to the path of the picture when it is complete and stored on the disk.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written, or if `bands` cannot supply a row. An existing file is
+    /// then unchanged.
+    pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
+        replace_file(&self.path, self.existing, |file| {
+            let mut out = BufWriter::with_capacity(1 << 16, file);
+            (FORMATS[self.format].encode)(picture, bands, &mut out)?;
+            out.flush()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::testing::{fill, film, white};
+    use crate::film::{Depth, Display, FileMetadata, Film, LightWeights, WholeFilm};
+    use std::fs;
+
+    #[test]
+    fn extension_chooses_the_format() {
+        for good in ["a.png", "A.PNG", "dir.x/b.Exr"] {
+            assert_eq!(ImageOutput::from_path(good).unwrap().path(), Path::new(good));
+        }
+        let error = ImageOutput::from_path("out.jpeg").unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "cannot write out.jpeg: no picture format has the extension .jpeg; \
+             known extensions: .png, .exr"
+        );
+        let error = ImageOutput::from_path("picture").unwrap_err().to_string();
+        assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
+    }
+
+    /// Returns a picture of 40 x 20 pixels.
+    fn picture(mix: &LightWeights) -> ImageData<'_> {
+        let (display, depth) = (Display::default(), Depth::Eight);
+        ImageData { size: [40, 20], mix, group_names: &[], display, depth }
+    }
+
+    #[test]
+    fn failed_write_keeps_the_old_file_and_names_the_reason() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        fs::write(&path, "old").unwrap();
+        let target = ImageOutput::from_path(&path).unwrap();
+        let mut full = Failing(film(40, 20, &[1.0]), || ErrorKind::StorageFull.into());
+        let error = target.write(&picture(&white(1)), &mut full).unwrap_err().to_string();
+        assert!(error.contains("no space is left"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn create_new_overwrites_no_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let target = ImageOutput::from_path(&path).unwrap().create_new();
+        let film = film(40, 20, &[1.0]);
+        let write = |noise: &str| {
+            let metadata = &entries(noise);
+            target.write(&picture(&white(1)), &mut WholeFilm { film: &film, metadata })
+        };
+        write("new").unwrap();
+        let error = write("newer").unwrap_err().to_string();
+        assert!(error.contains("such a file already"), "{error}");
+        assert_eq!(FileMetadata::read(&path).unwrap().get("Noise"), Some("new"));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    /// Source of picture rows for tests. Its metadata change after the last row, like those of a
+    /// render that runs while the file is written.
+    struct Late<'a> {
+        film: &'a Film,
+        rows: usize,
+    }
+
+    fn entries(noise: &str) -> Vec<(String, String)> {
+        [("Noise", noise), ("Source", "окно.toml")].map(|(k, v)| (k.into(), v.into())).to_vec()
+    }
+
+    impl Bands for Late<'_> {
+        fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
+            self.rows += 1;
+            assert_eq!(y + 1, self.rows, "rows in increasing order");
+            Ok(self.film)
+        }
+
+        fn metadata(&self) -> Vec<(String, String)> {
+            entries(if self.rows < self.film.height() { "unknown" } else { "0.5 8-bit levels" })
+        }
+    }
+
+    #[test]
+    fn metadata_that_are_known_last_replace_placeholders() {
+        let mut film = film(40, 20, &[1.0]);
+        fill(&mut film, 2, |x, y, _| vec![x as f64, y as f64, 1.0]);
+        let folder = tempfile::tempdir().unwrap();
+        let mix = white(1);
+        let picture = picture(&mix);
+        for name in ["a.png", "a.exr"] {
+            let write = |bands: &mut dyn Bands| {
+                let path = folder.path().join(name);
+                ImageOutput::from_path(&path).unwrap().write(&picture, bands).unwrap();
+                assert_eq!(
+                    FileMetadata::read(&path).unwrap().get("Noise"),
+                    Some("0.5 8-bit levels")
+                );
+                fs::read(path).unwrap()
+            };
+            let late = write(&mut Late { film: &film, rows: 0 });
+            let known =
+                write(&mut WholeFilm { film: &film, metadata: &entries("0.5 8-bit levels") });
+            assert!(late == known, "{name}");
+        }
+    }
+
+    /// Source of picture rows that fails after ten rows, as when a signal stops the render or the
+    /// disk is full. The fields are the film and the function that creates the error.
+    struct Failing(Film, fn() -> io::Error);
+
+    impl Bands for Failing {
+        fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
+            if y < 10 { Ok(&self.0) } else { Err(self.1()) }
+        }
+
+        fn metadata(&self) -> Vec<(String, String)> {
+            entries("unknown")
+        }
+    }
+
+    #[test]
+    fn failed_bands_leave_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let mix = white(1);
+        let picture = ImageData { depth: Depth::Sixteen, ..picture(&mix) };
+        for name in ["a.png", "a.exr"] {
+            let path = folder.path().join(name);
+            fs::write(&path, "old").unwrap();
+            let output = ImageOutput::from_path(&path).unwrap();
+            let mut stopped =
+                Failing(film(40, 20, &[1.0]), || io::Error::other("stopped by a signal"));
+            let error = output.write(&picture, &mut stopped).unwrap_err();
+            assert!(error.to_string().contains("stopped by a signal, and the old file"), "{error}");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+}

@@ -1,0 +1,415 @@
+//! Film tile of 16x16 pixels: integer sums of the samples of both replicates (halves of the
+//! samples).
+
+use crate::film::invalid::InvalidSamples;
+use crate::film::{InvalidSample, TILE};
+use std::collections::TryReserveError;
+use zerkalo_kernel::lanes::prefetch;
+
+/// Number of pixels in a film tile.
+pub const TILE_PIXELS: usize = TILE * TILE;
+
+/// Largest number of light groups of a film. Each light group has its own sums.
+pub const MAX_FILM_GROUPS: usize = 16;
+
+/// Number of integer sums (8 bytes each) in a cache line of 64 bytes.
+const CACHE_LINE: usize = 8;
+
+/// Integer sums of a pixel without samples.
+static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
+
+/// Integer sums of 16 x 16 pixels of a film. A pixel has the number `y * 16 + x` in its tile. In
+/// tiles at the right and lower edge of the picture, pixels outside of the picture stay zero (see
+/// [`Tile::extent`]).
+///
+/// All pixels have the same number of samples, except during the first pass. This pass adds the
+/// first sample of replicate A (half of the samples) to more and more pixels; [`Tile::lattice_px`]
+/// determines those that have it already. The number of samples may differ between the replicates A
+/// and B.
+#[derive(Debug)]
+pub struct Tile {
+    /// Epoch of the tile's contents: the film's epoch (a counter of its restarts) when they were
+    /// written; 0 for a new tile.
+    epoch: u64,
+    /// Number of integer sums of a pixel: `groups * 3` for red, green and blue.
+    stride: usize,
+    extent: [usize; 2],
+    counts: [u32; 2],
+    lattice_px: u8,
+    /// `true` if an integer sum has reached `i64::MAX`.
+    full: bool,
+    saturated_samples: u64,
+    bad: InvalidSamples,
+    /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
+    sums: Vec<i64>,
+    /// Bits of the pixels that have been written since the film's last restart: bit `p % 64` of
+    /// `[replicate][p / 64]` is for pixel p. The sums of other pixels count as zero, whatever the
+    /// memory contains. A restart therefore does not access the sums.
+    written: [[u64; TILE_PIXELS / 64]; 2],
+}
+
+impl Tile {
+    pub(super) fn cleared(groups: usize, extent: [usize; 2]) -> Self {
+        Self {
+            epoch: 0,
+            stride: groups * 3,
+            extent,
+            counts: [0; 2],
+            lattice_px: 0,
+            full: false,
+            saturated_samples: 0,
+            bad: InvalidSamples::default(),
+            sums: Vec::new(),
+            written: Default::default(),
+        }
+    }
+
+    /// Takes the memory of the integer sums of `old`, a tile of another film. The caller must
+    /// ensure that nothing has been written to this tile yet.
+    pub(super) fn take_memory(&mut self, old: Self) {
+        self.sums = old.sums;
+    }
+
+    /// Returns the number of integer sums of a tile with `groups` light groups.
+    pub(super) fn sums_len(groups: usize) -> usize {
+        2 * TILE_PIXELS * groups * 3
+    }
+
+    /// Allocates memory for the integer sums if the tile has less than it needs. Does not write to
+    /// the memory.
+    pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
+        let len = Self::sums_len(self.stride / 3);
+        if self.sums.capacity() < len {
+            self.sums = Vec::new();
+            self.sums.try_reserve_exact(len)?;
+        }
+        Ok(())
+    }
+
+    /// Clears the tile if it was last written before the film's latest restart. Allocates its
+    /// memory first if it has too little. `epoch` is the film's epoch, a counter of its restarts.
+    pub(super) fn clear_if_stale(&mut self, epoch: u64) {
+        if self.epoch == epoch {
+            return;
+        }
+        let len = Self::sums_len(self.stride / 3);
+        let mut sums = std::mem::take(&mut self.sums);
+        if sums.capacity() >= len {
+            sums.resize(len, 0);
+        } else {
+            // New memory is allocated, because growing the vector would copy its old contents.
+            sums = vec![0; len];
+        }
+        *self = Self { epoch, sums, ..Self::cleared(self.stride / 3, self.extent) };
+    }
+
+    pub(super) fn is_of(&self, epoch: u64) -> bool {
+        self.epoch == epoch
+    }
+
+    /// Returns width and height in pixels of the tile's part that is inside the picture, 1..=16
+    /// each.
+    pub fn extent(&self) -> [usize; 2] {
+        self.extent
+    }
+
+    /// Returns two numbers: how many samples every pixel of the tile has in replicate A, and how
+    /// many in replicate B. The replicates are the two halves of the samples.
+    pub fn counts(&self) -> [u32; 2] {
+        self.counts
+    }
+
+    /// Returns the progress of the first pass, which gives every pixel of the tile its first sample
+    /// of replicate A (half of the samples). Pixels whose x and y are multiples of the result have
+    /// this sample already; [`Tile::counts`] does not include it. The result is 0 before and after
+    /// the first pass.
+    pub fn lattice_px(&self) -> usize {
+        usize::from(self.lattice_px)
+    }
+
+    /// Returns two numbers: how many samples one pixel has in replicate A, and how many in
+    /// replicate B. The replicates are the two halves of the samples.
+    #[inline]
+    pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
+        let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
+        [self.counts[0] + u32::from(extra), self.counts[1]]
+    }
+
+    /// Returns `true` if at least one pixel has a sample.
+    pub fn any_sampled(&self) -> bool {
+        self.counts != [0; 2] || self.lattice_px != 0
+    }
+
+    /// Increases the sample count of all pixels of the tile in `replicate` (half of the samples; 0:
+    /// A, 1: B) by `samples`. The sums do not change.
+    pub fn advance(&mut self, replicate: usize, samples: u32) {
+        self.counts[replicate] = self.counts[replicate].saturating_add(samples);
+    }
+
+    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have the
+    /// first sample of replicate A (half of the samples). A step of 1 includes all pixels: the
+    /// sample count grows by one, and the first pass of the tile is complete.
+    ///
+    /// # Panics
+    /// Panics if `step_px` is none of these five numbers, or larger than the step of the previous
+    /// call in the same first pass.
+    pub fn set_lattice(&mut self, step_px: usize) {
+        assert!(
+            matches!(step_px, 1 | 2 | 4 | 8 | 16)
+                && (self.lattice_px == 0 || step_px <= self.lattice_px()),
+            "a lattice of {step_px} pixels after one of {}",
+            self.lattice_px
+        );
+        if step_px == 1 {
+            self.lattice_px = 0;
+            self.advance(0, 1);
+        } else {
+            self.lattice_px = step_px as u8;
+        }
+    }
+
+    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B) for
+    /// writing, `[group][channel]`. Callers must ensure that no sum overflows; [`Tile::add`]
+    /// handles overflow itself.
+    #[inline(always)]
+    pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
+        let start = (replicate * TILE_PIXELS + pixel) * self.stride;
+        let sums = &mut self.sums[start..start + self.stride];
+        let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
+        if *word & bit == 0 {
+            *word |= bit;
+            // With one light group, three stores are faster than a call of `fill`.
+            match &mut *sums {
+                [r, g, b] => (*r, *g, *b) = (0, 0, 0),
+                several => several.fill(0),
+            }
+        }
+        sums
+    }
+
+    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B):
+    /// `[group][channel]`.
+    #[inline(always)]
+    pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
+        if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
+            return &ZERO_SUMS[..self.stride];
+        }
+        let start = (replicate * TILE_PIXELS + pixel) * self.stride;
+        &self.sums[start..start + self.stride]
+    }
+
+    /// Prefetches the integer sums of a replicate (half of the samples; 0: A, 1: B) of the tile
+    /// into the processor's cache.
+    pub fn prefetch(&self, replicate: usize) {
+        let start = replicate * TILE_PIXELS * self.stride;
+        let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
+        sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
+    }
+
+    /// Iterates over the pairs (replicate, pixel) whose sums have been written since the film's
+    /// last restart. The replicates 0 and 1 are the two halves of the samples.
+    fn written(&self) -> impl Iterator<Item = (usize, usize)> {
+        let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
+        all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
+    }
+
+    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to the sums of a pixel.
+    /// A sum that would exceed `i64::MAX` is set to `i64::MAX` and counts as saturated. Because no
+    /// value is negative, the result is independent of the order of addition.
+    #[inline(always)]
+    pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
+        for (group, values) in values.chunks_exact(3).enumerate() {
+            self.add_group(replicate, pixel, group, [values[0], values[1], values[2]]);
+        }
+    }
+
+    /// Adds non-negative `values` (red, green, blue) to the integer sums of one pixel and light
+    /// group; see [`Tile::add`].
+    #[inline(always)]
+    pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
+        let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
+        // A sum of non-negative numbers is negative if it has overflowed.
+        let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
+        let fit = new[0] | new[1] | new[2] >= 0;
+        sums.copy_from_slice(&if fit { new } else { new.map(saturated_sum) });
+        self.full |= !fit;
+    }
+
+    /// Returns the number of pixels with an integer sum that has reached `i64::MAX`.
+    pub fn saturated_pixels(&self) -> u64 {
+        if !self.full {
+            return 0;
+        }
+        let full = |pixel: &usize| (0..2).any(|r| self.pixel(r, *pixel).contains(&i64::MAX));
+        (0..TILE_PIXELS).filter(full).count() as u64
+    }
+
+    /// Increases the number of saturated samples by `samples`. A saturated sample is above the
+    /// film's largest sample value and is stored with this value.
+    #[cold]
+    pub fn record_saturated(&mut self, samples: u64) {
+        self.saturated_samples += samples;
+    }
+
+    /// Returns the number of samples above the largest value that the film can store. They were
+    /// clamped to this value.
+    pub fn saturated_samples(&self) -> u64 {
+        self.saturated_samples
+    }
+
+    /// Records an invalid sample (NaN or negative). In its place the caller adds black to the sums.
+    #[cold]
+    pub fn record_bad(&mut self, sample: InvalidSample) {
+        self.bad.record(sample);
+    }
+
+    /// Sets the tile's counters to the values in a film file. The integer sums do not change.
+    /// `counts` are the sample counts of the replicates A and B (halves of the samples).
+    /// `saturated_samples` is the number of samples above the largest value that the film can
+    /// store. `bad` are the invalid samples. `full` is `true` if a sum has reached `i64::MAX`.
+    pub(super) fn restore(
+        &mut self,
+        counts: [u32; 2],
+        saturated_samples: u64,
+        bad: InvalidSamples,
+        full: bool,
+    ) {
+        self.counts = counts;
+        self.saturated_samples = saturated_samples;
+        self.bad = bad;
+        self.full = full;
+    }
+
+    pub(super) fn bad(&self) -> &InvalidSamples {
+        &self.bad
+    }
+
+    /// Adds the samples of `other`, a tile of another film at the same position.
+    ///
+    /// # Errors
+    ///
+    /// Fails if both tiles hold the first sample of only a part of their pixels.
+    pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
+        if self.lattice_px != 0 && other.lattice_px != 0 {
+            return Err(());
+        }
+        for (replicate, pixel) in other.written() {
+            self.add(replicate, pixel, other.pixel(replicate, pixel));
+        }
+        self.full |= other.full;
+        self.saturated_samples += other.saturated_samples;
+        self.lattice_px = self.lattice_px.max(other.lattice_px);
+        for replicate in 0..2 {
+            self.advance(replicate, other.counts[replicate]);
+        }
+        self.bad.merge(&other.bad);
+        Ok(())
+    }
+}
+
+/// Returns `i64::MAX` if `sum`, the result of a wrapping addition, has overflowed, otherwise `sum`.
+#[cold]
+fn saturated_sum(sum: i64) -> i64 {
+    if sum < 0 { i64::MAX } else { sum }
+}
+
+#[inline(always)]
+fn on_lattice(pixel: usize, step_px: usize) -> bool {
+    // The step is a power of two. A coordinate is a multiple of the step if it has no bits below
+    // the bit of the step.
+    ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
+}
+
+/// Iterates row by row over the pixels of a tile whose x and y are multiples of `step_px`, which
+/// divides 16. Leaves out pixels whose x and y are multiples of the larger step `before_px`. If
+/// `before_px` is 0, no pixel is left out.
+pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
+    let lines = move || (0..TILE).step_by(step_px);
+    lines()
+        .flat_map(move |y| lines().map(move |x| y * TILE + x))
+        .filter(move |p| before_px == 0 || !on_lattice(*p, before_px))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tile() -> Tile {
+        let mut tile = Tile::cleared(2, [16, 16]);
+        tile.clear_if_stale(1);
+        tile
+    }
+
+    #[test]
+    fn lattices_visit_every_pixel_once() {
+        let mut seen = [0; TILE_PIXELS];
+        for (before, step) in [(0, 16), (16, 8), (8, 4), (4, 2), (2, 1)] {
+            lattice_pixels(before, step).for_each(|p| seen[p] += 1);
+        }
+        assert_eq!(seen, [1; TILE_PIXELS]);
+        assert_eq!(lattice_pixels(0, 8).collect::<Vec<_>>(), [0, 8, 128, 136]);
+        assert_eq!(lattice_pixels(8, 1).count(), 252);
+    }
+
+    #[test]
+    fn lattice_determines_the_pixels_with_a_first_sample() {
+        let mut tile = tile();
+        assert!(!tile.any_sampled());
+        tile.set_lattice(8);
+        assert!(tile.any_sampled() && tile.counts_of(137) == [0; 2]);
+        assert_eq!((tile.counts(), tile.counts_of(8)), ([0, 0], [1, 0]));
+        tile.set_lattice(1);
+        assert_eq!((tile.counts(), tile.lattice_px()), ([1, 0], 0));
+        assert_eq!(tile.counts_of(137), [1, 0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "a lattice of 8 pixels after one of 4")]
+    fn coarser_lattice_panics() {
+        let mut tile = tile();
+        tile.set_lattice(4);
+        tile.set_lattice(8);
+    }
+
+    #[test]
+    fn saturated_sums_stay_and_are_counted() {
+        let mut tile = tile();
+        tile.add(1, 3, &[i64::MAX - 1, 1, 2, 3, 4, 5]);
+        assert_eq!(tile.saturated_pixels(), 0);
+        tile.add(1, 3, &[2, 1, 2, 3, 4, 5]);
+        tile.add(1, 3, &[2, 0, 0, 0, 0, 0]);
+        assert_eq!(tile.saturated_pixels(), 1);
+        assert_eq!(tile.pixel(1, 3), [i64::MAX, 2, 4, 6, 8, 10]);
+        assert_eq!(tile.pixel(0, 3), [0; 6]);
+        tile.add(0, 3, &[i64::MAX, i64::MAX, 0, 0, 0, 0]);
+        tile.add(0, 3, &[1, 1, 0, 0, 0, 0]);
+        assert_eq!(tile.pixel(0, 3), [i64::MAX, i64::MAX, 0, 0, 0, 0]);
+        assert_eq!(tile.saturated_pixels(), 1);
+    }
+
+    #[test]
+    fn new_epoch_clears_the_tile() {
+        let mut tile = tile();
+        tile.add(0, 0, &[1; 6]);
+        tile.advance(0, 1);
+        tile.record_saturated(3);
+        tile.clear_if_stale(1);
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
+        assert_eq!(tile.saturated_samples(), 3);
+        tile.clear_if_stale(2);
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
+        assert_eq!(tile.saturated_samples(), 0);
+        // The first access to the cleared tile is a write. Below, tiles with 1 and 3 groups reuse
+        // memory of a tile with another number of groups.
+        tile.add(0, 0, &[2; 6]);
+        assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
+        for groups in [1, 3] {
+            let memory = std::mem::replace(&mut tile, Tile::cleared(groups, [16, 16]));
+            tile.take_memory(memory);
+            tile.clear_if_stale(7);
+            tile.add(1, 255, &vec![5; 3 * groups]);
+            assert_eq!(tile.pixel(1, 255), vec![5; 3 * groups]);
+            assert!((0..255).all(|p| tile.pixel(1, p) == vec![0; 3 * groups]));
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! First pass over a picture: traces the first sample of every pixel in stages, from a coarse
+//! lattice of pixels to all pixels.
+
+use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
+use crate::pass::{PassContext, RejectedSamples, TileRenderer};
+use crate::wave::{JobReport, Wave, WaveReport};
+use rayon::prelude::*;
+use std::sync::atomic::Ordering;
+use zerkalo_kernel::lanes::SimdFloat;
+use zerkalo_world::{AnyWorld, Counts, TileTracer, World};
+
+/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A (the first of two
+/// halves of the samples). The first stage traces every 8th pixel in x and y. Three further stages
+/// trace the pixels between, with steps of 4, 2 and 1. Each stage covers all tiles. Calls
+/// `on_stage` with the film after every stage except the last. If the pass is cancelled, it
+/// completes its first stage, starts no jobs of later stages, and returns `None`.
+pub fn run(
+    world: &AnyWorld,
+    film: &mut Film,
+    wave: &Wave,
+    context: PassContext,
+    on_stage: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    match world {
+        AnyWorld::Single(world) => trace_first_pass(world, film, wave, context, on_stage),
+        AnyWorld::Double(world) => trace_first_pass(world, film, wave, context, on_stage),
+    }
+}
+
+/// Number of adjacent tiles in a strip. In stages of the first pass that add only few pixels to
+/// each tile, the tiles of a strip share ray packets.
+const STRIP_TILES: usize = 8;
+
+/// Largest step \[pixels\] at which one tile has enough pixels to fill ray packets. A stage of the
+/// first pass traces every n-th pixel in x and y, with n the step. In stages with larger steps,
+/// adjacent tiles share packets.
+const SHARED_ABOVE: usize = 2;
+
+fn trace_first_pass<L: SimdFloat>(
+    world: &World<L>,
+    film: &mut Film,
+    wave: &Wave,
+    context: PassContext,
+    on_stage: &mut dyn FnMut(&Film),
+) -> Option<WaveReport> {
+    let PassContext { sampling, pool, cancel } = context;
+    let renderer = TileRenderer::new(world, sampling);
+    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
+    let mut counts = vec![Counts::default(); tiles.len()];
+    let mut previous_step = 0;
+    for step in [8, 4, 2, 1] {
+        let mut strips: Vec<(Vec<TileHandle>, &mut [Counts])> = Vec::new();
+        let mut slots = film.slots(&tiles).into_iter();
+        for counts in counts.chunks_mut(STRIP_TILES) {
+            strips.push((slots.by_ref().take(counts.len()).collect(), counts));
+        }
+        let complete = pool.install(|| {
+            strips
+                .into_par_iter()
+                .map(|(slots, counts)| {
+                    if step != 8 && cancel.load(Ordering::Relaxed) {
+                        return false;
+                    }
+                    renderer.lattice(slots, (previous_step, step), counts);
+                    true
+                })
+                .reduce(|| true, |a, b| a & b)
+        });
+        if complete && step != 1 {
+            on_stage(film);
+        }
+        if !complete || (step != 1 && cancel.load(Ordering::Relaxed)) {
+            return None;
+        }
+        previous_step = step;
+    }
+    let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
+    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
+}
+
+/// Pixel of a strip of adjacent tiles.
+struct StripPixel {
+    /// Index of the tile in its strip of adjacent tiles.
+    tile: usize,
+    /// Number of the pixel in its tile; pixels are numbered row by row.
+    pixel: usize,
+    /// Column and row of the pixel in the picture.
+    position: (u32, u32),
+}
+
+/// Returns the pixels that a stage of the first pass adds to `tiles`. A lattice with the step n
+/// holds every n-th pixel of the picture in x and y. The stage adds the pixels of the lattice with
+/// the step `step` that are not in the lattice with the step `previous_step` (0: no earlier
+/// lattice). `tiles` has each tile with the column and row of its first pixel.
+fn pixels_to_add(
+    tiles: &[([usize; 2], &mut Tile)],
+    (previous_step, step): (usize, usize),
+) -> Vec<StripPixel> {
+    let mut pixels = Vec::with_capacity(TILE_PIXELS);
+    for (index, (origin, tile)) in tiles.iter().enumerate() {
+        let extent = tile.extent();
+        let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
+        pixels.extend(lattice_pixels(previous_step, step).filter(inside).map(|pixel| {
+            let (x, y) = (origin[0] + pixel % TILE, origin[1] + pixel / TILE);
+            StripPixel { tile: index, pixel, position: (x as u32, y as u32) }
+        }));
+    }
+    pixels
+}
+
+impl<L: SimdFloat> TileRenderer<'_, L> {
+    /// Traces the first sample of the pixels that one stage of the first pass adds. A lattice with
+    /// the step n holds every n-th pixel in x and y. `steps` has two steps: that of the previous
+    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share ray
+    /// packets if the stage adds only few pixels to each. `counts` receives the ray counts of the
+    /// tiles.
+    fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
+        let mut tiles: Vec<_> =
+            slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
+        let (_, step) = steps;
+        if step > SHARED_ABOVE {
+            let pixels = pixels_to_add(&tiles, steps);
+            let tracer = self.tracer.scattered(0, pixels.iter().map(|p| p.position));
+            self.add_pixels(&mut tiles, tracer, &pixels, counts);
+        } else {
+            for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
+                let pixels = pixels_to_add(tile, steps);
+                let rectangle = (tile[0].0, tile[0].1.extent());
+                let positions = pixels.iter().map(|p| p.position);
+                if let Some(tracer) = self.tracer.tile(0, rectangle, positions) {
+                    self.add_pixels(tile, tracer, &pixels, counts);
+                }
+            }
+        }
+        tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
+    }
+
+    /// Traces the first sample of each of `pixels` with `tracer`, which was created for these
+    /// pixels, and adds the sample to the pixel's tile. `counts` receives the ray counts of
+    /// `tiles`.
+    fn add_pixels(
+        &self,
+        tiles: &mut [([usize; 2], &mut Tile)],
+        mut tracer: TileTracer<L>,
+        pixels: &[StripPixel],
+        counts: &mut [Counts],
+    ) {
+        let mut rejected = RejectedSamples::new(0);
+        tracer.radiance_shared::<1>(0, |packet, radiance| {
+            self.reject_invalid(radiance, &mut rejected, |lane| packet.sample(lane));
+            let packet_pixels = &pixels[packet.pixels.clone()];
+            self.sum_by_pixel::<1, _>(radiance, packet_pixels, |p, group, sums| {
+                tiles[p.tile].1.add_group(0, p.pixel, group, sums);
+            });
+            let tile_of =
+                |x, y| packet_pixels.iter().find(|p| p.position == (x, y)).map(|p| p.tile);
+            for bad in rejected.bad.drain(..) {
+                if let Some(tile) = tile_of(bad.x, bad.y) {
+                    tiles[tile].1.record_bad(bad);
+                }
+            }
+            for saturated in rejected.saturated.drain(..) {
+                if let Some(tile) = tile_of(saturated.x, saturated.y) {
+                    tiles[tile].1.record_saturated(1);
+                }
+            }
+        });
+        // The rays of shared packets are divided among the tiles in proportion to the pixels of
+        // each tile, because the reported cost must not depend on the packet width. Only packets of
+        // a single tile report random choices (`glossy`).
+        let packet_counts = tracer.counts();
+        if let [counts] = counts {
+            counts.rays += packet_counts.rays;
+            counts.glossy |= packet_counts.glossy;
+        } else {
+            let (rays, sharing) = (packet_counts.rays, pixels.len().max(1) as u64);
+            counts[0].rays += rays % sharing;
+            pixels.iter().for_each(|p| counts[p.tile].rays += rays / sharing);
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Progressive rendering: the schedule of samples, the passes that trace them, and the session that
+//! runs both in the background.
+
+pub mod film;
+
+mod checkpoint;
+pub mod export;
+mod first_hit_buffer;
+mod first_pass;
+pub mod memory_budget;
+pub mod pass;
+pub mod plan;
+mod region_render;
+mod relighting;
+mod render_state;
+pub mod schedule;
+pub mod session;
+mod sync_render;
+mod threads;
+pub mod wave;
+
+pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
+pub use first_hit_buffer::FirstHitBuffer;
+pub use region_render::RegionRender;
+pub use relighting::Relighting;
+pub use render_state::{Options, RenderState};
+pub use sync_render::SyncRender;

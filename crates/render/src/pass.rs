@@ -1,0 +1,368 @@
+//! Pass: traces the jobs of one wave and adds their samples to the film. A wave is a set of jobs
+//! that run concurrently, each with samples of one tile. The pass returns when all jobs are done or
+//! cancelled.
+
+use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
+use crate::wave::{Job, JobReport, Wave, WaveReport};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_world::{
+    AnyWorld, CameraTracer, Counts, MAX_BLOCK_PIXELS, MAX_GROUPS, Radiance, TileTracer, World,
+};
+
+const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
+
+/// Inputs that all jobs of a tracing pass share.
+#[derive(Clone, Copy)]
+pub struct PassContext<'a> {
+    /// Random seed and kind of random numbers.
+    pub sampling: &'a SampleSettings,
+    /// Thread pool that traces the jobs.
+    pub pool: &'a rayon::ThreadPool,
+    /// Flag that cancels the pass: once it is `true`, no further job starts.
+    pub cancel: &'a AtomicBool,
+}
+
+/// Traces the jobs of `wave` (a set of jobs that run concurrently) and adds their samples to
+/// `film`. If `wave.estimate` is `true`, `estimator` computes the error of each tile. The report
+/// has an entry for each job, which is `None` if the job was cancelled.
+pub fn run(
+    world: &AnyWorld,
+    film: &mut Film,
+    wave: &Wave,
+    estimator: &Estimator,
+    context: PassContext,
+) -> WaveReport {
+    match world {
+        AnyWorld::Single(world) => run_typed(world, film, wave, estimator, context),
+        AnyWorld::Double(world) => run_typed(world, film, wave, estimator, context),
+    }
+}
+
+/// Traces the jobs of `wave` as [`run`] does, for one SIMD type.
+pub fn run_typed<L: SimdFloat>(
+    world: &World<L>,
+    film: &mut Film,
+    wave: &Wave,
+    estimator: &Estimator,
+    context: PassContext,
+) -> WaveReport {
+    let PassContext { sampling, pool, cancel } = context;
+    let renderer = TileRenderer::new(world, sampling);
+    let tiles: Vec<usize> = wave.jobs.iter().map(|job| job.tile as usize).collect();
+    let slots = film.slots(&tiles);
+    let trace = |(slot, job): (TileHandle, &Job)| {
+        if cancel.load(Ordering::Relaxed) {
+            return None;
+        }
+        let origin = slot.origin;
+        let tile = slot.prepare();
+        let counts = renderer.job(tile, origin, wave.replicate, job);
+        let error = if wave.estimate { estimator.tile(tile) } else { None };
+        Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
+    };
+    // If the wave has a single job and the pool a single thread, the calling thread traces the job.
+    // This saves a switch of threads.
+    let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
+        slots.into_iter().zip(&wave.jobs).map(trace).collect()
+    } else {
+        pool.install(|| slots.into_par_iter().zip(&wave.jobs).with_max_len(1).map(trace).collect())
+    };
+    WaveReport { reports }
+}
+
+/// Renderer of tiles: traces samples and adds their radiance to the film's integer sums.
+pub(super) struct TileRenderer<'a, L: SimdFloat> {
+    pub(super) tracer: CameraTracer<'a, L>,
+    /// Scale of each light group: the number of the film's integer steps per unit of radiance.
+    scales: &'a [f64],
+    /// Largest radiance of one sample that the film can hold, for each light group: 2^49 of the
+    /// film's integer steps.
+    limits: [L; MAX_GROUPS],
+    /// Indices of the pixels of a tile that is entirely inside the picture, see [`pixels_of`].
+    whole_tile: Vec<u8>,
+}
+
+impl<'a, L: SimdFloat> TileRenderer<'a, L> {
+    pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
+        let mut limits = [L::zero(); MAX_GROUPS];
+        for (limit, scale) in limits.iter_mut().zip(world.scales()) {
+            *limit = L::from_f64((49f64.exp2() / scale).min(L::MAX));
+        }
+        Self {
+            tracer: world.camera_tracer(sampling),
+            scales: world.scales(),
+            limits,
+            whole_tile: pixels_of([TILE; 2]),
+        }
+    }
+
+    /// Traces the samples of `job` in the replicate (half of the samples) with the number
+    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the number
+    /// of rays, and a flag that is `true` if a path made a random choice. A packet has `WIDTH`
+    /// lanes. It holds `WIDTH` samples of one pixel if its first sample index is a multiple of
+    /// `WIDTH` and at least `WIDTH` samples remain. Otherwise it holds samples of several pixels.
+    fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
+        let partial_tile: Vec<u8>;
+        let pixels = if tile.extent() == [TILE; 2] {
+            &self.whole_tile
+        } else {
+            partial_tile = pixels_of(tile.extent());
+            &partial_tile
+        };
+        let position = |pixel: &u8| {
+            let pixel = usize::from(*pixel);
+            ((origin[0] + pixel % TILE) as u32, (origin[1] + pixel / TILE) as u32)
+        };
+        let positions = pixels.iter().map(position);
+        let Some(mut tracer) = self.tracer.tile(replicate, (origin, tile.extent()), positions)
+        else {
+            tile.advance(replicate, job.count);
+            return Counts::default();
+        };
+        // The tile's sums are loaded into the cache while the first samples are traced.
+        tile.prefetch(replicate);
+        let mut rejected = RejectedSamples::new(replicate);
+        let (mut index, end) = (job.first, job.first + job.count);
+        while index < end {
+            let count = samples_per_packet(index, end, L::WIDTH);
+            match count {
+                _ if count == L::WIDTH => tracer.radiance(index, |packet, radiance| {
+                    self.reject_invalid(radiance, &mut rejected, |lane| packet.sample(lane));
+                    let pixel = usize::from(pixels[packet.pixels.start]);
+                    self.sum(radiance, |group, sums| {
+                        tile.add_group(replicate, pixel, group, sums);
+                    });
+                }),
+                1 => self.trace_shared::<1>(tile, &mut tracer, &mut rejected, pixels, index),
+                2 => self.trace_shared::<2>(tile, &mut tracer, &mut rejected, pixels, index),
+                4 => self.trace_shared::<4>(tile, &mut tracer, &mut rejected, pixels, index),
+                8 => self.trace_shared::<8>(tile, &mut tracer, &mut rejected, pixels, index),
+                _ => unreachable!("packets are narrower than 32"),
+            }
+            index += count as u32;
+        }
+        rejected.bad.into_iter().for_each(|bad| tile.record_bad(bad));
+        tile.record_saturated(rejected.saturated.len() as u64);
+        tile.advance(replicate, job.count);
+        tracer.counts()
+    }
+
+    /// Traces the samples `first..first + COUNT` of the pixels `pixels` and adds them to `tile`.
+    /// Each packet holds samples of several pixels. Samples that the film cannot hold are recorded
+    /// in `rejected`.
+    #[inline(never)]
+    fn trace_shared<const COUNT: usize>(
+        &self,
+        tile: &mut Tile,
+        tracer: &mut TileTracer<L>,
+        rejected: &mut RejectedSamples,
+        pixels: &[u8],
+        first: u32,
+    ) {
+        let replicate = rejected.replicate;
+        tracer.radiance_shared::<COUNT>(first, |packet, radiance| {
+            self.reject_invalid(radiance, rejected, |lane| packet.sample(lane));
+            let pixels = &pixels[packet.pixels.clone()];
+            self.sum_by_pixel::<COUNT, _>(radiance, pixels, |pixel, group, sums| {
+                tile.add_group(replicate, usize::from(*pixel), group, sums);
+            });
+        });
+    }
+
+    /// Sums the radiance of each light group over all lanes, in integer steps of the film. Calls
+    /// `add(group, sums)` with the sums of red, green and blue.
+    #[inline(always)]
+    fn sum(&self, radiance: &Radiance<L>, mut add: impl FnMut(usize, [i64; 3])) {
+        for (group, scale) in self.scales.iter().enumerate() {
+            let value = radiance.groups[group];
+            add(group, [value.x, value.y, value.z].map(|channel| channel.fixed_sum(*scale)));
+        }
+    }
+
+    /// Sums the radiance of each light group over the lanes of each pixel, in integer steps of the
+    /// film. Each of `pixels` has `COUNT` consecutive lanes. Calls `add(pixel, group, sums)` with
+    /// the sums of red, green and blue.
+    #[inline(always)]
+    pub(super) fn sum_by_pixel<const COUNT: usize, P>(
+        &self,
+        radiance: &Radiance<L>,
+        pixels: &[P],
+        mut add: impl FnMut(&P, usize, [i64; 3]),
+    ) {
+        for (group, scale) in self.scales.iter().enumerate() {
+            let value = radiance.groups[group];
+            let (x, y, z) = (value.x.fixed(*scale), value.y.fixed(*scale), value.z.fixed(*scale));
+            let sums = x.chunks_exact(COUNT).zip(y.chunks_exact(COUNT)).zip(z.chunks_exact(COUNT));
+            for (pixel, ((x, y), z)) in pixels.iter().zip(sums) {
+                add(pixel, group, [x.iter().sum(), y.iter().sum(), z.iter().sum()]);
+            }
+        }
+    }
+
+    /// Replaces those samples of a packet that the film cannot hold, and records them in
+    /// `rejected`. Valid samples, which are the usual case, cost only a comparison. `sample_of`
+    /// receives a lane and returns the position of its pixel and its sample index.
+    #[inline(always)]
+    pub(super) fn reject_invalid(
+        &self,
+        radiance: &mut Radiance<L>,
+        rejected: &mut RejectedSamples,
+        sample_of: impl Fn(usize) -> ((u32, u32), u32),
+    ) {
+        let mut valid = L::mask(true);
+        for (group, limit) in self.limits.iter().enumerate().take(self.scales.len()) {
+            let v = radiance.groups[group];
+            let (zero, limit) = (L::zero(), *limit);
+            valid = valid
+                & (v.x.ge(zero) & v.x.le(limit))
+                & (v.y.ge(zero) & v.y.le(limit))
+                & (v.z.ge(zero) & v.z.le(limit));
+        }
+        if !valid.all() {
+            self.replace_invalid(radiance, rejected, sample_of);
+        }
+    }
+
+    /// Implements [`Self::reject_invalid`] for a packet with at least one invalid sample. A sample
+    /// that is NaN or negative in a channel of a light group becomes black in that group. A channel
+    /// above the largest value that the film can hold, even an infinite one, is reduced to this
+    /// value.
+    #[cold]
+    fn replace_invalid(
+        &self,
+        radiance: &mut Radiance<L>,
+        rejected: &mut RejectedSamples,
+        sample_of: impl Fn(usize) -> ((u32, u32), u32),
+    ) {
+        let (mut bad, mut saturated) = (L::mask(false), L::mask(false));
+        for (group, limit) in radiance.groups.iter_mut().zip(self.limits).take(self.scales.len()) {
+            let (v, zero) = (*group, L::zero());
+            let valid = v.x.ge(zero) & v.y.ge(zero) & v.z.ge(zero);
+            bad = bad | !valid;
+            saturated = saturated | (valid & v.max_element().gt(limit));
+            *group = Vec3::new(v.x.min(limit), v.y.min(limit), v.z.min(limit)).masked(valid);
+        }
+        for lane in (0..L::WIDTH).filter(|lane| (bad | saturated).lane(*lane)) {
+            let ((x, y), index) = sample_of(lane);
+            let sample = InvalidSample { index, replicate: rejected.replicate as u8, y, x };
+            rejected.bad.extend(bad.lane(lane).then_some(sample));
+            rejected.saturated.extend(saturated.lane(lane).then_some(sample));
+        }
+    }
+}
+
+/// Samples of one job that the film cannot hold.
+pub(super) struct RejectedSamples {
+    replicate: usize,
+    /// Samples that are NaN or negative in at least one light group. In place of such a group's
+    /// light the film stores black.
+    pub(super) bad: Vec<InvalidSample>,
+    /// Samples that exceed the film's largest value in at least one light group. In place of the
+    /// excessive values the film stores the largest value.
+    pub(super) saturated: Vec<InvalidSample>,
+}
+
+impl RejectedSamples {
+    pub(super) fn new(replicate: usize) -> Self {
+        Self { replicate, bad: Vec::new(), saturated: Vec::new() }
+    }
+}
+
+/// Returns the number of samples of one pixel in the next packet: the largest power of two, at most
+/// `width`, that divides `first` and fits into the sample indices `first..end`.
+fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
+    let aligned = first | width as u32;
+    1 << aligned.trailing_zeros().min((end - first).ilog2())
+}
+
+/// Indices of a tile's pixels in the order of a Morton curve. An index counts the pixels row by
+/// row. Consecutive pixels of this order share packets; the pixels of a packet form a block of 2 x
+/// 1, 2 x 2, 4 x 2 or 4 x 4.
+const MORTON_ORDER: [u8; TILE_PIXELS] = {
+    let mut order = [0; TILE_PIXELS];
+    let mut i = 0;
+    while i < order.len() {
+        let (mut x, mut y, mut bit) = (0, 0, 0);
+        while 1 << bit < TILE {
+            x |= (i >> (2 * bit) & 1) << bit;
+            y |= (i >> (2 * bit + 1) & 1) << bit;
+            bit += 1;
+        }
+        order[i] = (y * TILE + x) as u8;
+        i += 1;
+    }
+    order
+};
+
+/// Returns the indices of the pixels of a tile with the given width and height, in
+/// [`MORTON_ORDER`]. An index counts the pixels of a whole tile row by row. Tiles at the right and
+/// lower edge of the picture are smaller than a whole tile.
+fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
+    let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
+    MORTON_ORDER.into_iter().filter(inside).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Header;
+    use crate::film::test_film::TestFilm;
+    use zerkalo_kernel::lanes::{Float, Single, Vec3};
+    use zerkalo_kernel::sampling::SamplerKind;
+
+    /// Checks that invalid samples are counted and stored as black, and that samples above the
+    /// largest value of the film are stored as this value. The sums of other light groups are not
+    /// affected.
+    #[test]
+    fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
+        let scene = zerkalo_scene::Scene::parse(
+            "light = [{ directional = { direction = [0.0, -1.0, 0.0] } }]\n\
+             [background]\ncolor = [1.0, 1.0, 1.0]\n\
+             [[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n",
+            "test",
+        )
+        .unwrap_or_else(|e| panic!("{e}"));
+        let world = World::<Single>::new(&scene);
+        assert_eq!(world.groups(), 2);
+        let renderer =
+            TileRenderer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
+        let limit = 49f64.exp2() / world.scales()[0];
+        for (value, stored) in [
+            (f64::NAN, 0.0),
+            (-1.0, 0.0),
+            (f64::NEG_INFINITY, 0.0),
+            (f64::INFINITY, limit),
+            (1e30, limit),
+        ] {
+            let (scales, precision) = (world.scales().to_vec(), "single".to_string());
+            let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
+            let tile = film.slots(&[0]).remove(0).prepare();
+            let mut rejected = RejectedSamples::new(0);
+            let mut radiance = Radiance { groups: [Vec3::<Single>::zero(); MAX_GROUPS] };
+            radiance.groups[0].x =
+                Single::from_fn(|i| Float::from_f64(if i == 3 { value } else { 0.5 }));
+            radiance.groups[1].y = Single::from_f64(0.25);
+            renderer.reject_invalid(&mut radiance, &mut rejected, |lane| ((lane as u32, 0), 0));
+            let pixels = [0, 1, 2, 3, 4, 5, 6, 7];
+            renderer.sum_by_pixel::<1, _>(&radiance, &pixels, |pixel, group, sums| {
+                tile.add_group(0, *pixel, group, sums);
+            });
+            let sample = [InvalidSample { index: 0, replicate: 0, y: 0, x: 3 }];
+            let recorded =
+                if stored == 0.0 { (&sample[..], &[][..]) } else { (&[][..], &sample[..]) };
+            assert_eq!((&rejected.bad[..], &rejected.saturated[..]), recorded, "{value}");
+            rejected.bad.into_iter().for_each(|bad| tile.record_bad(bad));
+            tile.record_saturated(rejected.saturated.len() as u64);
+            tile.advance(0, 1);
+            let only = |group| crate::film::testing::only(group, 2);
+            assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);
+            assert_eq!(film.pixel(3, 0, &only(0)), [stored, 0.0, 0.0], "{value}");
+            assert_eq!(film.pixel(4, 0, &only(0)), [0.5, 0.0, 0.0], "{value}");
+            assert_eq!(film.pixel(3, 0, &only(1)), [0.0, 0.25, 0.0], "{value}");
+        }
+        println!("extreme 30 | both | bad samples counted, pixels finite");
+    }
+}

@@ -1,0 +1,390 @@
+//! Plan files. A plan divides a render among shards, which different processes trace. Its file is
+//! text with one setting or tile per line, in a fixed order, and a checksum at the end.
+//!
+//! The line of a tile has four fields. The first is its base: the number of samples per pixel that
+//! each replicate (half of the samples) had when the plan started. The second is this number in the
+//! merged picture, the third is the expected number of rays per sample. The fourth is `g` if a path
+//! in the tile has made a random choice, such as a direction of a glossy lobe, otherwise `-`.
+
+use crate::film::{Display, Tone};
+use crate::plan::{MAX_SHARDS, Plan, PlanSettings, PlannedTile, tiles_of};
+use crate::schedule::MAX_SAMPLES;
+use std::fmt;
+use std::fmt::Write as _;
+use std::io::{ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_scene::disk::open_regular;
+use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
+
+/// First line of a plan file, with the version of the format.
+const TITLE: &str = "zerkalo plan 1";
+/// Largest length of a plan file in bytes. The plan of a picture of 16384 x 16384 pixels has about
+/// 30 MB.
+const MAX_BYTES: u64 = 1 << 26;
+/// Largest width and height of a planned picture in pixels.
+const MAX_SIDE: u32 = 1 << 14;
+/// Number of bytes of the shortest line of a tile in a plan file.
+const MIN_TILE_BYTES: usize = 8;
+
+/// Beginning of the first line of plan files, whatever their version.
+const START: &[u8] = b"zerkalo plan ";
+
+/// Returns `true` if the file at `path` begins like a plan file.
+pub fn is_plan_file(path: &Path) -> bool {
+    let mut start = [0; START.len()];
+    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == START
+}
+
+/// Error that makes a plan file, or a film file with a plan, unusable.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanError {
+    /// Path of the plan file, or of the film file that contains the plan.
+    pub path: PathBuf,
+    /// Line of the error, counted from 1; 0 for the file as a whole.
+    pub line: usize,
+    /// Description of the error, as a clause of a sentence with the text that was found and the
+    /// text that was expected.
+    pub what: String,
+    /// Advice to the user, as a clause of a sentence.
+    pub remedy: &'static str,
+}
+
+impl fmt::Display for PlanError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        if self.line > 0 {
+            write!(f, ":{}", self.line)?;
+        }
+        write!(f, ": {}; {}", self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for PlanError {}
+
+impl Plan {
+    /// Formats the plan as the text of a plan file.
+    pub fn text(&self) -> String {
+        let mut text = self.body();
+        let checksum = fnv1a64(text.as_bytes());
+        let _ = writeln!(text, "checksum {checksum:016x}");
+        text
+    }
+
+    /// Returns the checksum of the plan, a hash of its text. Plans with equal checksums count as
+    /// equal.
+    pub fn checksum(&self) -> u64 {
+        fnv1a64(self.body().as_bytes())
+    }
+
+    /// Formats all lines of the plan file before the checksum.
+    fn body(&self) -> String {
+        let s = &self.settings;
+        let base = s.base_plan.map_or("pilot".to_string(), |plan| format!("{plan:016x}"));
+        let mut text = format!(
+            "{TITLE}\nscene {}\nscene_hash {}\nsize {}x{}\nseed {}\nsampler {}\nprecision {}\n\
+             exposure {}\ntone {}\nrays_per_pixel {}\nnoise {}\npredicted_noise {}\nslopes {} {}\n\
+             shards {}\nbase {base}\ntiles {}\n",
+            sanitized(&s.source),
+            s.scene_hash,
+            s.size[0],
+            s.size[1],
+            s.seed,
+            s.sampler.name(),
+            s.precision,
+            s.display.exposure_ev,
+            s.display.tone,
+            s.rays_per_pixel,
+            s.noise_codes,
+            self.predicted_codes,
+            self.slopes[0],
+            self.slopes[1],
+            s.shards,
+            self.tiles.len(),
+        );
+        for tile in &self.tiles {
+            let PlannedTile { base, end, rays_per_sample, glossy } = tile;
+            let glossy = if *glossy { 'g' } else { '-' };
+            let _ = writeln!(text, "{base} {end} {rays_per_sample} {glossy}");
+        }
+        text
+    }
+
+    /// Reads a plan file.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is no valid plan.
+    pub fn read(path: &Path) -> Result<Self, PlanError> {
+        let error =
+            |what: String, remedy| PlanError { path: path.to_path_buf(), line: 0, what, remedy };
+        let unreadable = |e: std::io::Error| match e.kind() {
+            ErrorKind::NotFound => error("there is no such file".into(), "check its name"),
+            _ => error(e.to_string(), "check its name and permissions"),
+        };
+        let file = open_regular(path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        if length > MAX_BYTES {
+            let what = format!("it has {length} bytes; a plan has at most {MAX_BYTES}");
+            return Err(error(what, "name a file that `zerkalo plan` has written"));
+        }
+        let mut bytes = Vec::new();
+        file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+        Self::parse(path, &bytes)
+    }
+
+    /// Parses the text of a plan file. `path` is the name of the file in error messages.
+    ///
+    /// # Errors
+    /// Fails if the text is no valid plan.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, PlanError> {
+        let mut lines = Lines { path, line: 0, rest: "" };
+        let whole = |lines: &Lines, what: &str, remedy| PlanError {
+            line: 0,
+            remedy,
+            ..lines.error(what.to_string())
+        };
+        if !bytes.starts_with(START) {
+            let remedy = "name a file that `zerkalo plan` has written";
+            return Err(whole(&lines, "it is not a plan file", remedy));
+        }
+        let Ok(text) = std::str::from_utf8(bytes) else {
+            return Err(whole(&lines, "it is damaged: it is not UTF-8", DAMAGED));
+        };
+        lines.rest = text;
+        let title = lines.next_line();
+        if title != Some(TITLE) {
+            let found = truncated(title.unwrap_or_default());
+            let what = format!("found `{found}`, expected `{TITLE}`");
+            let remedy = "use the version of zerkalo that wrote it, or plan again";
+            return Err(PlanError { remedy, ..lines.error(what) });
+        }
+        let body = text.trim_end_matches('\n').rfind('\n').map_or("", |end| &text[..=end]);
+        let last = &text[body.len()..];
+        if last != format!("checksum {:016x}\n", fnv1a64(body.as_bytes())) {
+            let what = "it is damaged, altered or incomplete: the checksum at its end is wrong";
+            return Err(whole(&lines, what, DAMAGED));
+        }
+        lines.rest = &body[TITLE.len() + 1..];
+        Self::parse_body(&mut lines)
+    }
+
+    fn parse_body(lines: &mut Lines) -> Result<Self, PlanError> {
+        let positive = |text: &str| number(text).filter(|n: &f64| n.is_finite() && *n > 0.0);
+        // The fields are read in the order of the file. The last two follow other lines.
+        let mut settings = PlanSettings {
+            source: lines.setting("scene", "a file name", |text| Some(text.to_string()))?,
+            scene_hash: lines.setting("scene_hash", "a hash", |text| Some(text.to_string()))?,
+            size: lines.setting("size", "WIDTHxHEIGHT, 1 to 16384 pixels each", |text| {
+                let (width, height) = text.split_once('x')?;
+                let size = [number(width)?, number(height)?];
+                size.iter().all(|n| (1..=MAX_SIDE).contains(n)).then_some(size)
+            })?,
+            seed: lines.setting("seed", "an integer from 0", number)?,
+            sampler: lines.setting("sampler", "sobol or random", SamplerKind::from_name)?,
+            precision: lines.setting("precision", "single or double", |text| {
+                ["single", "double"].contains(&text).then(|| text.to_string())
+            })?,
+            display: Display {
+                exposure_ev: lines.setting("exposure", "a number from -64 to 64", |text| {
+                    number(text).filter(|ev: &f64| ev.abs() <= 64.0)
+                })?,
+                tone: lines.setting("tone", "clip or neutral", |text| Tone::from_str(text).ok())?,
+            },
+            rays_per_pixel: lines.setting("rays_per_pixel", "an integer from 0", number)?,
+            noise_codes: lines.setting("noise", "a number above 0", positive)?,
+            shards: 0,
+            base_plan: None,
+        };
+        let predicted_codes = lines.setting("predicted_noise", "a number from 0", |text| {
+            number(text).filter(|n: &f64| n.is_finite() && *n >= 0.0)
+        })?;
+        let slopes = lines.setting("slopes", "two numbers from 0.1 to 2", |text| {
+            let (plain, glossy) = text.split_once(' ')?;
+            let slopes = [number(plain)?, number(glossy)?];
+            slopes.iter().all(|s| (0.1..=2.0).contains(s)).then_some(slopes)
+        })?;
+        settings.shards = lines.setting("shards", "an integer from 1 to 65536", |text| {
+            number(text).filter(|n| (1..=MAX_SHARDS).contains(n))
+        })?;
+        settings.base_plan = lines.setting("base", "pilot or a checksum", |text| match text {
+            "pilot" => Some(None),
+            _ if text.len() == 16 => u64::from_str_radix(text, 16).ok().map(Some),
+            _ => None,
+        })?;
+        let count = tiles_of(settings.size);
+        lines.setting("tiles", &format!("{count}, the number of tiles of the size"), |text| {
+            number(text).filter(|n: &usize| *n == count)
+        })?;
+        // The file may promise more tiles than it has lines. Memory is reserved only for the lines
+        // that it has.
+        let mut tiles = Vec::with_capacity(count.min(lines.rest.len() / MIN_TILE_BYTES));
+        for _ in 0..count {
+            tiles.push(lines.tile()?);
+        }
+        if let Some(line) = lines.next_line() {
+            let what = format!("found `{}`, expected the checksum", truncated(line));
+            return Err(lines.error(what));
+        }
+        Ok(Self { settings, predicted_codes, slopes, tiles })
+    }
+}
+
+/// Advice to the user in errors about damaged plan files.
+const DAMAGED: &str = "copy it again or plan again";
+
+/// Lines of a plan file that remain to be parsed.
+struct Lines<'a> {
+    path: &'a Path,
+    /// Number of the line that was read last, counted from 1.
+    line: usize,
+    rest: &'a str,
+}
+
+impl<'a> Lines<'a> {
+    fn error(&self, what: String) -> PlanError {
+        PlanError { path: self.path.to_path_buf(), line: self.line, what, remedy: DAMAGED }
+    }
+
+    fn next_line(&mut self) -> Option<&'a str> {
+        self.line += 1;
+        let (line, rest) = self.rest.split_once('\n')?;
+        self.rest = rest;
+        Some(line)
+    }
+
+    /// Reads the next line of the plan file, which must have the setting `key`, and parses its
+    /// value. `expected` describes valid values in error messages.
+    fn setting<T>(
+        &mut self,
+        key: &str,
+        expected: &str,
+        parse: impl FnOnce(&str) -> Option<T>,
+    ) -> Result<T, PlanError> {
+        let line = self.next_line().unwrap_or_default();
+        let value = line.strip_prefix(key).and_then(|value| value.strip_prefix(' '));
+        value.and_then(parse).ok_or_else(|| {
+            self.error(format!("found `{}`, expected `{key}` and {expected}", truncated(line)))
+        })
+    }
+
+    fn tile(&mut self) -> Result<PlannedTile, PlanError> {
+        let line = self.next_line().unwrap_or_default();
+        let parse = || {
+            let mut fields = line.split(' ');
+            let tile = PlannedTile {
+                base: number(fields.next()?)?,
+                end: number(fields.next()?)?,
+                rays_per_sample: number(fields.next()?)?,
+                glossy: match fields.next()? {
+                    "g" => true,
+                    "-" => false,
+                    _ => return None,
+                },
+            };
+            let is_valid = tile.base <= tile.end
+                && tile.end <= MAX_SAMPLES
+                && (0.0..=1e9).contains(&tile.rays_per_sample)
+                && fields.next().is_none();
+            is_valid.then_some(tile)
+        };
+        parse().ok_or_else(|| {
+            self.error(format!(
+                "found `{}`, expected a tile: its samples in base and picture, rays per sample, \
+                 `g` or `-`",
+                truncated(line)
+            ))
+        })
+    }
+}
+
+/// Parses a number of a plan file. The text must begin with a digit or a minus sign. Returns `None`
+/// for any other text.
+fn number<T: FromStr>(text: &str) -> Option<T> {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.parse().ok())?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::testing::plan;
+
+    fn parsed(text: &str) -> Result<Plan, String> {
+        Plan::parse(Path::new("job.plan"), text.as_bytes()).map_err(|e| e.to_string())
+    }
+
+    /// Returns the text of a plan file with `from` replaced by `to` and a correct checksum.
+    fn altered(from: &str, to: &str) -> String {
+        let text = plan(8, &[[4, 16], [8, 8], [16, 480]]).body();
+        assert_eq!(text.matches(from).count(), 1, "{from} in {text}");
+        let mut text = text.replace(from, to);
+        let checksum = fnv1a64(text.as_bytes());
+        let _ = writeln!(text, "checksum {checksum:016x}");
+        text
+    }
+
+    #[test]
+    fn plan_survives_its_text() {
+        let mut plan = plan(8, &[[4, 16], [8, 8], [16, 480]]);
+        plan.settings.base_plan = Some(0x12);
+        plan.settings.display = Display { exposure_ev: -1.1, tone: Tone::Neutral };
+        plan.predicted_codes = 1.0 / 3.0;
+        assert_eq!(parsed(&plan.text()).unwrap(), plan);
+        assert!(plan.text().ends_with(&format!("checksum {:016x}\n", plan.checksum())));
+    }
+
+    #[test]
+    fn source_with_line_breaks_stays_in_its_line() {
+        let mut plan = plan(1, &[[4, 16]]);
+        plan.settings.source = "a\nshards 5".into();
+        assert_eq!(parsed(&plan.text()).unwrap().settings.source, "a\\nshards 5");
+    }
+
+    #[test]
+    fn faults_are_located_even_under_a_correct_checksum() {
+        for (from, to, message) in [
+            ("size 48x16", "size 0x16", "job.plan:4: found `size 0x16`, expected `size` and WIDTH"),
+            (
+                "size 48x16",
+                "size 16384x16384",
+                ":16: found `tiles 3`, expected `tiles` and 1048576",
+            ),
+            ("seed 7", "seed -7", "job.plan:5: "),
+            ("sampler sobol", "sampler halton", "expected `sampler` and sobol or random"),
+            ("exposure 0", "exposure nan", "job.plan:8: "),
+            ("noise 0.25\n", "noise 0\n", "job.plan:11: "),
+            ("shards 8", "shards 65537", "an integer from 1 to 65536"),
+            ("base pilot", "base 12", "pilot or a checksum"),
+            ("tiles 3", "tiles 4", "expected `tiles` and 3"),
+            ("4 16 2.25 g", "17 16 2.25 g", "job.plan:17: found `17 16 2.25 g`, expected a tile"),
+            ("4 16 2.25 g", "4 4294967295 2.25 g", "job.plan:17: "),
+            ("4 16 2.25 g", "4 16 inf g", "job.plan:17: "),
+            ("4 16 2.25 g\n", "", "job.plan:19: found ``, expected a tile"),
+            ("4 16 2.25 g", "4 16 2.25 g\n4 16 2.25 g", "job.plan:20: found `16 480 2.25 g`"),
+        ] {
+            let error = parsed(&altered(from, to)).unwrap_err();
+            assert!(error.contains(message), "{to}: {error}");
+        }
+        let other = parsed("zerkalo plan 2\n").unwrap_err();
+        assert!(other.contains("job.plan:1: found `zerkalo plan 2`"), "{other}");
+        assert!(parsed("[film]\nsize = [1, 1]\n").unwrap_err().contains("it is not a plan file"));
+    }
+
+    #[test]
+    fn altered_text_is_refused_by_its_checksum() {
+        let text = plan(8, &[[4, 16], [8, 8]]).text();
+        for end in 14..text.len() {
+            assert!(parsed(&text[..end]).is_err(), "cut at {end}");
+        }
+        let error = parsed(&text.replace("4 16", "4 32")).unwrap_err();
+        assert!(error.contains("the checksum at its end is wrong"), "{error}");
+    }
+
+    #[test]
+    fn unreadable_files_are_refused() {
+        let message = |path: &str| Plan::read(Path::new(path)).unwrap_err().to_string();
+        assert!(message("no-such-file").contains("there is no such file"));
+        assert!(message(".").contains("check its name and permissions"));
+    }
+}

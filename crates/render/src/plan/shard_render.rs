@@ -1,0 +1,165 @@
+//! Render of the samples that a plan assigns to one shard, in steps between which the film can be
+//! saved.
+
+use crate::film::TILE_PIXELS;
+use crate::schedule::{SAMPLE_ALIGNMENT, Spp};
+use crate::session::{Report, State};
+use crate::wave::{Job, Wave};
+use crate::{RenderState, threads};
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// Target duration in seconds of a step in the render of a shard (one process's part of a plan).
+/// The caller can save the film between two steps.
+const STEP_SECONDS: f64 = 0.25;
+/// Target duration in seconds of one tracing job in a shard's render. A job traces samples of one
+/// tile. Jobs are short, so that all threads have work until the end of a step.
+const JOB_SECONDS: f64 = 0.01;
+/// Largest number of samples per pixel of a tracing job, even if [`JOB_SECONDS`] allows more. A job
+/// traces samples of one tile in one replicate (half of the samples).
+const LONGEST_JOB: u32 = 1 << 20;
+/// Number of samples, over all pixels, of the first step of a shard's render. The speed of tracing
+/// is measured in this step. The lengths of the next steps follow from it.
+const FIRST_STEP_SAMPLES: u64 = 1 << 18;
+
+/// Render of the samples of one shard (one process's part of a plan), in steps of about a quarter
+/// of a second. After each step, both replicates (halves of the samples) of every tile hold equally
+/// many samples: the first ones of the shard's range in this tile. A film that was saved between
+/// two steps can therefore be continued.
+pub struct ShardRender {
+    /// Compiled scene and the film with the samples of the shard so far.
+    pub state: RenderState,
+    pool: rayon::ThreadPool,
+    /// Jobs that remain to be traced. Each is traced in both replicates (halves of the samples).
+    remaining: VecDeque<Job>,
+    /// `[samples of the complete shard, samples that the film holds so far]`, over all pixels and
+    /// both replicates (halves of the samples).
+    samples: [u64; 2],
+    rays: u64,
+    /// `(samples traced, seconds of tracing)` in all steps so far, from which the speed of tracing
+    /// follows.
+    measured: (u64, f64),
+}
+
+impl ShardRender {
+    /// Creates the render of a shard on `threads` threads. `ranges` are the shard's sample indices
+    /// in each tile. The film of `state` may already hold the first samples of some ranges, which
+    /// took `rays` rays; the render then continues after them.
+    ///
+    /// # Errors
+    /// Fails if the sample counts of a tile cannot come from an interrupted render of these ranges,
+    /// or if the threads cannot be started.
+    pub fn new(
+        state: RenderState,
+        ranges: &[Range<u32>],
+        rays: u64,
+        threads: usize,
+    ) -> Result<Self, String> {
+        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
+        let mut remaining = VecDeque::new();
+        let mut samples = [0; 2];
+        for (tile, range) in ranges.iter().enumerate() {
+            let counts = state.film.counts(tile);
+            let [done, total] = [counts[0], range.len() as u32];
+            if counts[1] != done || done > total {
+                let what = format!("{counts:?} samples in A and B of tile {tile}");
+                return Err(format!("the film has {what}, which are not those of its shard"));
+            }
+            let pixels = state.film.tile_pixels(tile);
+            samples[0] += 2 * u64::from(total) * pixels;
+            samples[1] += 2 * u64::from(done) * pixels;
+            if done < total {
+                let job = Job { tile: tile as u32, first: range.start + done, count: total - done };
+                remaining.push_back(job);
+            }
+        }
+        Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
+    }
+
+    /// Traces samples of the shard for about a quarter of a second. Returns `false` if no samples
+    /// are left.
+    pub fn step(&mut self) -> bool {
+        let speed = match self.measured {
+            (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
+            _ => FIRST_STEP_SAMPLES as f64 / STEP_SECONDS,
+        };
+        let threads = self.pool.current_num_threads() as f64;
+        // A job is traced twice, once for each replicate.
+        let longest = (0.5 * JOB_SECONDS * speed / threads / TILE_PIXELS as f64) as u32;
+        let longest =
+            longest.min(LONGEST_JOB).next_multiple_of(SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT);
+        let mut jobs: Vec<Job> = Vec::new();
+        let (mut sum, mut cut) = (0.0, Vec::new());
+        while sum < STEP_SECONDS * speed
+            && let Some(job) = self.remaining.pop_front()
+        {
+            // A job is cut at a multiple of `SAMPLE_ALIGNMENT`, so that packets after the cut are
+            // full.
+            let end = (job.first + longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
+            let count = job.count.min(end - job.first);
+            if count < job.count {
+                cut.push(Job { first: end, count: job.count - count, ..job });
+            }
+            jobs.push(Job { count, ..job });
+            sum += 2.0 * f64::from(count) * TILE_PIXELS as f64;
+        }
+        if jobs.is_empty() {
+            return false;
+        }
+        let start = Instant::now();
+        let mut wave = Wave { replicate: 0, jobs, estimate: false };
+        let mut traced = 0;
+        for replicate in 0..2 {
+            wave.replicate = replicate;
+            let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            self.rays += report.reports.iter().flatten().map(|report| report.rays).sum::<u64>();
+        }
+        for job in &wave.jobs {
+            traced += 2 * u64::from(job.count) * self.state.film.tile_pixels(job.tile as usize);
+        }
+        self.samples[1] += traced;
+        self.measured.0 += traced;
+        self.measured.1 += start.elapsed().as_secs_f64();
+        // The rest of each cut job is traced in the next step, while its tile is still in the
+        // cache.
+        cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
+        true
+    }
+
+    /// Returns the number of rays of all samples in the shard's film.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Returns the fraction of the shard's samples that the film holds, 0..=1.
+    pub fn progress(&self) -> f64 {
+        let [total, done] = self.samples;
+        if total == 0 { 1.0 } else { done as f64 / total as f64 }
+    }
+
+    /// Returns the report on the shard's film, with the progress of the shard.
+    pub fn report(&self) -> Report {
+        let [total, done] = self.samples;
+        let (traced, seconds) = self.measured;
+        let speed = if seconds > 0.0 { traced as f64 / seconds } else { 0.0 };
+        let left = (total - done) as f64 / speed.max(1.0);
+        let film = &self.state.film;
+        let pixels = (film.width() * film.height()) as f64;
+        let spp = done as f64 / pixels;
+        Report {
+            state: State::Tracing,
+            spp: Spp { min: 0, mean: spp, max: spp.ceil() as u32 },
+            samples: traced,
+            rays: self.rays,
+            seconds,
+            eta_seconds: Some((left, left)),
+            progress: Some(self.progress()),
+            recent_samples_per_second: speed,
+            lanes: self.state.world.lanes(),
+            threads: self.pool.current_num_threads(),
+            ..Report::default()
+        }
+    }
+}

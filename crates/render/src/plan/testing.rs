@@ -1,0 +1,35 @@
+//! Render plans with given sample counts, for tests.
+
+use crate::film::Display;
+use crate::plan::{Plan, PlanSettings, PlannedTile};
+use zerkalo_kernel::sampling::SamplerKind;
+
+/// Creates the plan of a picture with one row of tiles, divided into `shards` parts. Each entry of
+/// `tiles` has two sample counts of a tile, per pixel and replicate: in the base (the samples that
+/// the plan starts from) and in the merged picture.
+pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
+    let tile = |[base, end]: &[u32; 2]| PlannedTile {
+        base: *base,
+        end: *end,
+        rays_per_sample: 2.25,
+        glossy: base % 2 == 0,
+    };
+    Plan {
+        settings: PlanSettings {
+            source: "scenes/room one.toml".into(),
+            scene_hash: "fnv1a64:0123456789abcdef".into(),
+            size: [16 * tiles.len() as u32, 16],
+            seed: 7,
+            sampler: SamplerKind::Sobol,
+            precision: "single".into(),
+            display: Display::default(),
+            rays_per_pixel: 0,
+            noise_codes: 0.25,
+            shards,
+            base_plan: None,
+        },
+        predicted_codes: 0.248,
+        slopes: [0.5, 0.75],
+        tiles: tiles.iter().map(tile).collect(),
+    }
+}

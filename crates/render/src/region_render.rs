@@ -1,0 +1,229 @@
+//! Render of a picture that does not fit into memory, in regions: bands of rows, from top to
+//! bottom.
+//!
+//! Each region has its own film and its own schedule. Its film uses the memory of the previous
+//! region's film. A sample is a function of seed, pixel, replicate (half of the samples) and index;
+//! a uniform render in regions therefore equals a render of the whole picture, bit for bit. An
+//! adaptive render in regions differs from that of the whole picture, because it allocates samples
+//! within each region.
+
+use crate::export::{Provenance, metadata};
+use crate::film::{Bands, Depth, Display, Film, ImageData, ImageOutput, Noise, TileNoise};
+use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
+use crate::session::{Report, State};
+use crate::{Options, RenderState, threads};
+use std::io;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::WriteError;
+
+/// Target duration in seconds of a piece of a render in regions. A piece is the work between two
+/// calls of the observer, a callback that receives reports on the progress.
+const PIECE_SECONDS: f64 = 0.25;
+/// Number of samples, over all pixels, of the first piece of a render in regions. A piece is the
+/// work between two calls of the observer (the progress callback). The first piece measures the
+/// speed of tracing.
+const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
+/// Largest number of samples per pixel of a tracing job (samples of one tile) in a region. Jobs are
+/// short, so that all threads have work until the end of a piece.
+const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
+
+/// Callback that receives a report between two pieces of work and before each row is written. If it
+/// returns an error, the render ends with this error.
+pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
+
+/// Render of a picture in regions: bands of rows, one after another.
+pub struct RegionRender<'a> {
+    /// Compiled scene, with the film of the current region. `None` while the film is exchanged, and
+    /// after a failed exchange.
+    state: Option<RenderState>,
+    settings: Settings,
+    pool: rayon::ThreadPool,
+    provenance: Provenance,
+    display: Display,
+    /// Number of rows of each region except the last, which may have fewer.
+    rows: u32,
+    /// Number of rows of the picture in the finished regions.
+    finished_rows: u32,
+    /// Estimated error of each tile of the finished regions, in row order.
+    estimates: Vec<Option<TileNoise>>,
+    /// Report on all finished regions together.
+    report: Report,
+    stopped_by: StoppedBy,
+    observer: Observer<'a>,
+}
+
+impl<'a> RegionRender<'a> {
+    /// Compiles `scene`, which must have no validation errors, for regions of `rows` rows and for
+    /// `threads` threads. `rows` must be a multiple of [`TILE`](crate::film::TILE). Each region is
+    /// rendered until one of the stop criteria of `settings` is reached. A time limit is divided
+    /// among the regions.
+    ///
+    /// # Errors
+    /// Fails if a thread cannot be started, or if there is not enough memory for a region.
+    pub fn new(
+        scene: &Arc<Scene>,
+        options: &Options,
+        settings: Settings,
+        (rows, threads): (u32, usize),
+        provenance: Provenance,
+        observer: Observer<'a>,
+    ) -> Result<Self, String> {
+        let start = Instant::now();
+        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
+        let rows_at_once = 0..rows.min(scene.film.size[1]);
+        let state = RenderState::compile(Arc::clone(scene), options, None, rows_at_once)?;
+        let report = Report {
+            compile_seconds: start.elapsed().as_secs_f64(),
+            lanes: state.world.lanes(),
+            inventory: Arc::from(state.world.inventory()),
+            spp: Spp { min: u32::MAX, mean: 0.0, max: 0 },
+            threads,
+            ..Report::default()
+        };
+        Ok(Self {
+            state: Some(state),
+            settings: Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings },
+            pool,
+            provenance,
+            display: options.display,
+            rows,
+            finished_rows: 0,
+            estimates: Vec::new(),
+            report,
+            stopped_by: StoppedBy::Full,
+            observer,
+        })
+    }
+
+    /// Renders the picture and writes its rows as they finish. Returns the report on the whole
+    /// picture and the stop criterion that ended it.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written or the observer returns an error; an existing file is
+    /// then unchanged.
+    pub fn write(
+        &mut self,
+        depth: Depth,
+        output: &ImageOutput,
+    ) -> Result<(Report, StoppedBy), WriteError> {
+        let state = self.state();
+        let (mix, group_names) = (&state.mix.clone(), &state.group_names());
+        let (size, display) = (state.scene().film.size, self.display);
+        output.write(&ImageData { size, mix, group_names, display, depth }, self)?;
+        Ok((self.report.clone(), self.stopped_by))
+    }
+
+    /// Returns the compiled scene, with the film of the current region.
+    pub fn state(&self) -> &RenderState {
+        self.state.as_ref().expect("a region after a failed one is not rendered")
+    }
+
+    /// Renders the region whose first row is `self.finished_rows`.
+    fn render_region(&mut self) -> io::Result<()> {
+        let height = self.state().scene().film.size[1];
+        let rows = self.finished_rows..height.min(self.finished_rows + self.rows);
+        let state = self.state.take().expect("a region after a failed one is not rendered");
+        let state = state.into_band(rows.clone()).map_err(io::Error::other)?;
+        let left = |seconds: f64| {
+            let share = rows.len() as f64 / f64::from(height - rows.start);
+            (seconds - self.report.seconds).max(0.0) * share
+        };
+        let stop = self.settings.stop;
+        let stop = Stop { seconds: stop.seconds.map(left), ..stop };
+        let mut schedule = state.schedule(Settings { stop, ..self.settings });
+        let state = self.state.insert(state);
+        let mut seconds = 0.0;
+        let reason = loop {
+            let wave = match schedule.next(seconds) {
+                Step::Finished(reason) => break reason,
+                Step::Trace(wave) => wave,
+            };
+            let (samples, spent) =
+                (self.report.samples + schedule.samples(), self.report.seconds + seconds);
+            let piece = match spent > 0.0 {
+                true => (PIECE_SECONDS * samples as f64 / spent) as u64,
+                false => FIRST_PIECE_SAMPLES,
+            };
+            let wave = wave.cut(piece, LONGEST_JOB);
+            let start = Instant::now();
+            let report = state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            seconds += start.elapsed().as_secs_f64();
+            schedule.complete(&wave, &report);
+            (self.observer)(&progress(&self.report, &schedule, seconds, &rows, height))?;
+        };
+        self.estimates.extend(schedule.tile_estimates());
+        self.finished_rows = rows.end;
+        let (spp, film) = (schedule.spp(), &state.film);
+        let report = &mut self.report;
+        report.samples += schedule.samples();
+        report.rays += schedule.rays();
+        report.seconds += seconds;
+        report.bad_samples += film.bad_samples().count;
+        report.saturated_samples += film.saturated_samples();
+        report.saturated_pixels += film.saturated_pixels();
+        let pixels = film.width() as u64 * u64::from(rows.end);
+        report.spp = Spp {
+            min: spp.min.min(report.spp.min),
+            mean: report.samples as f64 / pixels as f64,
+            max: spp.max.max(report.spp.max),
+        };
+        report.progress = Some(f64::from(rows.end) / f64::from(height));
+        if self.stopped_by != StoppedBy::Time {
+            self.stopped_by = reason;
+        }
+        if rows.end == height {
+            report.noise = Noise::of_tiles(self.estimates.iter().copied());
+            report.state = State::Finished(self.stopped_by);
+        }
+        Ok(())
+    }
+}
+
+/// Returns the report on a picture of `height` rows that is rendered in regions. `finished` is the
+/// report on the regions above the current one. `schedule` is that of the current region, which has
+/// the rows `rows` and has been rendered for `seconds` seconds.
+fn progress(
+    finished: &Report,
+    schedule: &Schedule,
+    seconds: f64,
+    rows: &Range<u32>,
+    height: u32,
+) -> Report {
+    let share = schedule.progress(seconds);
+    let done =
+        (f64::from(rows.start) + share.unwrap_or(0.0) * rows.len() as f64) / f64::from(height);
+    let seconds = finished.seconds + seconds;
+    let left = seconds * (1.0 - done) / done;
+    let samples = finished.samples + schedule.samples();
+    Report {
+        state: State::Tracing,
+        spp: schedule.spp(),
+        samples,
+        rays: finished.rays + schedule.rays(),
+        seconds,
+        noise: schedule.noise(),
+        eta_seconds: share.filter(|_| done > 0.0).map(|_| (left, left)),
+        progress: Some(done),
+        ..finished.clone()
+    }
+}
+
+impl Bands for RegionRender<'_> {
+    fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
+        if y < self.finished_rows as usize {
+            (self.observer)(&self.report)?;
+        }
+        while y >= self.finished_rows as usize {
+            self.render_region()?;
+        }
+        Ok(&self.state().film)
+    }
+
+    fn metadata(&self) -> Vec<(String, String)> {
+        metadata(self.state(), &self.report, &self.provenance, &self.display)
+    }
+}

@@ -1,0 +1,161 @@
+//! State of a schedule as bytes, with which a later process continues it.
+//!
+//! All numbers are little-endian. A list starts with its length (u32); an option starts with 0
+//! (`None`) or 1 (u8). The parts are, in this order:
+//!
+//! - the criterion (u8), the numbers of samples and rays (u64 each), and the sample count of the
+//!   latest estimate in a uniform round (u32);
+//! - 1 if the allocation round ends with an estimate, otherwise 0 (u8), and the current replicate
+//!   (u8);
+//! - the noise of the picture, and the points of the convergence fit;
+//! - the jobs of the current allocation round, those of them that remain, and the tiles.
+
+use crate::film::file::Fields;
+use crate::film::{Mse, Noise, TileNoise};
+use crate::schedule::tile::Tile;
+use crate::schedule::{Criterion, MAX_SAMPLES, Schedule};
+use crate::wave::Job;
+
+impl Schedule {
+    /// Encodes everything on which the next samples depend, except for the settings.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        out.push(u8::from(self.settings.criterion == Criterion::Linear));
+        out.extend(self.samples.to_le_bytes());
+        out.extend(self.rays.to_le_bytes());
+        out.extend(self.estimated_at.to_le_bytes());
+        out.extend([u8::from(self.estimate), self.replicate as u8]);
+        out.push(u8::from(self.noise.is_some()));
+        if let Some(noise) = self.noise {
+            let Noise { rmse_linear, rmse_codes, p95_codes, worst_codes, effective_pixels } = noise;
+            floats(&[rmse_linear, rmse_codes, p95_codes, worst_codes], &mut out);
+            mse(effective_pixels, &mut out);
+        }
+        length(self.convergence.points.len(), &mut out);
+        self.convergence.points.iter().for_each(|(rays, noise)| floats(&[*rays, *noise], &mut out));
+        for jobs in [&self.round, &self.remaining] {
+            length(jobs.len(), &mut out);
+            for job in jobs {
+                [job.tile, job.first, job.count].iter().for_each(|n| out.extend(n.to_le_bytes()));
+            }
+        }
+        length(self.tiles.len(), &mut out);
+        for tile in &self.tiles {
+            out.extend(tile.done.to_le_bytes());
+            out.extend(tile.rays.to_le_bytes());
+            out.push(u8::from(tile.glossy));
+            out.push(u8::from(tile.error.is_some()));
+            tile.error.iter().for_each(|estimate| encode_estimate(estimate, &mut out));
+            out.push(tile.history.len() as u8);
+            tile.history.iter().for_each(|estimate| encode_estimate(estimate, &mut out));
+        }
+        out
+    }
+
+    /// Restores an encoded state into a new schedule of the same film. `counts` has two numbers of
+    /// samples per pixel for each tile of the film, one for each replicate (half of the samples).
+    /// The noise estimates are discarded if the criterion differs. Returns `None` if the state is
+    /// not valid or does not belong to the film; the schedule may then have changed.
+    pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
+        let mut fields = Fields::new(state);
+        let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Codes };
+        (self.samples, self.rays) = (fields.u64()?, fields.u64()?);
+        self.estimated_at = fields.u32()?;
+        self.estimate = flag(&mut fields)?;
+        self.replicate = usize::from(flag(&mut fields)?);
+        if flag(&mut fields)? {
+            self.noise = Some(Noise {
+                rmse_linear: error(&mut fields)?,
+                rmse_codes: error(&mut fields)?,
+                p95_codes: error(&mut fields)?,
+                worst_codes: error(&mut fields)?,
+                effective_pixels: decode_mse(&mut fields)?,
+            });
+        }
+        let points = fields.u32()?;
+        let point = |_| Some((error(&mut fields)?, error(&mut fields)?));
+        self.convergence.points = (0..points).map(point).collect::<Option<_>>()?;
+        self.round = self.decode_jobs(&mut fields)?;
+        self.remaining = self.decode_jobs(&mut fields)?;
+        if fields.u32()? as usize != self.tiles.len() || counts.len() != self.tiles.len() {
+            return None;
+        }
+        for (tile, counts) in self.tiles.iter_mut().zip(counts) {
+            decode_tile(tile, &mut fields)?;
+            let [a, b] = *counts;
+            if tile.done != b || a < b || a > MAX_SAMPLES {
+                return None;
+            }
+        }
+        let traced = |job: &Job| counts[job.tile as usize][self.replicate] == job.first;
+        if !fields.is_empty() || !self.remaining.iter().all(traced) {
+            return None;
+        }
+        if criterion != self.settings.criterion {
+            self.forget_estimates();
+        }
+        Some(())
+    }
+
+    /// Decodes a list of jobs. Returns `None` if the bytes end early, two jobs have the same tile,
+    /// or a job is not valid.
+    fn decode_jobs(&self, fields: &mut Fields) -> Option<Vec<Job>> {
+        let mut seen = vec![false; self.tiles.len()];
+        let jobs = fields.u32()?;
+        let mut job = || {
+            let job = Job { tile: fields.u32()?, first: fields.u32()?, count: fields.u32()? };
+            let is_new = !std::mem::replace(seen.get_mut(job.tile as usize)?, true);
+            let end = job.first.checked_add(job.count)?;
+            (is_new && job.count > 0 && end <= MAX_SAMPLES).then_some(job)
+        };
+        (0..jobs).map(|_| job()).collect()
+    }
+}
+
+fn decode_tile(tile: &mut Tile, fields: &mut Fields) -> Option<()> {
+    (tile.done, tile.rays) = (fields.u32()?, fields.u64()?);
+    tile.glossy = flag(fields)?;
+    tile.error = if flag(fields)? { Some(decode_estimate(tile.pixels, fields)?) } else { None };
+    let estimates = fields.u8()?;
+    let estimate = |_| decode_estimate(tile.pixels, fields);
+    tile.history = (0..estimates).map(estimate).collect::<Option<_>>()?;
+    Some(())
+}
+
+fn encode_estimate(noise: &TileNoise, out: &mut Vec<u8>) {
+    out.extend(noise.samples.to_le_bytes());
+    [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| mse(m, out));
+}
+
+fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
+    let samples = fields.u32().filter(|samples| *samples > 0)?;
+    let [reported, allocation, squares] =
+        [decode_mse(fields)?, decode_mse(fields)?, decode_mse(fields)?];
+    Some(TileNoise { reported, allocation, squares, pixels, samples })
+}
+
+fn length(length: usize, out: &mut Vec<u8>) {
+    out.extend((length as u32).to_le_bytes());
+}
+
+fn floats(values: &[f64], out: &mut Vec<u8>) {
+    values.iter().for_each(|value| out.extend(value.to_le_bytes()));
+}
+
+fn mse(Mse { linear, codes }: Mse, out: &mut Vec<u8>) {
+    floats(&[linear, codes], out);
+}
+
+fn decode_mse(fields: &mut Fields) -> Option<Mse> {
+    Some(Mse { linear: error(fields)?, codes: error(fields)? })
+}
+
+/// Decodes the estimated error of a tile or of the picture. In extreme pictures it is infinite or
+/// NaN. Returns `None` if the number is negative or the bytes end early.
+fn error(fields: &mut Fields) -> Option<f64> {
+    fields.f64().filter(|value| value.is_nan() || *value >= 0.0)
+}
+
+fn flag(fields: &mut Fields) -> Option<bool> {
+    fields.u8().filter(|flag| *flag < 2).map(|flag| flag == 1)
+}

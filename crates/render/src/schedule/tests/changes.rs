@@ -1,0 +1,130 @@
+//! Tests of changes during a render: other stop criteria, other noise estimates, and waves (sets of
+//! concurrent jobs) of which only a part is traced.
+
+use crate::schedule::tests::*;
+
+/// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
+/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel. It then keeps
+/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. Later
+/// waves have the samples that were cut off.
+fn finish_in_pieces(
+    model: &mut Model,
+    schedule: &mut Schedule,
+    tiles: u64,
+    longest: u32,
+) -> StoppedBy {
+    loop {
+        match schedule.next(0.0) {
+            Step::Finished(reason) => return reason,
+            Step::Trace(wave) => {
+                let piece = wave.cut(tiles * u64::from(longest) * u64::from(PIXELS), longest);
+                assert!(piece.jobs.iter().all(|job| job.count <= longest));
+                let report = model.run(&piece);
+                schedule.complete(&piece, &report);
+            }
+        }
+    }
+}
+
+fn mixed() -> Vec<Truth> {
+    (0..36).map(|i| if i % 3 == 0 { NOISY } else { Truth { sigma: 4.0, ..CALM } }).collect()
+}
+
+#[test]
+fn pieces_do_not_change_rounds() {
+    for adaptive in [false, true] {
+        let settings = until(noise(0.6), adaptive);
+        let (whole, reason) = Model::exact(mixed()).finish(settings);
+        for (tiles, longest) in
+            [(1, SAMPLE_ALIGNMENT), (5, 2 * SAMPLE_ALIGNMENT), (100, 3 * SAMPLE_ALIGNMENT)]
+        {
+            let mut model = Model::exact(mixed());
+            let mut schedule = model.schedule(settings);
+            assert_eq!(finish_in_pieces(&mut model, &mut schedule, tiles, longest), reason);
+            let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
+            assert_eq!(done(&schedule), done(&whole), "{tiles} x {longest}, adaptive {adaptive}");
+            assert_eq!((schedule.samples(), schedule.rays()), (whole.samples(), whole.rays()));
+            assert_eq!(schedule.noise(), whole.noise());
+        }
+    }
+}
+
+#[test]
+fn higher_target_resumes_after_the_lower_one() {
+    for adaptive in [false, true] {
+        for low in [2, 6, 22, 50, 150] {
+            let mut model = Model::exact(mixed());
+            let mut schedule = model.schedule(until(spp(low), adaptive));
+            assert_eq!(
+                finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES),
+                StoppedBy::Spp
+            );
+            assert_eq!(schedule.spp().mean, f64::from(low));
+            schedule.set_stop(spp(2000));
+            // Jobs may now start at any sample index. The simulated picture still panics if samples
+            // are repeated or out of order.
+            model.aligned = false;
+            let mut ends = Vec::new();
+            while let Step::Trace(wave) = schedule.next(0.0) {
+                let even = |j: &Job| {
+                    let end = j.first + j.count;
+                    end.is_multiple_of(SAMPLE_ALIGNMENT)
+                        || (end < SAMPLE_ALIGNMENT && end.is_power_of_two())
+                };
+                ends.push(wave.jobs.iter().all(even));
+                let report = model.run(&wave);
+                schedule.complete(&wave, &report);
+            }
+            // Jobs end at aligned counts in all rounds but the last, which adds the remaining
+            // samples. The last two waves are those of the last round, for the replicates A and B.
+            assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
+            assert_eq!(schedule.spp().mean, 2000.0);
+            // The lower target is reached at once.
+            schedule.set_stop(spp(low));
+            assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
+            schedule.set_stop(noise(1e6));
+            assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Noise));
+        }
+    }
+}
+
+#[test]
+fn new_estimates_replace_the_old_ones() {
+    let mut model = Model::exact(mixed());
+    let mut schedule = model.schedule(until(noise(0.6), true));
+    finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
+    let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
+    schedule.forget_estimates();
+    assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
+    // The picture becomes three times as bright on the display, and its error three times as large.
+    model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
+    let estimates: Vec<_> = (0..36).map(|tile| Some(model.estimate(tile))).collect();
+    schedule.set_estimates(&estimates);
+    let after = schedule.noise().unwrap();
+    assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);
+    assert_eq!(schedule.samples(), samples);
+    // The convergence of the new picture is unknown. The estimated range is wide, but contains the
+    // true time.
+    let (low, high) = schedule.eta_seconds(1.0).unwrap();
+    assert!(high > 2.0 * low, "{low}..{high}");
+    let rays = schedule.rays() as f64;
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);
+    assert!((model.rmse() / 0.6 - 1.0).abs() < 0.1);
+    let needed = schedule.rays() as f64 / rays - 1.0;
+    assert!((low..high).contains(&needed), "{needed} not in {low}..{high}");
+}
+
+#[test]
+fn cap_may_rise_and_fall() {
+    let mut model = Model::exact(mixed());
+    let mut schedule = model.schedule(until(spp(100), false));
+    schedule.set_rays_per_pixel(40);
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
+    assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
+    schedule.set_rays_per_pixel(0);
+    // The cap was 20 samples per replicate, which is no multiple of `SAMPLE_ALIGNMENT`. Jobs after
+    // it start at unaligned samples.
+    model.aligned = false;
+    assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
+    assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));
+}

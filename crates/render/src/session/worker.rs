@@ -1,0 +1,238 @@
+//! Worker: the rendering thread of a session, which receives commands and chooses the next piece of
+//! work.
+
+use crate::export::Provenance;
+use crate::film::Display;
+use crate::schedule::{Settings, Step, Stop};
+use crate::session::active_render::{ActiveRender, WorkContext};
+use crate::session::report::{Report, State};
+use crate::session::snapshot::Snapshot;
+use crate::session::{CheckpointTask, Command, Task};
+use crate::{Checkpoint, Options};
+use crossbeam_channel::Receiver;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use zerkalo_scene::Scene;
+
+pub(super) struct Worker {
+    inbox: Receiver<Command>,
+    context: WorkContext,
+    options: Options,
+    settings: Settings,
+    /// Newest scene that the client has set. `None` before the first.
+    newest: Option<Arc<Scene>>,
+    /// `true` if the render of the newest scene has not been started yet.
+    pending: bool,
+    /// `true` if the newest scene must start with an empty film, even if samples of the active
+    /// render could be reused.
+    restart: bool,
+    /// Scene to show, and the checkpoint from which its render continues. `None` if no
+    /// checkpoint is waiting to be continued.
+    resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
+    tasks: Vec<Task>,
+    checkpoints: Vec<(Provenance, CheckpointTask)>,
+    paused: bool,
+    /// Active render; `Ok(None)` if there is none. The error states why the newest scene cannot be
+    /// rendered.
+    work: Result<Option<ActiveRender>, String>,
+    /// State of the session after the latest piece of work.
+    state: State,
+    /// `true` if there is no work to do before the next command.
+    idle: bool,
+}
+
+impl Worker {
+    pub fn new(
+        inbox: Receiver<Command>,
+        context: WorkContext,
+        options: Options,
+        settings: Settings,
+    ) -> Self {
+        Self {
+            inbox,
+            context,
+            options,
+            settings,
+            newest: None,
+            pending: false,
+            restart: false,
+            resume: None,
+            tasks: Vec::new(),
+            checkpoints: Vec::new(),
+            paused: false,
+            work: Ok(None),
+            state: State::Idle,
+            idle: true,
+        }
+    }
+
+    pub fn run(mut self) {
+        while self.listen().is_continue() {
+            if std::mem::take(&mut self.pending) {
+                self.start_newest();
+            }
+            self.run_tasks();
+            self.advance();
+        }
+    }
+
+    /// Receives all queued commands of the client. Waits for one if there is no work. Returns
+    /// `Break` if the session ends.
+    fn listen(&mut self) -> ControlFlow<()> {
+        // The cancel flags are lowered before commands are received. In the reverse order a flag
+        // could be lowered without its command being received; the module `session` explains this.
+        self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
+        self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
+        if self.idle {
+            match self.inbox.recv() {
+                Ok(command) => self.apply(command)?,
+                Err(_) => return ControlFlow::Break(()),
+            }
+        }
+        while let Ok(command) = self.inbox.try_recv() {
+            self.apply(command)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn apply(&mut self, command: Command) -> ControlFlow<()> {
+        match command {
+            Command::Scene(generation, scene) => {
+                self.newest = Some(scene);
+                (self.pending, self.context.generation) = (true, generation);
+            }
+            Command::Resume(generation, scene, checkpoint) => {
+                self.resume = Some((Arc::clone(&scene), checkpoint));
+                self.newest = Some(scene);
+                (self.pending, self.context.generation) = (true, generation);
+            }
+            Command::Restart(generation) => {
+                if self.newest.is_some() {
+                    (self.pending, self.restart) = (true, true);
+                    self.context.generation = generation;
+                }
+            }
+            Command::Pause(paused) => self.paused = paused,
+            Command::View(view) => self.context.view = view,
+            Command::Stop(stop) => self.set_stop(stop),
+            Command::Display(display) => self.set_display(display),
+            Command::Pool(pool) => {
+                self.context.pool = pool;
+                if let Ok(Some(work)) = &mut self.work {
+                    work.reset_throughput();
+                }
+            }
+            Command::Task(task) => self.tasks.push(task),
+            Command::Checkpoint(provenance, task) => self.checkpoints.push((provenance, task)),
+            Command::Quit => return ControlFlow::Break(()),
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn set_stop(&mut self, stop: Stop) {
+        self.settings.stop = stop;
+        if let Ok(Some(work)) = &mut self.work {
+            work.schedule.set_stop(stop);
+        }
+    }
+
+    fn set_display(&mut self, display: Display) {
+        self.options.display = display;
+        if let Ok(Some(work)) = &mut self.work
+            && work.state.display() != display
+        {
+            work.state.set_display(display);
+            work.invalidate_estimates();
+        }
+    }
+
+    fn start_newest(&mut self) {
+        let Some(scene) = &self.newest else { return };
+        let restart = std::mem::take(&mut self.restart);
+        if let Some((own, checkpoint)) = self.resume.take() {
+            self.work = Ok(None);
+            let resumed = ActiveRender::resume(&own, &self.options, self.settings, *checkpoint);
+            self.work = resumed.map(Some);
+            if Arc::ptr_eq(&own, scene) && !restart {
+                return;
+            }
+        }
+        if let Ok(Some(work)) = &mut self.work
+            && !restart
+            && work.try_reuse(scene)
+        {
+            return;
+        }
+        #[cfg(test)]
+        self.context.shared.compilations.fetch_add(1, Ordering::SeqCst);
+        let previous = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
+        self.work = ActiveRender::start(scene, &self.options, self.settings, previous).map(Some);
+    }
+
+    fn run_tasks(&mut self) {
+        for (provenance, task) in std::mem::take(&mut self.checkpoints) {
+            task(match &self.work {
+                Ok(Some(work)) => work.checkpoint(&provenance, &self.context, self.state.clone()),
+                _ => None,
+            });
+        }
+        if self.tasks.is_empty() {
+            return;
+        }
+        let tasks = std::mem::take(&mut self.tasks);
+        let film = match &self.work {
+            Ok(Some(work)) => Some((&work.state, work.report(&self.context, self.state.clone()))),
+            _ => None,
+        };
+        for task in tasks {
+            task(film.as_ref().map(|(state, report)| (*state, report)));
+        }
+    }
+
+    /// Does the next piece of rendering work, if there is any: estimates the noise again if it is
+    /// out of date, traces a piece of a wave (set of concurrent jobs), and publishes a snapshot.
+    fn advance(&mut self) {
+        let context = &self.context;
+        self.idle = true;
+        let work = match &mut self.work {
+            Ok(Some(work)) => work,
+            Ok(None) => return,
+            Err(reason) => {
+                self.state = State::Failed(reason.clone());
+                let report = Report {
+                    generation: context.generation,
+                    state: self.state.clone(),
+                    threads: context.pool.current_num_threads(),
+                    ..Report::default()
+                };
+                context.put(Snapshot { report, ..Snapshot::default() });
+                return;
+            }
+        };
+        // The first picture of a scene is traced even during a pause.
+        let paused = self.paused && work.first_picture_after.is_some();
+        if work.estimates_stale {
+            // The picture is published at once. Its noise follows as soon as it is estimated.
+            self.state = if paused { State::Paused } else { State::Tracing };
+            work.publish(context, self.state.clone(), true);
+            if !work.reestimate(&context.pool, &context.shared.cancel_wave) {
+                self.idle = false;
+                return;
+            }
+        }
+        self.state = if paused {
+            State::Paused
+        } else {
+            match work.schedule.next(work.seconds()) {
+                Step::Finished(reason) => State::Finished(reason),
+                Step::Trace(wave) => {
+                    work.trace(wave, context);
+                    self.idle = false;
+                    State::Tracing
+                }
+            }
+        };
+        work.publish(context, self.state.clone(), self.idle);
+    }
+}

@@ -1,0 +1,325 @@
+//! Cache of asset files (meshes and images), shared between compilations of scenes.
+
+use crate::asset::error::AssetError;
+use crate::asset::file::{FileContents, MAX_BYTES, read_error};
+use crate::asset::image::Image;
+use crate::asset::mesh;
+use crate::asset::radiance_map::RadianceMap;
+use crate::process_memory::missing_memory;
+use crate::value::sort_by_number;
+use std::collections::HashMap;
+use std::fmt;
+use std::hash::Hash;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::SystemTime;
+use zerkalo_kernel::primitive::Mesh;
+
+/// Largest memory for cached files that no scene uses any more \[bytes\]. Such files are kept
+/// because an undo may bring them back.
+const UNUSED_BYTES: usize = 256 << 20;
+
+/// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
+const MAX_IMAGE_BYTES: u64 = 512 << 20;
+
+/// Estimated peak memory for building the BVH of a mesh \[bytes per triangle\].
+const BUILD_BYTES: u64 = 400;
+
+/// Stage of loading an asset file, for progress messages: reading the file, or building the BVH of
+/// a mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LoadProgress {
+    /// Stage of loading: a file is being read.
+    Reading {
+        /// Path of the asset file that is being read.
+        file: PathBuf,
+        /// Length in bytes of the file that is being read.
+        bytes: u64,
+    },
+    /// Stage of loading: the BVH of a mesh is being built.
+    Building {
+        /// Path of the mesh file.
+        file: PathBuf,
+        /// Number of triangles of the mesh.
+        triangles: usize,
+    },
+}
+
+impl fmt::Display for LoadProgress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name =
+            |file: &Path| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match self {
+            Self::Reading { file, bytes } => {
+                write!(f, "reading {}: {:.1} MB", name(file), *bytes as f64 / 1e6)
+            }
+            Self::Building { file, triangles } => {
+                write!(f, "reading {}: BVH of {triangles} triangles", name(file))
+            }
+        }
+    }
+}
+
+/// Cache key of an asset file. A file with the same path and another modification time or length
+/// has another key.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Key {
+    path: PathBuf,
+    modified: Option<SystemTime>,
+    bytes: u64,
+}
+
+/// Cache entry of an asset file: its content or the error of reading it. Empty until the file has
+/// been read.
+type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
+
+/// Cache of asset files of one type; the least recently used ones are evicted. The map holds two
+/// values for a key: its cache entry, and the number of the last use of this entry. Uses of the
+/// cache are numbered from 1.
+struct Cache<T> {
+    files: HashMap<Key, (CacheEntry<T>, u64)>,
+    last_used: u64,
+}
+
+impl<T> Default for Cache<T> {
+    fn default() -> Self {
+        Self { files: HashMap::new(), last_used: 0 }
+    }
+}
+
+impl<T> Cache<T> {
+    /// Returns the cache entry for `key`, and creates it if there is none. Removes the entries for
+    /// other versions of the same file, which have another modification time or length.
+    fn entry(&mut self, key: &Key) -> CacheEntry<T> {
+        self.last_used += 1;
+        self.files.retain(|k, _| k.path != key.path || k == key);
+        let (entry, last_used) = self.files.entry(key.clone()).or_default();
+        *last_used = self.last_used;
+        entry.clone()
+    }
+
+    /// Evicts files that no scene uses, the least recently used first, until the remaining unused
+    /// files take at most [`UNUSED_BYTES`]. `bytes_of` returns the memory of a file's content.
+    fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
+        let unused: Vec<(u64, usize, Key)> = self
+            .files
+            .iter()
+            .filter_map(|(key, (entry, last_used))| {
+                let bytes = match entry.get()? {
+                    Ok(file) if Arc::strong_count(file) == 1 => bytes_of(file),
+                    Ok(_) => return None,
+                    Err(_) => 0,
+                };
+                Some((*last_used, bytes, key.clone()))
+            })
+            .collect();
+        for key in beyond_limit(unused) {
+            self.files.remove(&key);
+        }
+    }
+}
+
+/// Returns the keys of the files to evict. `unused` has the unused files, each as `(number of its
+/// last use, memory in bytes, key)`.
+fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
+    sort_by_number(&mut unused, |(last_used, ..)| -(*last_used as i64));
+    let mut sum = 0usize;
+    let exceeds = |(_, bytes, key): (u64, usize, Key)| {
+        sum = sum.saturating_add(bytes);
+        (sum > UNUSED_BYTES).then_some(key)
+    };
+    unused.into_iter().filter_map(exceeds).collect()
+}
+
+/// Cache of all asset files that scenes name. All scenes and threads share the content of a file.
+/// The file is read once, and again only if it changes on disk. Errors are cached as well. Unused
+/// files are evicted if they take more than 256 MiB.
+pub struct Assets {
+    meshes: Mutex<Cache<Mesh>>,
+    images: Mutex<Cache<Image>>,
+    radiance_maps: Mutex<Cache<RadianceMap>>,
+    progress: Box<dyn Fn(&LoadProgress) + Send + Sync>,
+}
+
+impl Default for Assets {
+    fn default() -> Self {
+        Self::new(|_| {})
+    }
+}
+
+impl fmt::Debug for Assets {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.debug_struct("Assets").finish_non_exhaustive()
+    }
+}
+
+impl Assets {
+    /// Creates an empty cache. `progress` is called at the start of each stage of loading, on the
+    /// thread that loads the file.
+    pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
+        Self {
+            meshes: Mutex::default(),
+            images: Mutex::default(),
+            radiance_maps: Mutex::default(),
+            progress: Box::new(progress),
+        }
+    }
+
+    /// Returns the mesh in the file at `path`.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is not a valid mesh.
+    pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
+        let read = |key: &Key| {
+            let needed = key.bytes.saturating_mul(mesh::parse_bytes(path));
+            check_memory(path, "the file", needed)?;
+            let triangles = mesh::parse(self.read(path, key, MAX_BYTES)?)?;
+            let count = triangles.triangles.len();
+            let tree = format!("the BVH of {count} triangles");
+            check_memory(path, &tree, (count as u64).saturating_mul(BUILD_BYTES))?;
+            (self.progress)(&LoadProgress::Building { file: path.to_path_buf(), triangles: count });
+            Ok(Mesh::new(triangles))
+        };
+        load(&self.meshes, path, read, Mesh::bytes)
+    }
+
+    /// Returns the image in the file at `path`.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is not a valid image.
+    pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
+        let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
+        load(&self.images, path, read, Image::bytes)
+    }
+
+    /// Returns the environment image (radiance from all directions) in the file at `path`.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is not a valid image.
+    pub fn radiance_map(&self, path: &Path) -> Result<Arc<RadianceMap>, AssetError> {
+        let read = |key: &Key| RadianceMap::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
+        load(&self.radiance_maps, path, read, RadianceMap::bytes)
+    }
+
+    fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {
+        (self.progress)(&LoadProgress::Reading { file: path.to_path_buf(), bytes: key.bytes });
+        FileContents::read(path, limit)
+    }
+}
+
+/// Checks that `needed` bytes of memory are available. `path` is the asset file, and `what` names
+/// the data that needs the memory.
+///
+/// # Errors
+/// Fails if less memory is available. The error states the needed and the available memory, and a
+/// remedy.
+fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> {
+    let expected = "a mesh of fewer triangles, or more free memory";
+    missing_memory(needed).map_or(Ok(()), |missing| {
+        Err(AssetError::of_file(path, format!("{what} {missing}"), expected))
+    })
+}
+
+/// Locks an asset cache, even if a thread has panicked while it held the lock. The cache is valid
+/// then, because no method leaves it half changed.
+fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
+    cache.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns the content of the asset file at `path` from `cache`. If the cache lacks the file,
+/// `read` reads it. Other threads can use the cache meanwhile. `bytes_of` returns the memory of the
+/// content in bytes.
+fn load<T>(
+    cache: &Mutex<Cache<T>>,
+    path: &Path,
+    read: impl FnOnce(&Key) -> Result<T, AssetError>,
+    bytes_of: impl Fn(&T) -> usize,
+) -> Result<Arc<T>, AssetError> {
+    let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
+    let key = Key {
+        path: std::fs::canonicalize(path).map_err(|e| read_error(path, &e))?,
+        modified: metadata.modified().ok(),
+        bytes: metadata.len(),
+    };
+    let entry = locked(cache).entry(&key);
+    let file = entry.get_or_init(|| read(&key).map(Arc::new)).clone();
+    locked(cache).evict(bytes_of);
+    file
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    fn counted() -> (Assets, Arc<AtomicUsize>) {
+        let count = Arc::new(AtomicUsize::new(0));
+        let counter = count.clone();
+        let assets = Assets::new(move |progress| {
+            if matches!(progress, LoadProgress::Reading { .. }) {
+                counter.fetch_add(1, Ordering::SeqCst);
+            }
+        });
+        (assets, count)
+    }
+
+    #[test]
+    fn file_is_read_once_until_it_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, TRIANGLE).unwrap();
+        let (assets, reads) = counted();
+        let meshes: Vec<_> = std::thread::scope(|scope| {
+            let threads: Vec<_> =
+                (0..8).map(|_| scope.spawn(|| assets.mesh(&path).unwrap())).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(meshes.iter().all(|m| Arc::ptr_eq(m, &meshes[0])));
+        assert_eq!(reads.load(Ordering::SeqCst), 1);
+        let other = folder.path().join(".").join("a.obj");
+        assert!(Arc::ptr_eq(&assets.mesh(&other).unwrap(), &meshes[0]));
+        std::fs::write(&path, format!("{TRIANGLE}f 3 2 1\n")).unwrap();
+        assert_eq!(assets.mesh(&path).unwrap().mesh().triangles.len(), 2);
+        assert_eq!(reads.load(Ordering::SeqCst), 2);
+        assert_eq!(locked(&assets.meshes).files.len(), 1);
+    }
+
+    #[test]
+    fn errors_are_cached_except_missing_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let (assets, reads) = counted();
+        assert!(assets.mesh(&path).unwrap_err().found.contains("no such file"));
+        std::fs::write(&path, "f 1 2 3\n").unwrap();
+        for _ in 0..3 {
+            assert!(assets.mesh(&path).unwrap_err().found.contains("vertex 1"));
+        }
+        assert_eq!(reads.load(Ordering::SeqCst), 1);
+        assert!(assets.mesh(folder.path()).unwrap_err().found.contains("not a regular file"));
+    }
+
+    #[test]
+    fn unused_files_are_evicted_least_recent_first() {
+        let mut cache = Cache::<usize>::default();
+        let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
+        let put = |cache: &mut Cache<usize>, name| {
+            let file = Arc::new(UNUSED_BYTES / 2);
+            cache.entry(&key(name)).set(Ok(file.clone())).unwrap();
+            file
+        };
+        let held = put(&mut cache, "held");
+        for name in ["a", "b", "c"] {
+            drop(put(&mut cache, name));
+        }
+        cache.evict(|bytes| *bytes);
+        let known = |cache: &Cache<usize>, name| cache.files.contains_key(&key(name));
+        assert!(known(&cache, "held") && !known(&cache, "a"));
+        assert!(known(&cache, "b") && known(&cache, "c"));
+        drop(held);
+        cache.entry(&key("b"));
+        cache.evict(|bytes| *bytes);
+        assert!(!known(&cache, "held") && known(&cache, "b") && known(&cache, "c"));
+    }
+}

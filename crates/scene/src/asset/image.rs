@@ -1,0 +1,450 @@
+//! Images for textures, from PNG and JPEG files.
+
+use crate::asset::error::AssetError;
+use crate::asset::exif::Orientation;
+use crate::asset::file::FileContents;
+use crate::value::{Fnv1a64, linear_from_srgb};
+use png::{BitDepth, ColorType, Transformations};
+use std::fmt::Display;
+use std::io::Cursor;
+use std::sync::LazyLock;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+/// Largest number of pixels in a row or column of a texture image.
+pub const MAX_SIDE: u32 = 32_768;
+
+/// Largest number of pixels of a texture image: 64 Mi. An image of this size takes at most 402 MB
+/// of memory after decoding, and at most 810 MB during decoding.
+pub const MAX_PIXELS: u64 = 1 << 26;
+
+/// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
+/// pixels per byte of uncompressed data, times the factor of at most 1032 by which deflate
+/// compresses this data. A JPEG has at most 64 pixels per bit, which is 512 per byte. A Radiance
+/// file in the old encoding has at most 65536 pixels per 8 bytes, which is 8192 per byte.
+const PIXELS_PER_BYTE: u64 = 8 * 1032;
+
+/// Format of an image file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ImageFormat {
+    Png,
+    Jpeg,
+    Hdr,
+    OpenExr,
+}
+
+impl ImageFormat {
+    /// Determines the format by the first bytes of a file. Returns `None` for all other formats.
+    pub fn of(bytes: &[u8]) -> Option<Self> {
+        let formats: [(&[u8], Self); 4] = [
+            (b"\x89PNG\r\n\x1a\n", Self::Png),
+            (b"\xff\xd8\xff", Self::Jpeg),
+            (b"#?RADIANCE", Self::Hdr),
+            (b"\x76\x2f\x31\x01", Self::OpenExr),
+        ];
+        formats.into_iter().find_map(|(start, format)| bytes.starts_with(start).then_some(format))
+    }
+}
+
+/// Pixels of a texture image with 8 or 16 bits per channel, as in the file. A grey pixel is one
+/// number, a coloured pixel three.
+#[derive(Clone, Debug, PartialEq)]
+enum Texels {
+    Bytes(Vec<u8>),
+    Words(Vec<u16>),
+}
+
+/// Texture image, decoded in the bit depth of its file: 1 to 6 bytes per pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    size: [u32; 2],
+    channels: usize,
+    texels: Texels,
+}
+
+/// Returns a table of linear light from 0 to 1, indexed by sRGB level from 0 (black) to `last`
+/// (white).
+fn linear_table(last: u16) -> Vec<f32> {
+    let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
+    (0..=last).map(linear).collect()
+}
+
+static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
+static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
+
+impl Image {
+    /// Adds the size and the pixels of the image to `hash`.
+    pub fn hash_contents(&self, hash: &mut Fnv1a64) {
+        self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
+        hash.update(&[self.channels as u8]);
+        match &self.texels {
+            Texels::Bytes(bytes) => hash.update(bytes),
+            Texels::Words(words) => words.iter().for_each(|w| hash.update(&w.to_le_bytes())),
+        }
+    }
+
+    /// Decodes an image file in memory. The format is determined by the first bytes of the file.
+    ///
+    /// # Errors
+    /// Fails if the file is not a valid image.
+    pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
+        let (image, orientation) = match ImageFormat::of(&source.bytes) {
+            Some(ImageFormat::Png) => decode_png(source)?,
+            Some(ImageFormat::Jpeg) => decode_jpeg(source)?,
+            _ => return Err(source.fault("this is neither a PNG nor a JPEG", EXPECTED)),
+        };
+        let Self { size, channels, texels } = image;
+        let (size, texels) = match texels {
+            Texels::Bytes(t) => {
+                let (size, t) = orientation.apply(size, channels, t);
+                (size, Texels::Bytes(t))
+            }
+            Texels::Words(t) => {
+                let (size, t) = orientation.apply(size, channels, t);
+                (size, Texels::Words(t))
+            }
+        };
+        Ok(Self { size, channels, texels })
+    }
+
+    /// Returns width and height in pixels, each at least 1.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Returns the memory of the pixels in bytes.
+    pub fn bytes(&self) -> usize {
+        match &self.texels {
+            Texels::Bytes(t) => t.len(),
+            Texels::Words(t) => 2 * t.len(),
+        }
+    }
+
+    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y`, counted from the
+    /// top. The numbers of the file are interpreted as sRGB levels.
+    ///
+    /// # Panics
+    /// Panics if the image has no such pixel.
+    pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
+        let index = self.index(x, y);
+        let channel = |c: usize| match &self.texels {
+            Texels::Bytes(t) => BYTES[usize::from(t[index + c])],
+            Texels::Words(t) => WORDS[usize::from(t[index + c])],
+        };
+        if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
+    }
+
+    /// Returns the height, 0..=1, that the image has as a height map at the pixel in column `x` and
+    /// row `y`, counted from the top. The numbers of the file are interpreted without sRGB
+    /// decoding. The height of a coloured pixel is the mean of its channels.
+    ///
+    /// # Panics
+    /// Panics if the image has no such pixel.
+    pub fn height(&self, x: u32, y: u32) -> f32 {
+        let index = self.index(x, y);
+        let level = |i: usize| match &self.texels {
+            Texels::Bytes(t) => f32::from(t[i]) / 255.0,
+            Texels::Words(t) => f32::from(t[i]) / 65535.0,
+        };
+        (index..index + self.channels).map(level).sum::<f32>() / self.channels as f32
+    }
+
+    fn index(&self, x: u32, y: u32) -> usize {
+        assert!(x < self.size[0] && y < self.size[1], "no pixel {x}, {y}");
+        (y as usize * self.size[0] as usize + x as usize) * self.channels
+    }
+}
+
+/// Checks the size of an image of `width` x `height` pixels in the file `source`. Neither side may
+/// exceed `max_side`. The number of pixels must be from 1 to `max_pixels`. It must also be at most
+/// [`PIXELS_PER_BYTE`] times the length of the file in bytes.
+pub(super) fn check_size(
+    source: &FileContents,
+    [width, height]: [u32; 2],
+    max_side: u32,
+    max_pixels: u64,
+) -> Result<(), AssetError> {
+    let pixels = u64::from(width) * u64::from(height);
+    let size = format!("the image has {width} x {height} pixels");
+    if width.max(height) > max_side || pixels > max_pixels || pixels == 0 {
+        let least = if pixels == 0 { "at least one, " } else { "" };
+        let expected = format!("{least}at most {max_side} a side and {max_pixels} altogether");
+        return Err(source.fault(size, &expected));
+    }
+    if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
+        let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
+        return Err(source.fault(found, "a whole image"));
+    }
+    Ok(())
+}
+
+const EXPECTED: &str = "a PNG or JPEG image";
+
+/// Creates the error that the image file `source` has a known format, but is invalid.
+fn decode_error(source: &FileContents, format: &str, error: impl Display) -> AssetError {
+    source.fault(format!("the {format} image cannot be read: {error}"), EXPECTED)
+}
+
+/// Decodes a PNG file and the orientation in its EXIF data. The alpha channel is dropped.
+fn decode_png(source: &FileContents) -> Result<(Image, Orientation), AssetError> {
+    let error = |e| decode_error(source, "PNG", e);
+    let limits = png::Limits { bytes: MAX_PIXELS as usize * 8 };
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(&source.bytes[..]), limits);
+    // Palettes become colours, transparent colours an alpha channel, and levels have 8 or 16 bits.
+    decoder.set_transformations(Transformations::EXPAND);
+    let size = decoder.read_header_info().map_err(error)?.size().into();
+    check_size(source, size, MAX_SIDE, MAX_PIXELS)?;
+    let mut reader = decoder.read_info().map_err(error)?;
+    let exif = reader.info().exif_metadata.as_deref();
+    let orientation = exif.map_or(Orientation::UPRIGHT, Orientation::of_exif);
+    let length = reader.output_buffer_size();
+    let length = length.ok_or_else(|| decode_error(source, "PNG", "it is too large"))?;
+    let (color, depth) = reader.output_color_type();
+    let texels = if depth == BitDepth::Sixteen {
+        let mut words = vec![0u16; length / 2];
+        reader.next_frame(bytemuck::cast_slice_mut(&mut words)).map_err(error)?;
+        words.iter_mut().for_each(|word| *word = u16::from_be(*word));
+        Texels::Words(without_alpha(words, color))
+    } else {
+        let mut bytes = vec![0; length];
+        reader.next_frame(&mut bytes).map_err(error)?;
+        Texels::Bytes(without_alpha(bytes, color))
+    };
+    let channels = match color {
+        ColorType::Grayscale | ColorType::GrayscaleAlpha => 1,
+        ColorType::Rgb | ColorType::Rgba | ColorType::Indexed => 3,
+    };
+    Ok((Image { size, channels, texels }, orientation))
+}
+
+/// Returns the levels of all channels except alpha. `levels` are those of all channels.
+fn without_alpha<T: Copy>(mut levels: Vec<T>, color: ColorType) -> Vec<T> {
+    match color {
+        ColorType::GrayscaleAlpha => remove_last::<2, _>(&mut levels),
+        ColorType::Rgba => remove_last::<4, _>(&mut levels),
+        ColorType::Grayscale | ColorType::Rgb | ColorType::Indexed => {}
+    }
+    levels
+}
+
+/// Removes every `N`th element of `elements`.
+fn remove_last<const N: usize, T: Copy>(elements: &mut Vec<T>) {
+    let count = elements.len() / N;
+    for i in 0..count {
+        for j in 0..N - 1 {
+            elements[i * (N - 1) + j] = elements[i * N + j];
+        }
+    }
+    elements.truncate(count * (N - 1));
+    elements.shrink_to_fit();
+}
+
+/// Decodes a JPEG file and the orientation in its EXIF data. Colours become red, green and blue.
+fn decode_jpeg(source: &FileContents) -> Result<(Image, Orientation), AssetError> {
+    let error = |e| decode_error(source, "JPEG", e);
+    let options = DecoderOptions::default()
+        .set_strict_mode(false)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&source.bytes[..]), options);
+    decoder.decode_headers().map_err(error)?;
+    // Sides in a JPEG file have 16 bits. After the headers are read, they are known.
+    let (width, height) = decoder.dimensions().unwrap_or_default();
+    let size = [width as u32, height as u32];
+    check_size(source, size, MAX_SIDE, MAX_PIXELS)?;
+    let orientation =
+        decoder.exif().map_or(Orientation::UPRIGHT, |exif| Orientation::of_exif(exif));
+    let (space, channels) = match decoder.input_colorspace() {
+        Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
+        _ => (ColorSpace::RGB, 3),
+    };
+    decoder.set_options(options.jpeg_set_out_colorspace(space));
+    let mut texels = vec![0; width * height * channels];
+    decoder.decode_into(&mut texels).map_err(error)?;
+    Ok((Image { size, channels, texels: Texels::Bytes(texels) }, orientation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use png::Info;
+    use proptest::prelude::*;
+    use std::path::PathBuf;
+
+    fn file(bytes: Vec<u8>) -> FileContents {
+        FileContents { path: PathBuf::from("a.png"), bytes }
+    }
+
+    /// Returns a PNG file with the header `info`. `data` are its uncompressed rows.
+    fn png(info: Info, data: &[u8]) -> FileContents {
+        let mut bytes = Vec::new();
+        let mut writer = png::Encoder::with_info(&mut bytes, info).unwrap().write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        file(bytes)
+    }
+
+    fn info(
+        [width, height]: [u32; 2],
+        color_type: ColorType,
+        bit_depth: BitDepth,
+    ) -> Info<'static> {
+        let mut info = Info::with_size(width, height);
+        (info.color_type, info.bit_depth) = (color_type, bit_depth);
+        info
+    }
+
+    fn parsed(info: Info, data: &[u8]) -> Image {
+        Image::parse(&png(info, data)).unwrap()
+    }
+
+    /// Returns the values of all pixels in all channels.
+    fn values(image: &Image) -> Vec<u16> {
+        match &image.texels {
+            Texels::Bytes(t) => t.iter().map(|byte| u16::from(*byte)).collect(),
+            Texels::Words(t) => t.clone(),
+        }
+    }
+
+    #[test]
+    fn pixels_keep_values_of_file() {
+        let mut rgba = [255, 0, 0, 7].repeat(6);
+        rgba[20..].copy_from_slice(&[128, 255, 0, 255]);
+        let image = parsed(info([3, 2], ColorType::Rgba, BitDepth::Eight), &rgba);
+        assert_eq!(image.size(), [3, 2]);
+        assert_eq!(image.bytes(), 18);
+        assert_eq!(image.color(0, 0), [1.0, 0.0, 0.0]);
+        assert!((image.color(2, 1)[0] - 0.215_86).abs() < 1e-5);
+        assert!((image.height(2, 1) - (128.0 + 255.0) / 765.0).abs() < 1e-6);
+        let grey: Vec<u8> = [0u16, 1000, 2000, 3000].iter().flat_map(|n| n.to_be_bytes()).collect();
+        let image = parsed(info([2, 2], ColorType::Grayscale, BitDepth::Sixteen), &grey);
+        assert_eq!(image.height(1, 1), 3000.0 / 65535.0);
+        assert_eq!(image.bytes(), 8);
+    }
+
+    #[test]
+    fn few_bits_and_palettes_become_bytes() {
+        // The bits 1 0 1 in each of two rows.
+        let bits = |depth| parsed(info([3, 2], ColorType::Grayscale, depth), &[0b1010_0000; 2]);
+        assert_eq!(values(&bits(BitDepth::One)), [255, 0, 255, 255, 0, 255]);
+        assert_eq!(values(&bits(BitDepth::Two)), [170, 170, 0, 170, 170, 0]);
+        for transparency in [None, Some((&[0, 128]).into())] {
+            let mut info = info([3, 1], ColorType::Indexed, BitDepth::Four);
+            info.palette = Some(vec![9, 8, 7, 255, 0, 1].into());
+            info.trns = transparency;
+            let image = parsed(info, &[0x10, 0x10]);
+            assert_eq!((image.channels, image.bytes()), (3, 9));
+            assert_eq!(values(&image), [255, 0, 1, 9, 8, 7, 255, 0, 1]);
+        }
+    }
+
+    #[test]
+    fn interlaced_png_is_decoded() {
+        let image =
+            Image::parse(&file(include_bytes!("../../../../tests/images/interlaced.png").into()));
+        let pixels = (0..7).flat_map(|y| (0..9).map(move |x| [x * 31, y * 42, x * y]));
+        assert_eq!(values(&image.unwrap()), pixels.collect::<Vec<_>>().as_flattened());
+    }
+
+    #[test]
+    fn jpeg_is_decoded() {
+        // The upper rows of these files are (200, 100, 50) on the left, (50, 100, 200) on the right.
+        let files: [(&[u8], [[f32; 3]; 2]); 4] = [
+            (include_bytes!("../../../../tests/images/color.jpg"), LEFT_AND_RIGHT),
+            (include_bytes!("../../../../tests/images/progressive.jpg"), LEFT_AND_RIGHT),
+            (include_bytes!("../../../../tests/images/cmyk.jpg"), LEFT_AND_RIGHT),
+            (include_bytes!("../../../../tests/images/grey.jpg"), [[124.0; 3], [97.0; 3]]),
+        ];
+        const LEFT_AND_RIGHT: [[f32; 3]; 2] = [[200.0, 100.0, 50.0], [50.0, 100.0, 200.0]];
+        for (bytes, colors) in files {
+            let image = Image::parse(&file(bytes.into())).unwrap();
+            assert_eq!(image.size(), [48, 40]);
+            for (x, expected) in [(5, colors[0]), (40, colors[1])] {
+                let expected = expected.map(|level| linear_from_srgb(f64::from(level) / 255.0));
+                let found = image.color(x, 5).map(f64::from);
+                assert!((0..3).all(|c| (found[c] - expected[c]).abs() < 0.03), "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn cameras_may_turn_images() {
+        // Orientation 6: the first row is the right column, from above.
+        let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+        let rows: Vec<u8> = (0..24).collect();
+        let mut turned = info([3, 2], ColorType::Rgba, BitDepth::Eight);
+        turned.exif_metadata = Some(exif.into());
+        let image = parsed(turned, &rows);
+        assert_eq!(image.size(), [2, 3]);
+        let firsts: Vec<u16> = values(&image).chunks(3).map(|pixel| pixel[0]).collect();
+        assert_eq!(firsts, [12, 0, 16, 4, 20, 8]);
+        let jpeg = include_bytes!("../../../../tests/images/color.jpg");
+        let length = (8 + exif.len()) as u16;
+        let segment = [b"\xff\xe1", &length.to_be_bytes()[..], b"Exif\0\0", exif].concat();
+        let with_exif = file([&jpeg[..2], &segment, &jpeg[2..]].concat());
+        let (upright, turned) =
+            (Image::parse(&file(jpeg.into())).unwrap(), Image::parse(&with_exif).unwrap());
+        assert_eq!(turned.size(), [40, 48]);
+        assert_eq!(turned.color(39, 47), upright.color(47, 0));
+        assert_eq!(turned.color(0, 7), upright.color(7, 39));
+    }
+
+    proptest! {
+        #[test]
+        fn alpha_is_dropped(
+            [width, height] in [1..9u32, 1..9u32],
+            seed in any::<u64>(),
+            is_colored in any::<bool>(),
+            is_deep in any::<bool>(),
+        ) {
+            let channels = if is_colored { 3 } else { 1 };
+            let pixel = |i: u64| seed.rotate_left(7 * i as u32).wrapping_mul(i | 1).to_be_bytes();
+            let pixels: Vec<[u8; 8]> = (0..u64::from(width * height)).map(pixel).collect();
+            let (depth, bytes) = if is_deep { (BitDepth::Sixteen, 2) } else { (BitDepth::Eight, 1) };
+            let color = if is_colored { ColorType::Rgba } else { ColorType::GrayscaleAlpha };
+            let data: Vec<u8> =
+                pixels.iter().flat_map(|pixel| &pixel[..(channels + 1) * bytes]).copied().collect();
+            let image = parsed(info([width, height], color, depth), &data);
+            let value = |bytes: &[u8]| bytes.iter().fold(0, |n, byte| n << 8 | u16::from(*byte));
+            let kept = pixels.iter().flat_map(|pixel| pixel[..channels * bytes].chunks(bytes));
+            prop_assert_eq!(values(&image), kept.map(value).collect::<Vec<_>>());
+            prop_assert_eq!(image.bytes(), pixels.len() * channels * bytes);
+        }
+    }
+
+    /// Returns a PNG file of one pixel whose header declares `side` x `side` pixels. The checksum
+    /// of the header is valid.
+    fn png_declaring(side: u32) -> FileContents {
+        let mut source = png(info([1, 1], ColorType::Grayscale, BitDepth::Eight), &[0]);
+        source.bytes[16..20].copy_from_slice(&side.to_be_bytes());
+        source.bytes[20..24].copy_from_slice(&side.to_be_bytes());
+        let crc = source.bytes[12..29].iter().fold(u32::MAX, |mut crc, byte| {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = crc >> 1 ^ (0xEDB8_8320 & (crc & 1).wrapping_neg());
+            }
+            crc
+        });
+        source.bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
+        source
+    }
+
+    #[test]
+    fn oversized_image_is_rejected_before_decoding() {
+        for (side, words) in [
+            (60_000, "60000 x 60000"),
+            (8_000, "more than its"),
+            (u32::MAX >> 1, "2147483647 x 2147483647"),
+        ] {
+            let error = Image::parse(&png_declaring(side)).unwrap_err();
+            assert!(error.found.contains(words), "{side}: {error}");
+        }
+        let text = FileContents { path: PathBuf::from("a.png"), bytes: b"no image".to_vec() };
+        assert!(Image::parse(&text).unwrap_err().found.contains("neither"));
+        let mut half = png(info([50, 50], ColorType::Grayscale, BitDepth::Eight), &[0; 2500]);
+        half.bytes.truncate(60);
+        assert!(Image::parse(&half).is_err());
+    }
+}

@@ -1,0 +1,378 @@
+//! Builder of meshes. The parser of a file format adds vertices and triangles to it. The builder
+//! then checks them, and removes triangles without area.
+
+use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::file::FileContents;
+use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES};
+use glam::DVec3;
+use std::collections::HashMap;
+use zerkalo_kernel::primitive::TriangleMesh;
+use zerkalo_kernel::primitive::mesh::smooth;
+
+/// Largest absolute value of a mesh coordinate.
+const MAX_COORDINATE: f64 = 1e9;
+
+/// Smallest valid extent of a mesh (length of the longest side of its bounding box). Products of
+/// three coordinates of this magnitude are not subnormal in single precision.
+const MIN_EXTENT: f64 = 1e-9;
+
+/// Largest ratio of a mesh's largest absolute coordinate to its extent for which the positions are
+/// stored relative to the origin. Above it, they are stored relative to the centre of the mesh. At
+/// this ratio, single precision resolves the mesh with four bits less than if it were centred at
+/// the origin.
+const MAX_OFFSET: f64 = 16.0;
+
+/// Mesh under construction, to which the parser of a file format adds vertices and triangles.
+pub struct Builder<'a> {
+    source: &'a FileContents,
+    positions: Vec<[f64; 3]>,
+    /// Normals of the vertices, in order. The list may be shorter than `positions`. The zero vector
+    /// means that the file has no normal for the vertex.
+    normals: Vec<[f32; 3]>,
+    /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`; the
+    /// other vertices have no texture coordinates.
+    uvs: Vec<[f32; 2]>,
+    triangles: Vec<[u32; 3]>,
+    colors: Vec<[f32; 3]>,
+    color_of: Vec<u16>,
+    color: u16,
+    notes: Vec<String>,
+}
+
+impl<'a> Builder<'a> {
+    /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
+    pub fn new(source: &'a FileContents) -> Self {
+        Self {
+            source,
+            positions: Vec::new(),
+            normals: Vec::new(),
+            uvs: Vec::new(),
+            triangles: Vec::new(),
+            colors: Vec::new(),
+            color_of: Vec::new(),
+            color: 0,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Reserves memory for the given numbers of further vertices and triangles. The caller must
+    /// check before that the file is long enough for them.
+    ///
+    /// # Errors
+    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`], or if there is not
+    /// enough memory.
+    pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+        self.check_limits(vertices, triangles)?;
+        let reserved = self.positions.try_reserve(vertices);
+        reserved.and_then(|()| self.triangles.try_reserve(triangles)).map_err(|_| {
+            let found = format!("there is no memory for {triangles} triangles");
+            self.source.fault(found, "a smaller mesh, or more free memory")
+        })
+    }
+
+    /// Checks that the mesh stays within its limits if the given numbers of vertices and triangles
+    /// are added.
+    ///
+    /// # Errors
+    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`].
+    pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
+        let checks = [
+            (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
+            (self.triangles.len().saturating_add(triangles), MAX_TRIANGLES, "triangles"),
+        ];
+        for (count, max, noun) in checks {
+            if count > max {
+                let found = format!("the mesh has {count} {noun}");
+                let expected = format!("at most {max}");
+                return Err(self.source.fault(found, &expected));
+            }
+        }
+        Ok(())
+    }
+
+    /// Records a note for the user about a part of the file that was omitted or replaced.
+    pub fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Returns the number of vertices added so far.
+    pub fn vertices(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Adds a vertex. This method does not check the number of vertices; [`Builder::finish`] fails
+    /// if there are more than [`MAX_VERTICES`].
+    pub fn vertex(&mut self, position: [f64; 3]) {
+        self.positions.push(position);
+    }
+
+    /// Sets the normal of the vertex added last.
+    pub fn normal(&mut self, normal: [f32; 3]) {
+        self.normals.resize(self.positions.len(), [0.0; 3]);
+        if let Some(last) = self.normals.last_mut() {
+            *last = normal;
+        }
+    }
+
+    /// Sets the texture coordinates of the vertex added last.
+    pub fn uv(&mut self, uv: [f32; 2]) {
+        self.uvs.resize(self.positions.len(), [0.0; 2]);
+        if let Some(last) = self.uvs.last_mut() {
+            *last = uv;
+        }
+    }
+
+    /// Returns `true` if [`Builder::color`] was called.
+    pub fn has_colors(&self) -> bool {
+        !self.colors.is_empty()
+    }
+
+    /// Sets the linear base colour of the triangles added from now on. Triangles added before the
+    /// first call are white.
+    ///
+    /// # Errors
+    /// Fails if there are more than 65536 colours.
+    pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
+        if self.colors.is_empty() && !self.triangles.is_empty() {
+            self.colors.push([1.0; 3]);
+        }
+        let found = self.colors.iter().rposition(|c| *c == color);
+        let index = found.unwrap_or(self.colors.len());
+        self.color = u16::try_from(index).map_err(|_| {
+            self.source.fault("the mesh has more than 65536 different colours", "at most 65536")
+        })?;
+        if found.is_none() {
+            self.colors.push(color);
+        }
+        Ok(())
+    }
+
+    /// Adds a triangle. `place` returns the location of the triangle in the file.
+    ///
+    /// # Errors
+    /// Fails if the triangle names a vertex that does not exist, or the mesh exceeds a limit.
+    pub fn triangle(
+        &mut self,
+        corners: [u32; 3],
+        place: impl Fn() -> FileLocation,
+    ) -> Result<(), AssetError> {
+        let vertices = self.positions.len();
+        if let Some(unknown) = corners.iter().find(|i| **i as usize >= vertices) {
+            let found = format!("the face names vertex {unknown}, counted from 0");
+            let expected = format!("a vertex below {vertices}, their number");
+            return Err(self.source.error(place(), found, &expected));
+        }
+        self.check_limits(0, 1)?;
+        self.triangles.push(corners);
+        if self.colors.len() > 1 {
+            // The triangles before the first call of [`Builder::color`] have colour index 0.
+            self.color_of.resize(self.triangles.len() - 1, 0);
+            self.color_of.push(self.color);
+        }
+        Ok(())
+    }
+
+    /// Adds a polygon as triangles: a fan around its first corner.
+    ///
+    /// # Errors
+    /// Fails in the same cases as [`Builder::triangle`].
+    pub fn polygon(
+        &mut self,
+        corners: &[u32],
+        place: impl Fn() -> FileLocation,
+    ) -> Result<(), AssetError> {
+        for pair in corners.get(1..).unwrap_or_default().windows(2) {
+            self.triangle([corners[0], pair[0], pair[1]], &place)?;
+        }
+        Ok(())
+    }
+
+    /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0.
+    ///
+    /// # Errors
+    /// Fails if no triangle has an area, a number is not finite, a coordinate is out of range, or
+    /// the mesh is too large or too small.
+    pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
+        self.check_limits(0, 0)?;
+        let source = self.source;
+        if self.triangles.is_empty() {
+            return Err(source.fault("the mesh has no triangles", "at least one"));
+        }
+        self.coordinates()?;
+        let center = self.center();
+        let positions: Vec<[f32; 3]> = self
+            .positions
+            .drain(..)
+            .map(|p| std::array::from_fn(|i| (p[i] - center[i]) as f32))
+            .collect();
+        self.positions = Vec::new();
+        self.drop_flat(&positions)?;
+        let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+        for corner in self.triangles.iter().flatten() {
+            for (i, x) in positions[*corner as usize].into_iter().enumerate() {
+                bounds[0][i] = bounds[0][i].min(x);
+                bounds[1][i] = bounds[1][i].max(x);
+            }
+        }
+        let extent = (0..3).map(|i| f64::from(bounds[1][i]) - f64::from(bounds[0][i]));
+        let extent = extent.fold(0.0, f64::max);
+        if extent < MIN_EXTENT {
+            let found = format!("the mesh is {extent:e} large");
+            return Err(source.fault(found, "a size from 1e-9 to 1e9"));
+        }
+        let normals = self.unit_normals(&positions);
+        let uvs = self.checked_uvs(positions.len())?;
+        self.triangles.shrink_to_fit();
+        let color_of = if self.colors.len() > 1 {
+            self.color_of.resize(self.triangles.len(), 0);
+            self.color_of
+        } else {
+            Vec::new()
+        };
+        Ok(TriangleMesh {
+            positions,
+            center,
+            triangles: self.triangles,
+            normals,
+            uvs,
+            colors: self.colors,
+            color_of,
+            bounds,
+            notes: self.notes,
+        })
+    }
+
+    /// Checks that all coordinates are finite and within ±[`MAX_COORDINATE`].
+    fn coordinates(&self) -> Result<(), AssetError> {
+        let bad = |p: &[f64; 3]| p.iter().any(|x| !(-MAX_COORDINATE..=MAX_COORDINATE).contains(x));
+        match self.positions.iter().position(bad) {
+            None => Ok(()),
+            Some(i) => {
+                let [x, y, z] = self.positions[i];
+                let place = FileLocation::Part(format!("vertex {i} (from 0)"));
+                let found = format!("a vertex lies at [{x}, {y}, {z}]");
+                Err(self.source.error(place, found, "coordinates from -1e9 to 1e9"))
+            }
+        }
+    }
+
+    /// Returns the point that is subtracted from all positions before they are converted to single
+    /// precision. This point is the centre of the bounding box if the mesh is far from the origin
+    /// relative to its size, otherwise the origin.
+    fn center(&self) -> [f64; 3] {
+        let positions = self.positions.iter().map(|p| DVec3::from_array(*p));
+        let (low, high) = positions
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            });
+        let max_coordinate = low.abs().max(high.abs()).max_element();
+        let is_far = max_coordinate > MAX_OFFSET * (high - low).max_element();
+        if is_far { (0.5 * (low + high)).to_array() } else { [0.0; 3] }
+    }
+
+    /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
+    /// triangles.
+    ///
+    /// # Errors
+    /// Fails if no triangle is left.
+    fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
+        let before = self.triangles.len();
+        let has_area = |t: &[u32; 3]| {
+            let p = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+            (p[1] - p[0]).cross(p[2] - p[0]) != DVec3::ZERO
+        };
+        if self.color_of.is_empty() {
+            self.triangles.retain(has_area);
+        } else {
+            let keep: Vec<bool> = self.triangles.iter().map(has_area).collect();
+            let mut kept = keep.iter();
+            self.triangles.retain(|_| *kept.next().unwrap_or(&true));
+            let mut kept = keep.iter();
+            self.color_of.retain(|_| *kept.next().unwrap_or(&true));
+        }
+        let dropped = before - self.triangles.len();
+        if self.triangles.is_empty() {
+            let found = format!("none of the {before} triangles has an area");
+            return Err(self.source.fault(found, "at least one that has"));
+        }
+        match dropped {
+            0 => {}
+            1 => self.notes.push("1 triangle without area was left out".to_string()),
+            n => self.notes.push(format!("{n} triangles without area were left out")),
+        }
+        Ok(())
+    }
+
+    /// Returns a unit normal for each vertex. If some vertices have no normal in the file, their
+    /// normals are computed from the triangles. Returns `None` if no vertex has a normal in the
+    /// file.
+    fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
+        let mut normals = std::mem::take(&mut self.normals);
+        if normals.is_empty() {
+            return None;
+        }
+        normals.resize(positions.len(), [0.0; 3]);
+        let mut without = 0;
+        for n in &mut normals {
+            let d = n.map(f64::from);
+            let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            if length.is_finite() && length > 0.0 {
+                *n = d.map(|x| (x / length) as f32);
+            } else {
+                *n = [0.0; 3];
+                without += 1;
+            }
+        }
+        if without == normals.len() {
+            return None;
+        }
+        if without > 0 {
+            let computed = smooth(positions, &self.triangles);
+            for (n, c) in normals.iter_mut().zip(computed).filter(|(n, _)| **n == [0.0; 3]) {
+                *n = c;
+            }
+            self.notes.push(format!("{without} vertices have no normal in the file; computed"));
+        }
+        Some(normals)
+    }
+
+    /// Returns the texture coordinates of the vertices. Vertices without texture coordinates get
+    /// zero. Returns `None` if no vertex has any.
+    ///
+    /// # Errors
+    /// Fails if a texture coordinate is not finite.
+    fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
+        let mut uvs = std::mem::take(&mut self.uvs);
+        if uvs.is_empty() {
+            return Ok(None);
+        }
+        if let Some(i) = uvs.iter().position(|uv| uv.iter().any(|x| !x.is_finite())) {
+            let place = FileLocation::Part(format!("vertex {i} (from 0)"));
+            let found = format!("texture coordinates are [{}, {}]", uvs[i][0], uvs[i][1]);
+            return Err(self.source.error(place, found, "finite numbers"));
+        }
+        uvs.resize(vertices, [0.0; 2]);
+        Ok(Some(uvs))
+    }
+}
+
+/// Merges vertices with equal positions, for file formats that repeat the vertices of each
+/// triangle.
+#[derive(Default)]
+pub struct Welder {
+    known: HashMap<[u32; 3], u32>,
+}
+
+impl Welder {
+    /// Returns the index of the vertex at `position`. Adds the vertex to `builder` if it is new.
+    pub fn index(&mut self, position: [f32; 3], builder: &mut Builder) -> u32 {
+        // +0 and -0 are the same position.
+        let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
+        *self.known.entry(key).or_insert_with(|| {
+            builder.vertex(position.map(f64::from));
+            (builder.vertices() - 1) as u32
+        })
+    }
+}

@@ -1,0 +1,176 @@
+//! Diagnostics: errors and warnings about a scene file, as users read them.
+
+use crate::format::source_map::LineCounter;
+use crate::value::{sanitized, sort_by_number};
+use std::fmt;
+
+/// Error or warning about a scene file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Name of the scene file as the user gave it.
+    pub file: String,
+    /// Line and column, both counted from 1; the column counts characters. `None` if the diagnostic
+    /// is about the whole file.
+    pub line_column: Option<(usize, usize)>,
+    /// Table that the diagnostic is about, such as `object "queen"`. Empty for the scene as a
+    /// whole.
+    pub subject: String,
+    /// Phrase that states the error, such as `radius is -1`.
+    pub found: String,
+    /// Expected value and remedy, in sentences; may be empty.
+    pub help: String,
+}
+
+/// Largest indentation of the second line of a printed diagnostic [characters]. The second line is
+/// indented by the width of file name and location, up to this limit.
+const MAX_INDENT: usize = 24;
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let mut head = sanitized(&self.file);
+        if let Some((line, column)) = self.line_column {
+            head += &format!(":{line}:{column}");
+        }
+        head += "  ";
+        let indent = head.chars().count().min(MAX_INDENT);
+        if !self.subject.is_empty() {
+            head += &sanitized(&self.subject);
+            head += ": ";
+        }
+        write!(f, "{head}{}.", sanitized(&self.found))?;
+        if !self.help.is_empty() {
+            write!(f, "\n{:indent$}{}", "", sanitized(&self.help))?;
+        }
+        Ok(())
+    }
+}
+
+/// Largest number of errors of a scene file that are reported. Further ones are only counted.
+pub(crate) const MAX_REPORTED: usize = 100;
+
+/// Errors of one scene file: at least one, sorted by location.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneErrors {
+    messages: Vec<Diagnostic>,
+    /// Number of errors of the scene file that are not in `messages`.
+    more: usize,
+}
+
+/// Collector of the diagnostics of a scene file. It stores the [`MAX_REPORTED`] diagnostics with
+/// the smallest byte offsets in the file, and only counts the others.
+#[derive(Default)]
+pub(super) struct FirstDiagnostics {
+    found: Vec<(usize, Diagnostic)>,
+    more: usize,
+    /// Byte offset above which further diagnostics are only counted; `None` as long as all are
+    /// stored.
+    last: Option<usize>,
+}
+
+impl FirstDiagnostics {
+    /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and
+    /// column. `make` is not called if the diagnostic is only counted.
+    pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
+        if self.skips(at) {
+            return;
+        }
+        self.found.push((at, make()));
+        if self.found.len() >= 4 * MAX_REPORTED {
+            self.keep_first();
+        }
+    }
+
+    /// Returns `true` if the diagnostic at the byte offset `at` need not be created, because it
+    /// comes after the first [`MAX_REPORTED`] in the file. It is then only counted.
+    pub fn skips(&mut self, at: usize) -> bool {
+        let skips = self.last.is_some_and(|last| at > last);
+        self.more += usize::from(skips);
+        skips
+    }
+
+    /// Adds `more` to the number of diagnostics that are not stored.
+    pub fn count_more(&mut self, more: usize) {
+        self.more += more;
+    }
+
+    fn keep_first(&mut self) {
+        sort_by_number(&mut self.found, |(at, _)| *at as i64);
+        self.more += self.found.len().saturating_sub(MAX_REPORTED);
+        self.found.truncate(MAX_REPORTED);
+        if self.found.len() == MAX_REPORTED {
+            self.last = self.found.last().map(|(at, _)| *at);
+        }
+    }
+
+    /// Returns `true` if no diagnostic about the scene file was added.
+    pub fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// Returns `(diagnostics, number)`: the stored diagnostics, sorted by location, and the number
+    /// of those that were not stored. Each diagnostic has the file name `file`, and its line and
+    /// column in `text`.
+    pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
+        self.keep_first();
+        let mut lines = LineCounter::new(text);
+        let located = |(at, diagnostic): (usize, Diagnostic)| Diagnostic {
+            file: file.to_string(),
+            line_column: Some(lines.line_column(at)),
+            ..diagnostic
+        };
+        (self.found.into_iter().map(located).collect(), self.more)
+    }
+}
+
+/// Largest number of diagnostics that are printed at once.
+const MAX_SHOWN: usize = 20;
+
+impl SceneErrors {
+    /// Creates the errors of a scene file. `messages` has at least one entry and is sorted by
+    /// location. An entry that repeats the previous one is removed. `more` is the number of errors
+    /// that are not in `messages`.
+    pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
+        debug_assert!(!messages.is_empty(), "errors without a message");
+        messages.dedup();
+        Self { messages, more }
+    }
+
+    /// Creates the errors of a scene file that has one error, at the given location.
+    pub(super) fn at(
+        file: &str,
+        line_column: Option<(usize, usize)>,
+        found: String,
+        help: &str,
+    ) -> Self {
+        let (file, help) = (file.to_string(), help.to_string());
+        let message = Diagnostic { file, line_column, found, help, ..Diagnostic::default() };
+        Self { messages: vec![message], more: 0 }
+    }
+
+    /// Returns the first diagnostics, at most 100, sorted by location.
+    pub fn messages(&self) -> &[Diagnostic] {
+        &self.messages
+    }
+
+    /// Returns the number of errors of the scene file beyond those of [`SceneErrors::messages`].
+    pub fn more(&self) -> usize {
+        self.more
+    }
+}
+
+impl fmt::Display for SceneErrors {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, message) in self.messages.iter().take(MAX_SHOWN).enumerate() {
+            if i > 0 {
+                f.write_str("\n")?;
+            }
+            message.fmt(f)?;
+        }
+        match self.messages.len().saturating_sub(MAX_SHOWN) + self.more {
+            0 => Ok(()),
+            more => write!(f, "\n… and {more} more."),
+        }
+    }
+}
+
+impl std::error::Error for SceneErrors {}

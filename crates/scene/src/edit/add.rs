@@ -1,0 +1,309 @@
+//! Adding objects, lights and materials, with defaults that fit the scene.
+
+use crate::edit::bounds::{BoundingSphere, scene_bounds};
+use crate::edit::convert::{LIGHT_KINDS, set_kind};
+use crate::edit::placement::place_for;
+use crate::edit::properties::{Word, words};
+use crate::edit::unique_name::{free_light, free_material, free_object};
+use crate::edit::{Edit, EditError, Target};
+use crate::light::{Falloff, Light};
+use crate::material::Material;
+use crate::shape::{KINDS, Shape, compose};
+use crate::value::{
+    Color, names, number, round_nice, round_significant, rounded_to, sort_by_number, total_order,
+    unit,
+};
+use crate::{Object, Scale, Scene, TransformOp};
+use glam::DVec3;
+use zerkalo_kernel::primitive::{Form, ParallelogramForm};
+
+/// Returns the name and a description of each kind of object that can be added.
+pub fn object_kinds() -> Vec<Word> {
+    words(KINDS)
+}
+
+/// Returns the name and a description of each kind of light that can be added.
+pub fn light_kinds() -> Vec<Word> {
+    words(LIGHT_KINDS)
+}
+
+/// Colours of new materials, linear red, green and blue. A new material gets the first colour that
+/// no other material has.
+const PALETTE: [[f64; 3]; 6] = [
+    [0.85, 0.16, 0.11],
+    [0.13, 0.28, 0.8],
+    [0.15, 0.62, 0.28],
+    [0.9, 0.68, 0.12],
+    [0.55, 0.2, 0.65],
+    [0.1, 0.6, 0.65],
+];
+
+/// Returns a material with the first palette colour that no material of the scene has. If all are
+/// used, the number of materials modulo the number of colours is the index of the colour.
+fn fresh_material(scene: &Scene) -> Material {
+    let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
+    let free = PALETTE.iter().find(|color| !used(color));
+    let color = free.copied().unwrap_or(PALETTE[scene.materials.len() % PALETTE.len()]);
+    let (diffuse, specular, exponent) = (0.8, 0.2, 40.0);
+    Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
+}
+
+/// Adds an object of the kind `kind`. The object rests on a surface, as near as possible to the
+/// middle of the camera's view, and is somewhat smaller than most other objects. A plane is put
+/// below all objects. `material` is the name of an existing material for the object; `None` creates
+/// a new material.
+///
+/// # Errors
+/// Fails if there is no such kind of object, or the scene has no such material.
+pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
+    let size = usual_size(scene);
+    let room = DVec3::splat(size);
+    let base = place_for(scene, room);
+    let Some(mut shape) = Shape::fitted_to(kind, base, room) else {
+        let found = format!("there is no kind of object called \"{kind}\"");
+        return Err(EditError::new(&found, &format!("Expected one of {}.", names(KINDS))));
+    };
+    face_camera(&mut shape, scene);
+    if let Form::Plane(_) = shape.form() {
+        // A plane is put below all objects, so that it does not coincide with an existing ground.
+        let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
+        if let Some(lowest) = lows.reduce(f64::min) {
+            let under = round_nice(lowest - 0.1 * size, size);
+            shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] = under);
+        }
+    }
+    let mut next = scene.clone();
+    let name = free_object(scene, kind);
+    let material = match material {
+        Some(shared) => shared.to_string(),
+        None => {
+            let unique_name = free_material(scene, &name);
+            next.materials.insert(unique_name.clone(), fresh_material(scene));
+            unique_name
+        }
+    };
+    let transform = if shape.anchor_points_mut().is_empty() {
+        upright_steps(&shape, base, size)
+    } else {
+        Vec::new()
+    };
+    next.objects.push(Object { name, material, shape, transform });
+    let subject = Target::Object(next.objects.len() - 1);
+    Edit::checked(next, subject, format!("add {kind}"))
+}
+
+/// Returns transform steps for `shape`, which has no key for its position. The steps scale the
+/// longest side of its bounding box to `size` and place the shape upright on the point `base`. The
+/// list is empty if the shape has no bounds.
+fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
+    // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
+    let mut steps = match shape {
+        Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
+        _ => Vec::new(),
+    };
+    let Some((low, high)) = shape.form().transformed(&compose(&steps)).bounds() else {
+        return Vec::new();
+    };
+    let factor = size / (high - low).max_element();
+    let foot = DVec3::new(0.5 * (low.x + high.x), low.y, 0.5 * (low.z + high.z));
+    let by = base - factor * foot;
+    steps.extend([TransformOp::Scale(Scale([factor; 3])), TransformOp::Translate(by.to_array())]);
+    steps
+}
+
+/// Returns the length of a new object in scene units, rounded to one significant digit. It is 0.6
+/// times the median length of the solids, the objects that are not flat. The median is limited to
+/// the range from 0.01 R to R, where R is the radius of the scene's bounding sphere. If there are
+/// no solids, the length is 0.15 R. In an empty scene it is 0.6.
+fn usual_size(scene: &Scene) -> f64 {
+    let BoundingSphere { radius, .. } = scene_bounds(scene);
+    let solid = |object: &Object| {
+        let form = object.form();
+        let (low, high) = form.bounds()?;
+        form.is_solid().then(|| (high - low).max_element())
+    };
+    let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
+    sort_by_number(&mut sizes, |size| total_order(*size));
+    let size = match sizes.get(sizes.len() / 2) {
+        Some(middle) => middle.clamp(0.01 * radius, radius),
+        None if scene.objects.is_empty() => 1.0,
+        None => 0.25 * radius,
+    };
+    round_significant(0.6 * size, 1)
+}
+
+/// Turns a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
+/// camera. Other shapes and flat shapes that are nearly horizontal stay unchanged.
+fn face_camera(shape: &mut Shape, scene: &Scene) {
+    let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
+    let front = u.cross(v).normalize();
+    if front.y.abs() > 0.5 {
+        return;
+    }
+    let heading = |d: DVec3| d.x.atan2(d.z).to_degrees();
+    let toward = -scene.camera.view().unwrap_or(DVec3::NEG_Z);
+    shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
+}
+
+/// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
+/// with fewer lights. It illuminates the centre of the scene as a light of intensity 1 without
+/// falloff does, or half as brightly if another light is on.
+///
+/// # Errors
+/// Fails if there is no such kind.
+pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
+    let BoundingSphere { center, radius } = scene_bounds(scene);
+    let center = DVec3::from_array(center);
+    let [right, _, forward] = scene.camera.frame();
+    let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
+    let (right, forward) = (level(right), level(forward));
+    let side = |light: &Light| match (light.position(), light.direction()) {
+        (Some(position), _) => (DVec3::from_array(position) - center).dot(right),
+        (None, Some(direction)) => unit(direction).map_or(0.0, |along| -along.dot(right)),
+        (None, None) => 0.0,
+    };
+    let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
+    let toward = if lit > 0.0 { -right } else { right };
+    let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
+    let mut light = Light::default();
+    let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
+    let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
+    set_kind(&mut light, kind, position, direction, radius / 5.0);
+    if light.kinds().is_empty() {
+        let found = format!("there is no kind of light called \"{kind}\"");
+        let kinds = crate::light::KINDS.join(", ");
+        return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
+    }
+    let name = match kind {
+        "directional" => "sun",
+        "spot" => "spot",
+        "environment" => "sky",
+        _ => "lamp",
+    };
+    light.name = free_light(scene, name);
+    // If a light is on already, the new light adds to it, and therefore gets half the intensity.
+    light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
+    if let Some(surface) = light.surface() {
+        // The intensity makes the light as bright at the centre of the scene as a light without
+        // falloff.
+        let squared = (from * (1.5 * radius)).length_squared();
+        let seen = std::f64::consts::PI * surface.radius().powi(2);
+        let factor = std::f64::consts::PI * squared / seen;
+        light.intensity = round_significant(light.intensity * factor, 2);
+    }
+    let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
+    let mut note = None;
+    if physical && !scene.lights.is_empty() && light.apex().is_some() {
+        // All other lights have the inverse square falloff: the new one gets it, too. Its intensity
+        // is scaled so that the brightness at the centre of the scene stays that of a light without
+        // falloff.
+        let squared = (from * (1.5 * radius)).length_squared();
+        light.falloff = Falloff::InverseSquare;
+        light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);
+        let text = number(light.intensity);
+        note = Some(format!("It falls off with the square of the distance; intensity {text}."));
+    }
+    let mut next = scene.clone();
+    let label = format!("add {}", light.name);
+    next.lights.push(light);
+    let subject = Target::Light(next.lights.len() - 1);
+    Ok(Edit::checked(next, subject, label)?.with_note(note))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+
+    #[test]
+    fn added_objects_are_visible_and_intersect_nothing() {
+        let scene = built_in();
+        for word in object_kinds() {
+            let edit = add_object(&scene, &word.name, None).unwrap();
+            let Target::Object(i) = edit.subject else { panic!() };
+            let object = &edit.scene.objects[i];
+            assert_eq!(object.shape.key(), word.name);
+            assert_eq!(
+                object.name,
+                if word.name == "cube" {
+                    "cube 2"
+                } else if ["prism", "pyramid"].contains(&word.name.as_str()) {
+                    object.name.as_str()
+                } else {
+                    word.name.as_str()
+                }
+            );
+            assert!(edit.scene.materials.contains_key(&object.material));
+            let Some((low, high)) = object.form().bounds() else { continue };
+            assert!(low.y.abs() < 1e-12 || word.name == "platform", "{}: {low}", word.name);
+            let middle = (low + high) / 2.0;
+            let [right, up, forward] = scene.camera.frame();
+            let to = middle - DVec3::from_array(scene.camera.eye);
+            let depth = to.dot(forward);
+            let [w, h] = scene.camera.half_size(4.0 / 3.0);
+            let inside = to.dot(right).abs() < w * depth && to.dot(up).abs() < h * depth;
+            assert!(depth > 0.0 && inside, "{}: {middle}", word.name);
+            for other in &scene.objects[2..] {
+                let (a, b) = other.form().bounds().unwrap();
+                assert!(!(low.cmplt(b).all() && a.cmplt(high).all()), "{}", word.name);
+            }
+        }
+    }
+
+    #[test]
+    fn ten_added_cubes_do_not_intersect() {
+        let mut scene = built_in();
+        for _ in 0..10 {
+            scene = add_object(&scene, "cube", Some("red")).unwrap().scene;
+        }
+        let boxes: Vec<_> = scene.objects[2..].iter().map(|o| o.form().bounds().unwrap()).collect();
+        for (i, a) in boxes.iter().enumerate().skip(4) {
+            for b in &boxes[..i] {
+                assert!(
+                    !(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()),
+                    "cube {i} stands in another"
+                );
+            }
+        }
+        assert_eq!(scene.materials.len(), 6);
+    }
+
+    #[test]
+    fn objects_added_to_an_empty_scene_are_in_view() {
+        for word in object_kinds() {
+            let edit = add_object(&Scene::default(), &word.name, None).unwrap();
+            assert_eq!(edit.scene.faults(), []);
+        }
+        assert!(add_object(&Scene::default(), "sphere", Some("none")).is_err());
+        assert!(add_object(&Scene::default(), "blob", None).is_err());
+    }
+
+    #[test]
+    fn added_lights_alternate_sides() {
+        let scene = built_in();
+        for word in light_kinds() {
+            let edit = add_light(&scene, &word.name).unwrap();
+            let light = &edit.scene.lights[1];
+            let x = match (light.position(), light.direction()) {
+                (Some(position), _) => position[0],
+                (None, Some(direction)) => -direction[0],
+                (None, None) => {
+                    assert!(light.environment.is_some() && light.name == "sky");
+                    continue;
+                }
+            };
+            assert!(x < 0.0, "the lamp that is there stands to the right");
+            let name = match word.name.as_str() {
+                "directional" => "sun",
+                "spot" => "spot",
+                _ => "lamp 2",
+            };
+            assert_eq!(light.name, name, "{}", word.name);
+        }
+        assert!(add_light(&scene, "area").is_err());
+        let physical = "light = [{ point.position = [3, 3, 3], intensity = 40, \
+                        falloff = \"inverse-square\" }]\n";
+        let edit = add_light(&Scene::parse(physical, "").unwrap(), "point").unwrap();
+        assert!(edit.scene.lights[1].falloff == Falloff::InverseSquare && edit.note.is_some());
+    }
+}

@@ -1,0 +1,135 @@
+//! Bounds of objects and scenes. They serve to frame objects with the camera, to choose the length
+//! of the arrow keys' steps, and to place new objects.
+
+use crate::edit::Target;
+use crate::value::floor_log10;
+use crate::{Object, Scene};
+use glam::DVec3;
+
+/// Bounding sphere of an object or scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingSphere {
+    /// Centre of the sphere, in scene units.
+    pub center: [f64; 3],
+    /// Radius of the sphere, in scene units; greater than 0.
+    pub radius: f64,
+}
+
+/// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
+pub(super) type Extent = (DVec3, DVec3);
+
+/// Returns a bounding sphere for `subject`, a part of the scene. The sphere of a finite object
+/// contains the object. The sphere of a plane is centred on the plane's position and has the radius
+/// R of [`scene_bounds`]. The sphere of a light with a position has the radius of the light, at
+/// least R / 10. The sphere of a material contains all finite objects that use it. Returns `None`
+/// for any other target.
+pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
+    match subject {
+        Target::Object(i) => {
+            let object = scene.objects.get(*i)?;
+            Some(match object.form().bounds() {
+                Some(extent) => ball(extent),
+                None => {
+                    let point = object.shape.position();
+                    let at = object.scene_from_object().transform_point3(point);
+                    BoundingSphere { center: at.to_array(), radius: scene_bounds(scene).radius }
+                }
+            })
+        }
+        Target::Light(i) => {
+            let light = scene.lights.get(*i)?;
+            let usual = scene_bounds(scene).radius / 10.0;
+            let radius = light.surface().map_or(usual, |surface| surface.radius().max(usual));
+            Some(BoundingSphere { center: light.position()?, radius })
+        }
+        Target::Material(name) => {
+            let used = scene.objects.iter().filter(|o| o.names_material(name));
+            used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
+        }
+        _ => None,
+    }
+}
+
+/// Returns the bounding sphere of all solids in the scene, the finite objects that are not flat. If
+/// there are no solids, it is that of all finite objects. If there are no finite objects either, it
+/// is the unit sphere about the origin.
+pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
+    middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
+}
+
+/// Returns the bounding box of all solids in the scene, the finite objects that are not flat.
+/// Without solids it is that of all finite objects. Returns `None` if there are no finite objects.
+fn middle(scene: &Scene) -> Option<Extent> {
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let solids = forms.iter().filter(|form| form.is_solid()).filter_map(|form| form.bounds());
+    solids.reduce(union).or_else(|| forms.iter().filter_map(|form| form.bounds()).reduce(union))
+}
+
+pub(super) fn union(a: Extent, b: Extent) -> Extent {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// Returns the sphere through the corners of a box, which is given by its lowest and highest
+/// corner.
+fn ball((low, high): Extent) -> BoundingSphere {
+    let radius = (high - low).length() / 2.0;
+    let center = low + (high - low) / 2.0;
+    BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
+}
+
+/// Returns the coarse step, in scene units, by which arrow keys change a coordinate: the power of
+/// ten between a hundredth and a tenth of the diameter of [`scene_bounds`]. It is 0.1 in a room
+/// with objects a few units apart. A fine step is a tenth of it.
+pub fn step_length(scene: &Scene) -> f64 {
+    let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
+    format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
+}
+
+/// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
+/// the camera's target. For a camera with a direction it is the point of the view axis closest to
+/// the centre of [`scene_bounds`]. If this point is behind the eye or close to the eye, the
+/// distance is the radius of [`scene_bounds`].
+pub fn pivot_distance(scene: &Scene) -> f64 {
+    let eye = DVec3::from_array(scene.camera.eye);
+    if let Some(target) = scene.camera.target {
+        return (DVec3::from_array(target) - eye).length();
+    }
+    let BoundingSphere { center, radius } = scene_bounds(scene);
+    let along = scene.camera.view().map_or(0.0, |w| w.dot(DVec3::from_array(center) - eye));
+    if along > 0.1 * radius { along } else { radius }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+
+    #[test]
+    fn scene_bounds_enclose_the_solids() {
+        let mut scene = built_in();
+        let room = scene_bounds(&scene);
+        assert!(room.radius > 1.5 && room.radius < 3.0, "{room:?}");
+        assert_eq!(step_length(&scene), 0.1);
+        let floor = bounds(&scene, &Target::Object(0)).unwrap();
+        assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == [0.0; 3]);
+        let red = bounds(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(red, bounds(&scene, &Target::Object(2)).unwrap());
+        assert_eq!(bounds(&scene, &Target::Film), None);
+        scene.objects.truncate(1);
+        assert_eq!(scene_bounds(&scene), floor, "without solids what there is");
+        scene.objects.clear();
+        assert_eq!(scene_bounds(&scene).radius, 1.0);
+    }
+
+    #[test]
+    fn pivot_distance_is_positive() {
+        let mut scene = built_in();
+        let target = pivot_distance(&scene);
+        let w = scene.camera.view().unwrap();
+        scene.camera.target = None;
+        scene.camera.direction = Some(w.to_array());
+        assert!((pivot_distance(&scene) / target - 1.0).abs() < 0.3);
+        scene.camera.direction = Some((-w).to_array());
+        assert!(pivot_distance(&scene) > 0.0);
+    }
+}

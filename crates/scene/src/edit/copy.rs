@@ -1,0 +1,341 @@
+//! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
+
+use crate::Scene;
+use crate::edit::bounds::bounds;
+use crate::edit::parse_value::name;
+use crate::edit::placement::place_for;
+use crate::edit::translate::move_object;
+use crate::edit::unique_name::{free_light, free_material, free_object, free_view};
+use crate::edit::{Edit, EditError, Target};
+use crate::value::truncated;
+use glam::DVec3;
+
+/// Duplicates an object, a light, a material or a stored camera. The copy has a unique name such as
+/// `cube 2`. The copy of an object or a light without a name has no name either. The copy of an
+/// object is moved horizontally to a free place, in the camera's view if possible; that of a plane
+/// is moved down. The copy of a light with a position is moved along x.
+///
+/// # Errors
+/// Fails for targets that every scene has exactly once, such as the current camera, and for targets
+/// that do not exist.
+pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    if !subject.exists(scene) {
+        return Err(EditError::gone(subject));
+    }
+    let mut next = scene.clone();
+    let copy = match subject {
+        Target::Object(i) => {
+            let mut copy = scene.objects[*i].clone();
+            if !copy.name.is_empty() {
+                copy.name = free_object(scene, &copy.name);
+            }
+            if let Some((low, high)) = copy.form().bounds() {
+                let size = high - low;
+                let usual = size.max_element();
+                let base = place_for(scene, size.map(|s| s.max(1e-3 * usual)));
+                let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
+                // The copy is at the same height above the ground as the original.
+                let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
+                let digits = crate::value::floor_log10(usual) - 3;
+                let by = by.map(|x| crate::value::rounded_to(x, digits));
+                move_object(&mut copy, by.to_array());
+            } else {
+                let ball = bounds(scene, subject);
+                move_object(&mut copy, [0.0, -0.1 * ball.map_or(1.0, |b| b.radius), 0.0]);
+            }
+            next.objects.push(copy);
+            Target::Object(next.objects.len() - 1)
+        }
+        Target::Light(i) => {
+            let mut copy = scene.lights[*i].clone();
+            if !copy.name.is_empty() {
+                copy.name = free_light(scene, &copy.name);
+            }
+            if let Some(position) = copy.position_mut() {
+                let step = crate::edit::step_length(scene);
+                *position = crate::edit::translate::moved(*position, [5.0 * step, 0.0, 0.0]);
+            }
+            next.lights.push(copy);
+            Target::Light(next.lights.len() - 1)
+        }
+        Target::Material(old) => {
+            let new = free_material(scene, old);
+            next.materials.insert(new.clone(), scene.materials[old].clone());
+            Target::Material(new)
+        }
+        Target::View(old) => {
+            let new = free_view(scene, old);
+            next.cameras.insert(new.clone(), scene.cameras[old].clone());
+            Target::View(new)
+        }
+        _ => {
+            let found = format!("there is only one {}", subject.label(scene));
+            return Err(EditError::new(&found, ""));
+        }
+    };
+    Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
+}
+
+/// Deletes an object, a light, a stored camera or a material. Objects with a deleted material get
+/// the default material, and parts of compounds that of the whole compound. The edit's note names
+/// these objects and parts.
+///
+/// # Errors
+/// Fails for targets that every scene has.
+pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    if !subject.exists(scene) {
+        return Err(EditError::gone(subject));
+    }
+    let label = format!("delete {}", subject.label(scene));
+    let mut next = scene.clone();
+    let mut note = None;
+    // Index to select after the deletion of entry `i`: that of the next entry, else of the previous
+    // one. `left` is the number of entries that remain.
+    let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
+    let select = match subject {
+        Target::Object(i) => {
+            next.objects.remove(*i);
+            neighbour(*i, next.objects.len()).map(Target::Object)
+        }
+        Target::Light(i) => {
+            next.lights.remove(*i);
+            neighbour(*i, next.lights.len()).map(Target::Light)
+        }
+        Target::View(name) => {
+            next.cameras.remove(name);
+            following(next.cameras.keys(), name).map(Target::View)
+        }
+        Target::Material(name) => {
+            next.materials.remove(name);
+            note = strip(&mut next, name);
+            following(next.materials.keys(), name).map(Target::Material)
+        }
+        _ => {
+            let found = format!("{} belongs to every scene", subject.label(scene));
+            return Err(EditError::new(&found, "Only its values can be changed."));
+        }
+    };
+    Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
+}
+
+/// Returns the name to select after the name `gone` was deleted: the first of the sorted `names`
+/// after it, or else the last one. Returns `None` if `names` is empty.
+fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
+    names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
+}
+
+/// Removes the material `name` from all objects and parts of compounds. The objects get the default
+/// material, the parts that of the whole compound. Returns a note that names these objects and
+/// parts; `None` if nothing used the material.
+fn strip(scene: &mut Scene, name: &str) -> Option<String> {
+    let (mut whole, mut parts) = (Vec::new(), Vec::new());
+    for i in 0..scene.objects.len() {
+        if !scene.objects[i].names_material(name) {
+            continue;
+        }
+        let label = Target::Object(i).label(scene);
+        let object = &mut scene.objects[i];
+        if object.material == name { &mut whole } else { &mut parts }.push(label);
+        object.rename_material(name, "");
+    }
+    let note_for = |labels: &[String], [one, many]: [&str; 2]| {
+        let names = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+        match labels.len() {
+            0 => None,
+            1 => Some(format!("{names} {one} now.")),
+            2 | 3 => Some(format!("{names} {many} now.")),
+            n => Some(format!("{names} and {} more {many} now.", n - 3)),
+        }
+    };
+    let whole = note_for(&whole, ["has the default material", "have the default material"]);
+    let parts = note_for(
+        &parts,
+        [
+            "has the material of the whole in its parts",
+            "have the material of the whole in their parts",
+        ],
+    );
+    let notes: Vec<_> = whole.into_iter().chain(parts).collect();
+    (!notes.is_empty()).then(|| notes.join(" "))
+}
+
+/// Renames an object, a light, a material or a stored camera. A renamed material is also renamed in
+/// all objects and parts that use it. The name of an object or a light may be empty.
+///
+/// # Errors
+/// Fails for targets without a name, and for a name that exists already or is not printable.
+pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
+    if !subject.exists(scene) {
+        return Err(EditError::gone(subject));
+    }
+    let new = name("name", new)?;
+    let mut next = scene.clone();
+    let needed = || EditError::new("the name must not be empty", "Type one.");
+    let taken = |what| EditError::new(&format!("there is a {what} \"{new}\" already"), "");
+    let select = match subject {
+        Target::Object(i) => {
+            next.objects[*i].name = new.clone();
+            subject.clone()
+        }
+        Target::Light(i) => {
+            next.lights[*i].name = new.clone();
+            subject.clone()
+        }
+        Target::Material(_) | Target::View(_) if new.is_empty() => return Err(needed()),
+        Target::Material(old) => {
+            if old != &new && next.materials.contains_key(&new) {
+                return Err(taken("material"));
+            }
+            let moved = next.materials.remove(old);
+            next.materials.extend(moved.map(|material| (new.clone(), material)));
+            next.objects.iter_mut().for_each(|object| object.rename_material(old, &new));
+            Target::Material(new.clone())
+        }
+        Target::View(old) => {
+            if old != &new && next.cameras.contains_key(&new) {
+                return Err(taken("view"));
+            }
+            let moved = next.cameras.remove(old);
+            next.cameras.extend(moved.map(|view| (new.clone(), view)));
+            Target::View(new.clone())
+        }
+        _ => {
+            let found = format!("{} has no name to change", subject.label(scene));
+            return Err(EditError::new(&found, ""));
+        }
+    };
+    Edit::checked(next, select, format!("rename {}", subject.label(scene)))
+}
+
+/// Gives an object a copy of its material that no other object uses.
+///
+/// # Errors
+/// Fails for targets other than objects.
+pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = subject else {
+        return Err(EditError::new("only objects have a material", "Select an object."));
+    };
+    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
+    let mut next = scene.clone();
+    let old = scene.materials.get(&object.material).cloned().unwrap_or_default();
+    let wanted = if object.name.is_empty() { object.shape.key() } else { &object.name };
+    let new = free_material(scene, wanted);
+    next.materials.insert(new.clone(), old);
+    next.objects[*index].material = new.clone();
+    let label = format!("own material for {}", subject.label(scene));
+    Ok(Edit::checked(next, subject.clone(), label)?
+        .with_note(Some(format!("Its material is {} now.", truncated(&new)))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+
+    #[test]
+    fn duplicates_are_apart_and_have_unique_names() {
+        let scene = built_in();
+        let edit = duplicate(&scene, &Target::Object(3)).unwrap();
+        assert_eq!(edit.subject, Target::Object(6));
+        let (old, new) = (&scene.objects[3], &edit.scene.objects[6]);
+        assert_eq!((new.name.as_str(), &new.material), ("cube 2", &old.material));
+        let (a, b) = (old.form().bounds().unwrap(), new.form().bounds().unwrap());
+        assert!(!(a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()), "{a:?} {b:?}");
+        assert_eq!(a.0.y, b.0.y);
+        let lamp = duplicate(&scene, &Target::Light(0)).unwrap().scene;
+        assert_eq!(lamp.lights[1].name, "lamp 2");
+        assert_ne!(lamp.lights[1].point, lamp.lights[0].point);
+        let red = duplicate(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(red.subject, Target::Material("red 2".into()));
+        assert!(duplicate(&scene, &Target::Film).is_err());
+        assert!(duplicate(&scene, &Target::Light(7)).is_err());
+    }
+
+    #[test]
+    fn delete_selects_neighbour_and_notes_lost_materials() {
+        let scene = built_in();
+        let edit = delete(&scene, &Target::Object(5)).unwrap();
+        assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
+        let edit = delete(&scene, &Target::Object(2)).unwrap();
+        assert_eq!(edit.subject, Target::Object(2));
+        let edit = delete(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(edit.scene.objects[2].material, "");
+        assert_eq!(edit.note.as_deref(), Some("ball has the default material now."));
+        assert_eq!(edit.subject, Target::Material("yellow".into()));
+        let edit = delete(&scene, &Target::Light(0)).unwrap();
+        assert_eq!(edit.subject, Target::Camera);
+        assert!(delete(&scene, &Target::Camera).is_err());
+    }
+
+    #[test]
+    fn rename_material_updates_objects() {
+        let scene = built_in();
+        let red = Target::Material("red".into());
+        let edit = rename(&scene, &red, " crimson ").unwrap();
+        assert_eq!(edit.scene.objects[2].material, "crimson");
+        assert_eq!(edit.subject, Target::Material("crimson".into()));
+        assert_eq!(rename(&scene, &red, "red").unwrap().scene, scene);
+        assert_eq!(
+            rename(&scene, &Target::Object(2), "bowl").unwrap().scene.objects[2].name,
+            "bowl"
+        );
+        for (subject, new) in [
+            (red.clone(), "green"),
+            (red, ""),
+            (Target::Object(2), "cube"),
+            (Target::Object(2), "a\nb"),
+            (Target::Camera, "x"),
+        ] {
+            assert!(rename(&scene, &subject, new).is_err(), "{subject:?} {new:?}");
+        }
+    }
+
+    #[test]
+    fn own_material_copies_a_shared_material() {
+        let scene = built_in();
+        let edit = own_material(&scene, &Target::Object(2)).unwrap();
+        assert_eq!(edit.scene.objects[2].material, "ball");
+        assert_eq!(edit.scene.materials["ball"], scene.materials["red"]);
+        assert!(own_material(&scene, &Target::Light(0)).is_err());
+    }
+
+    const COMPOUND: &str = "
+        [materials.red]
+        color = [1.0, 0.0, 0.0]
+        [materials.blue]
+        color = [0.0, 0.0, 1.0]
+        [[object]]
+        name = \"dice\"
+        material = \"blue\"
+        [[object.shape.union.of]]
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+        [[object.shape.union.of]]
+        material = \"red\"
+        [[object.shape.union.of.shape.difference.of]]
+        shape.sphere = { center = [1.0, 0.0, 0.0], radius = 1.0 }
+        [[object.shape.union.of.shape.difference.of]]
+        material = \"red\"
+        shape.sphere = { center = [1.0, 1.0, 0.0], radius = 0.5 }
+    ";
+
+    #[test]
+    fn rename_material_updates_parts() {
+        let scene = Scene::parse(COMPOUND, "test").unwrap();
+        let edit = rename(&scene, &Target::Material("red".into()), "crimson").unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["blue", "crimson", "crimson"]);
+        let edit = rename(&scene, &Target::Material("blue".into()), "navy").unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["navy", "red", "red"]);
+    }
+
+    #[test]
+    fn delete_material_clears_parts() {
+        let scene = Scene::parse(COMPOUND, "test").unwrap();
+        let edit = delete(&scene, &Target::Material("red".into())).unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["blue"; 3]);
+        let note = "dice has the material of the whole in its parts now.";
+        assert_eq!(edit.note.as_deref(), Some(note));
+        let edit = delete(&scene, &Target::Material("blue".into())).unwrap();
+        assert_eq!(edit.scene.objects[0].materials(), ["", "red", "red"]);
+        assert_eq!(edit.note.as_deref(), Some("dice has the default material now."));
+    }
+}

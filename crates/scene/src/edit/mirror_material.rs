@@ -1,0 +1,168 @@
+//! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
+//! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
+
+use crate::Scene;
+use crate::edit::target::mirror_of;
+use crate::edit::{Edit, EditError, Target, step};
+use zerkalo_kernel::primitive::Form;
+
+/// Returns the name of the material that the mirror commands change: the first of the following
+/// that reflects.
+///
+/// - The material that is selected, or that of the selected object. Glass counts even if it only
+///   transmits.
+/// - The material with the largest reflection coefficient in the selected object and its parts.
+/// - The material with the largest reflection coefficient in the first rectangle that reflects.
+/// - The material with the largest reflection coefficient in all objects and parts.
+///
+/// If none reflects, returns the selected material, or else that of the first rectangle, so that
+/// the reflection can be increased from 0 again. Returns `None` if there is neither.
+pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
+    let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
+    let chosen = selected.and_then(|subject| match subject.material(scene) {
+        Some(Target::Material(name)) => Some(name),
+        _ => None,
+    });
+    let is_specular = |material: &String| {
+        scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
+    };
+    if let Some(chosen) = chosen.clone().filter(is_specular) {
+        return Some(chosen);
+    }
+    if let Some(Target::Object(i)) = selected
+        && let Some(part) = reflecting(*i)
+    {
+        return Some(part);
+    }
+    // Rectangles of any orientation count; the ground (`platform`) does not.
+    let rectangle = |i: &usize| {
+        let object = &scene.objects[*i];
+        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))
+    };
+    let mut all = 0..scene.objects.len();
+    if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
+        return Some(name);
+    }
+    let strengths = all.clone().filter_map(|i| mirror_of(scene, i));
+    if let Some((name, _)) = strengths.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
+        return Some(name.to_string());
+    }
+    let name = |i: usize| Some(scene.objects[i].material.clone());
+    let named = |i: &usize| scene.materials.contains_key(&scene.objects[*i].material);
+    chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
+}
+
+/// Changes the value of `key` of the material that [`mirror`] finds for `selected`, such as its
+/// `roughness`, `reflection` or `lobe`, by `steps` presses of an arrow key, as [`step`] does.
+///
+/// # Errors
+/// Fails if [`mirror`] finds no material.
+pub fn step_mirror(
+    scene: &Scene,
+    selected: Option<&Target>,
+    key: &str,
+    steps: f64,
+) -> Result<Edit, EditError> {
+    let material = mirror(scene, selected).map(Target::Material).ok_or_else(|| {
+        let help = "Give an object's material a reflection first.";
+        EditError::new("nothing in this scene reflects", help)
+    })?;
+    step(scene, &material, key, None, steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+    use crate::material::Lobe;
+
+    #[test]
+    fn mirror_prefers_selection_then_rectangle() {
+        let mut scene = built_in();
+        let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
+        assert_eq!(at(&scene, None), "mirror");
+        assert_eq!(at(&scene, Some(Target::Object(2))), "red");
+        assert_eq!(at(&scene, Some(Target::Object(3))), "mirror", "the cube does not reflect");
+        assert_eq!(at(&scene, Some(Target::Material("floor".into()))), "floor");
+        assert_eq!(at(&scene, Some(Target::Camera)), "mirror");
+        scene.materials.get_mut("green").unwrap().transmission = 0.5;
+        assert_eq!(at(&scene, Some(Target::Object(3))), "green", "glass is as rough as a mirror");
+        scene.materials.get_mut("green").unwrap().transmission = 0.0;
+        scene.materials.get_mut("mirror").unwrap().reflection = 0.0;
+        assert_eq!(at(&scene, None), "red");
+        for material in scene.materials.values_mut() {
+            material.reflection = 0.0;
+        }
+        assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
+        assert_eq!(at(&scene, Some(Target::Object(3))), "green");
+        scene.objects.clear();
+        assert_eq!(mirror(&scene, None), None);
+        assert!(step_mirror(&scene, None, "roughness", 1.0).unwrap_err().found.contains("nothing"));
+    }
+
+    #[test]
+    fn mirror_is_found_in_compound_parts() {
+        let text = "
+            [materials.glossy]
+            reflection = 0.5
+            [[object]]
+            [[object.shape.union.of]]
+            shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+            material = \"glossy\"
+            [[object.shape.union.of]]
+            shape.sphere = { center = [1.0, 0.0, 0.0], radius = 1.0 }
+        ";
+        let scene = Scene::parse(text, "test").unwrap();
+        assert_eq!(mirror(&scene, None).as_deref(), Some("glossy"));
+        assert_eq!(mirror(&scene, Some(&Target::Object(0))).as_deref(), Some("glossy"));
+        let outline = crate::edit::outline(&scene);
+        let (section, _) = outline.iter().find(|(_, s)| *s == Target::Object(0)).unwrap();
+        assert_eq!(*section, crate::edit::Section::Mirrors);
+    }
+
+    #[test]
+    fn adjust_roughness_from_zero_and_back() {
+        let mut scene = built_in();
+        scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
+        let start = scene.clone();
+        let mut seen = vec![0.0];
+        for _ in 0..60 {
+            scene = step_mirror(&scene, None, "roughness", 1.0).unwrap().scene;
+            seen.push(scene.materials["mirror"].roughness);
+        }
+        assert!(seen.is_sorted_by(|a, b| a < b), "{seen:?}");
+        assert!(seen.contains(&0.3) && seen.contains(&0.001) && seen.contains(&0.05), "{seen:?}");
+        for expected in seen.iter().rev().skip(1) {
+            scene = step_mirror(&scene, None, "roughness", -1.0).unwrap().scene;
+            assert_eq!(scene.materials["mirror"].roughness, *expected);
+        }
+        assert_eq!(scene, start);
+        assert_eq!(
+            step_mirror(&scene, None, "roughness", -1.0).unwrap().scene,
+            start,
+            "0 is the end"
+        );
+        let fine = step_mirror(&scene, None, "roughness", 0.1).unwrap().scene;
+        assert_eq!(fine.materials["mirror"].roughness, 0.001);
+    }
+
+    #[test]
+    fn next_lobe_cycles_and_reflect_steps() {
+        let mut scene = built_in();
+        let mut lobes = Vec::new();
+        for _ in 0..5 {
+            scene = step_mirror(&scene, None, "lobe", 1.0).unwrap().scene;
+            lobes.push(scene.materials["mirror"].lobe);
+        }
+        assert_eq!(lobes, [Lobe::Square, Lobe::Beckmann, Lobe::Ggx, Lobe::Mirror, Lobe::Cone]);
+        assert_eq!(
+            step_mirror(&scene, None, "lobe", -1.0).unwrap().scene.materials["mirror"].lobe,
+            Lobe::Mirror
+        );
+        let edit = step_mirror(&scene, None, "reflection", 1.0).unwrap();
+        assert_eq!(edit.scene.materials["mirror"].reflection, 0.97);
+        assert_eq!(edit.label, "reflection of mirror");
+        let edit = step_mirror(&scene, None, "reflection", -0.1).unwrap();
+        assert_eq!(edit.scene.materials["mirror"].reflection, 0.915);
+    }
+}

@@ -1,0 +1,110 @@
+//! Edits of scenes, as pure functions from a scene to a scene. They use no terminal and no clock.
+//! They read only the files that a scene names, each of them once.
+//!
+//! Every function takes a valid scene and returns an [`Edit`] whose scene is valid, or an
+//! [`EditError`] with the reason.
+
+mod add;
+mod bounds;
+mod convert;
+mod copy;
+mod increment;
+#[cfg(test)]
+mod increment_test;
+mod lens;
+mod mirror_material;
+mod parse_value;
+mod placement;
+mod properties;
+mod rotate;
+mod set;
+mod target;
+mod toml_view;
+mod translate;
+mod unique_name;
+mod viewpoints;
+
+pub use add::{add_light, add_object, light_kinds, object_kinds};
+pub use bounds::{BoundingSphere, bounds, pivot_distance, scene_bounds, step_length};
+pub use copy::{delete, duplicate, own_material, rename};
+pub use increment::{step, toggle};
+pub use lens::{change_aperture, focus_on};
+pub use mirror_material::{mirror, step_mirror};
+pub use placement::snap_to_ground;
+pub use properties::{Property, Widget, Word, rows};
+pub use rotate::turn;
+pub use set::{set, set_component};
+pub use target::{Section, Target, outline};
+pub use translate::move_by;
+pub use viewpoints::{recall_view, store_view};
+
+use crate::Scene;
+use crate::value::truncated;
+use std::fmt;
+
+/// Result of an edit: the edited scene, and what the editor shows about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edit {
+    /// Edited scene, which is valid.
+    pub scene: Scene,
+    /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
+    /// one.
+    pub subject: Target,
+    /// Short description for the undo history: `move cube`, `radius of ball`. Successive edits can
+    /// be merged into one undo step only if they have the same label.
+    pub label: String,
+    /// Sentence about a side effect of the edit; `None` if there is none.
+    pub note: Option<String>,
+}
+
+/// Reason why an edit of a scene was refused.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EditError {
+    /// Phrase that states why the edit was refused.
+    pub found: String,
+    /// Expected value or remedy, in sentences; may be empty.
+    pub help: String,
+}
+
+impl fmt::Display for EditError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}.", self.found)?;
+        if self.help.is_empty() { Ok(()) } else { write!(f, " {}", self.help) }
+    }
+}
+
+impl std::error::Error for EditError {}
+
+impl EditError {
+    fn new(found: &str, help: &str) -> Self {
+        Self { found: found.to_string(), help: help.to_string() }
+    }
+
+    fn gone(subject: &Target) -> Self {
+        let what = match subject {
+            Target::View(name) => format!("there is no camera \"{}\"", truncated(name)),
+            Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
+            Target::Light(i) => format!("there is no light {}", i + 1),
+            Target::Object(i) => format!("there is no object {}", i + 1),
+            _ => "it cannot be read".to_string(),
+        };
+        Self::new(&what, "")
+    }
+}
+
+impl Edit {
+    /// Creates the edit whose result is `scene`, if `scene` is valid; otherwise returns the first
+    /// validation error. `subject` is selected after the edit. `label` is the name of the edit in
+    /// the undo history.
+    fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
+        scene.resolve();
+        match scene.faults().into_iter().next() {
+            Some(fault) => Err(EditError { found: fault.found, help: fault.help }),
+            None => Ok(Self { scene, subject, label, note: None }),
+        }
+    }
+
+    fn with_note(self, note: Option<String>) -> Self {
+        Self { note, ..self }
+    }
+}

@@ -1,0 +1,239 @@
+//! Placement of objects: on the surfaces that support them, and at positions that are free of other
+//! objects.
+
+use crate::camera::Camera;
+use crate::edit::bounds::{BoundingSphere, Extent, scene_bounds};
+use crate::edit::{Edit, EditError, Target};
+use crate::value::{floor_log10, round_significant, rounded_to};
+use crate::{Object, Scene, TransformOp};
+use glam::{DVec2, DVec3};
+use zerkalo_kernel::primitive::Form;
+
+/// Lowers an object until its lowest point rests on the highest surface below it. If there is none
+/// below, raises the object to the lowest surface above. Surfaces are searched on vertical lines
+/// through the centre and the lowest corners of the object.
+///
+/// # Errors
+/// Fails for targets other than objects, and for a plane, because it has no lowest point. Also
+/// fails if there is no surface below or above the object.
+pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = subject else {
+        return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
+    };
+    if !subject.exists(scene) {
+        return Err(EditError::gone(subject));
+    }
+    let mut others: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let form = others.remove(*index);
+    let Some((low, high)) = form.bounds() else {
+        return Err(EditError::new("a plane without end has no lowest point", ""));
+    };
+    let level = (low.y + high.y) / 2.0;
+    let support_points = support_points(&form, (low, high));
+    let heights = |down: bool| {
+        let found = support_points.iter().flat_map(|foot| {
+            let from = DVec3::new(foot.x, level, foot.y);
+            let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
+            others.iter().filter_map(move |form| {
+                let t = form.cast(from, direction)?;
+                // This sum has a rounding error, which would leave a gap. Rounding to 13 digits
+                // removes the error.
+                Some(round_significant(from.y + direction.y * t, 13))
+            })
+        });
+        found.collect::<Vec<_>>()
+    };
+    let below = heights(true).into_iter().reduce(f64::max);
+    let support_height = below.or_else(|| heights(false).into_iter().reduce(f64::min));
+    let Some(support_height) = support_height else {
+        let help = "Add a platform or a plane first.";
+        return Err(EditError::new("there is no surface below or above it", help));
+    };
+    let mut next = scene.clone();
+    let dropped = &mut next.objects[*index];
+    // The second and third pass remove the gap that rounding leaves after the first one.
+    for _ in 0..3 {
+        let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
+        lift(dropped, support_height - lowest);
+    }
+    let label = format!("drop {}", subject.label(scene));
+    Edit::checked(next, subject.clone(), label)
+}
+
+/// Moves an object up by `by` scene units. The new height is exact, not rounded to a short decimal
+/// number.
+fn lift(object: &mut Object, by: f64) {
+    if by == 0.0 {
+        return;
+    }
+    match object.transform.last_mut() {
+        None if !object.shape.anchor_points_mut().is_empty() => {
+            object.shape.anchor_points_mut().into_iter().for_each(|anchor| anchor[1] += by);
+        }
+        Some(TransformOp::Translate(last)) => last[1] += by,
+        _ => object.transform.push(TransformOp::Translate([0.0, by, 0.0])),
+    }
+}
+
+/// Returns the points (x, z) at which an object can be supported: the centre of its bounding box,
+/// and its lowest corners.
+fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
+    let flat = |p: DVec3| DVec2::new(p.x, p.z);
+    let middle = flat(low + (high - low) / 2.0);
+    let mut support_points = vec![middle];
+    let corners = form.corners();
+    let near = 1e-9 * (high - low).max_element();
+    let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
+    // Corners are moved slightly inwards, so that other objects that only touch the sides of this
+    // object do not count as its support.
+    support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
+    support_points
+}
+
+/// Returns a position for a new object: the point for the centre of its underside. `size` has the
+/// object's lengths along x, y and z. The position is on a surface, in a place that is free of
+/// other objects and as near as possible to the middle of the camera's view. Places that the camera
+/// sees are preferred.
+pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
+    let BoundingSphere { radius, .. } = scene_bounds(scene);
+    let eye = DVec3::from_array(scene.camera.eye);
+    let forward = scene.camera.view().unwrap_or(DVec3::NEG_Z);
+    let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
+    let aim = eye + forward * crate::edit::pivot_distance(scene);
+    let solids: Vec<Extent> =
+        forms.iter().filter(|f| f.is_solid()).filter_map(|form| form.bounds()).collect();
+    let walls: Vec<&Form> = forms.iter().filter(|form| !form.is_solid()).collect();
+    let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
+    // New positions are round numbers: whole centimetres for an object of one metre.
+    let grid = floor_log10(size.min_element()) - 2;
+    let candidate = |offset: DVec2| {
+        let at = DVec3::new(aim.x + offset.x, aim.y, aim.z + offset.y);
+        let ground = ground_under(&floors, at).unwrap_or(aim.y - size.y / 2.0);
+        DVec3::new(rounded_to(at.x, grid), round_significant(ground, 13), rounded_to(at.z, grid))
+    };
+    let spread = size.x.max(size.z);
+    let spots = (0..400).map(|i| {
+        // A sunflower spiral covers the area evenly from the middle outwards.
+        let angle = f64::from(i) * 2.399_963_229_728_653;
+        DVec2::from_angle(angle) * (0.45 * spread * f64::from(i).sqrt())
+    });
+    let reach = 6.0 * radius.max(spread);
+    let free = spots.take_while(|offset| offset.length() <= reach).map(candidate).filter(|base| {
+        let half = DVec3::new(spread / 2.0, 0.0, spread / 2.0);
+        let room = (*base - half, *base + half + DVec3::Y * size.y);
+        !walls.iter().any(|wall| intersects(wall, room))
+            && !solids.iter().any(|solid| overlap(*solid, room))
+    });
+    // A visible position is best. The second choice is a hidden position inside the picture, and
+    // the third is one outside of the picture.
+    let (mut hidden, mut outside) = (None, None);
+    for base in free {
+        let middle = base + DVec3::Y * (size.y / 2.0);
+        if !in_view(&scene.camera, scene.film.size, middle) {
+            outside = outside.or(Some(base));
+        } else if !is_visible(&forms, eye, middle) {
+            hidden = hidden.or(Some(base));
+        } else {
+            return base;
+        }
+    }
+    hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
+}
+
+/// Returns `true` if an object is flat and its slope is less than 60 degrees, so that others can
+/// rest on it.
+fn is_level(form: &Form) -> bool {
+    form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
+}
+
+/// Returns the height of the ground on the vertical line through the point `at`. It is the height
+/// of the highest of the flat objects `floors` below the point, or of the lowest above it if there
+/// is none below. Returns `None` if there is neither.
+fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
+    let heights = |direction: DVec3| {
+        floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
+    };
+    heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
+}
+
+/// Returns `true` if the flat object `form` (a wall) intersects the inside of a box.
+fn intersects(form: &Form, (low, high): Extent) -> bool {
+    let shrink = (high - low) * 1e-6;
+    let (low, high) = (low + shrink, high - shrink);
+    let edge = high - low;
+    let corners = [low, low + DVec3::X * edge.x, low + DVec3::Z * edge.z, high - DVec3::Y * edge.y];
+    let diagonals =
+        [high, high - DVec3::X * edge.x, high - DVec3::Z * edge.z, low + DVec3::Y * edge.y];
+    corners
+        .iter()
+        .zip(diagonals)
+        .any(|(from, to)| form.cast(*from, to - from).is_some_and(|t| t < 1.0))
+}
+
+fn overlap(a: Extent, b: Extent) -> bool {
+    a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
+}
+
+/// Returns `true` if `point` is inside a picture of `size` pixels, and farther from each edge than
+/// 7.5 % of the width or height. Occlusion by objects is not considered.
+fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
+    let [right, up, forward] = camera.frame();
+    let to = point - DVec3::from_array(camera.eye);
+    let depth = to.dot(forward);
+    let [half_width, half_height] = camera.half_size(f64::from(size[0]) / f64::from(size[1]));
+    depth > 0.0
+        && to.dot(right).abs() < 0.85 * half_width * depth
+        && to.dot(up).abs() < 0.85 * half_height * depth
+}
+
+/// Returns `true` if none of the objects `forms` occludes `point` from the eye.
+fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
+    !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+    use crate::edit::move_by;
+
+    fn lowest(scene: &Scene, i: usize) -> f64 {
+        scene.objects[i].form().bounds().unwrap().0.y
+    }
+
+    #[test]
+    fn snap_to_ground_rests_exactly_on_the_surface() {
+        let scene = built_in();
+        for i in 2..6 {
+            for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
+                let subject = Target::Object(i);
+                let up = move_by(&scene, &subject, by).unwrap().scene;
+                let down = snap_to_ground(&up, &subject).unwrap();
+                assert_eq!(lowest(&down.scene, i), 0.0, "object {i} {by:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn snap_to_ground_finds_table_and_ground_above() {
+        let text = "[[object]]\nshape.plane = { point = [0, -1, 0], normal = [0, 1, 0] }\n\
+                    [[object]]\nshape.box = { center = [0, 0, 0], size = [2, 0.5, 2] }\n\
+                    [[object]]\nshape.cube = { corner = [-0.5, 3, 0.5], edge = 1 }\n\
+                    transform = [{ rotate_y = 30.0 }]\n";
+        let scene = Scene::parse(text, "text").unwrap();
+        let cube = Target::Object(2);
+        let on_table = snap_to_ground(&scene, &cube).unwrap().scene;
+        assert!((lowest(&on_table, 2) - 0.25).abs() < 1e-15);
+        let aside = move_by(&scene, &cube, [5.0, 0.0, 0.0]).unwrap().scene;
+        assert!((lowest(&snap_to_ground(&aside, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        let corner = move_by(&scene, &cube, [1.3, 0.0, 0.0]).unwrap().scene;
+        assert!((lowest(&snap_to_ground(&corner, &cube).unwrap().scene, 2) - 0.25).abs() < 1e-15);
+        let sunk = move_by(&aside, &cube, [0.0, -9.0, 0.0]).unwrap().scene;
+        assert!((lowest(&snap_to_ground(&sunk, &cube).unwrap().scene, 2) + 1.0).abs() < 1e-15);
+        let refusal = snap_to_ground(&scene, &Target::Object(0)).unwrap_err();
+        assert!(refusal.found.contains("no lowest point"), "{refusal}");
+        let alone = Scene { objects: vec![scene.objects[2].clone()], ..Scene::default() };
+        let refusal = snap_to_ground(&alone, &Target::Object(0)).unwrap_err();
+        assert!(refusal.found.contains("no surface below"), "{refusal}");
+    }
+}

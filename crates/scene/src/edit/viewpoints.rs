@@ -1,0 +1,61 @@
+//! Edits that store the current camera and recall stored cameras.
+
+use crate::Scene;
+use crate::edit::parse_value::name;
+use crate::edit::unique_name::free_view;
+use crate::edit::{Edit, EditError, Target};
+
+/// Stores the current camera under the name `given`. A stored camera of that name is replaced. If
+/// `given` is `None`, the name is the first free one of `view`, `view 2` and so on.
+///
+/// # Errors
+/// Fails if the name is empty, longer than 60 characters or not printable.
+pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
+    let name = match given {
+        Some(given) => name("name", given)?,
+        None => free_view(scene, "view"),
+    };
+    if name.is_empty() {
+        return Err(EditError::new("a camera needs a name", ""));
+    }
+    let mut next = scene.clone();
+    let old = next.cameras.insert(name.clone(), scene.camera.clone());
+    let label = format!("store camera {name}");
+    let replaced = old.is_some_and(|old| old != scene.camera);
+    let note = replaced.then(|| format!("View {name} was replaced."));
+    Ok(Edit::checked(next, Target::View(name), label)?.with_note(note))
+}
+
+/// Makes the stored camera `name` the current camera.
+///
+/// # Errors
+/// Fails if there is no stored camera of that name.
+pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
+    let subject = Target::View(name.to_string());
+    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
+    let next = Scene { camera: view.clone(), ..scene.clone() };
+    Edit::checked(next, Target::Camera, format!("recall camera {}", subject.label(scene)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::built_in;
+
+    #[test]
+    fn cameras_are_stored_and_recalled() {
+        let scene = built_in();
+        let edit = store_view(&scene, None).unwrap();
+        assert_eq!(edit.subject, Target::View("view".into()));
+        let edit = store_view(&edit.scene, None).unwrap();
+        assert_eq!(edit.subject, Target::View("view 2".into()));
+        let mut moved = edit.scene;
+        moved.camera.eye = [3.0, 2.0, 1.0];
+        let back = recall_view(&moved, "view").unwrap();
+        assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Target::Camera));
+        let edit = store_view(&moved, Some(" view ")).unwrap();
+        assert_eq!(edit.scene.cameras["view"], moved.camera);
+        assert!(edit.note.is_some());
+        assert!(recall_view(&scene, "view").is_err() && store_view(&scene, Some(" ")).is_err());
+    }
+}

@@ -1,0 +1,348 @@
+//! Schema validation of a scene file against the tables that list its keys and their types: unknown
+//! keys, values of a wrong type, missing keys. One pass finds all errors.
+
+use crate::camera;
+use crate::diagnostic::{Diagnostic, FirstDiagnostics};
+use crate::format::parts::Part;
+use crate::format::source_map::subject_in;
+use crate::format::suggest::{did_you_mean, nearest};
+use crate::light;
+use crate::material;
+use crate::value::{
+    Color, DefaultValue, Description, Field, NumberRange, ValueType, names, sort_by_number,
+    truncated,
+};
+use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
+use std::ops;
+use toml::Spanned;
+use toml::de::{DeInteger, DeTable, DeValue};
+
+/// Top-level keys of a scene file.
+pub const FIELDS: &[Field] = &[
+    table("film", FilmSettings::FIELDS, "Film: size of the picture, pixel filter, sample limit."),
+    table(
+        "trace",
+        IntegratorSettings::FIELDS,
+        "Integrator: kinds of rays, depth, acceleration structure.",
+    ),
+    Field::optional(
+        "camera",
+        ValueType::Table(camera::FIELDS),
+        "",
+        "at [0.0, 1.0, 5.0], directed at the origin",
+        "Camera that the picture is taken from.",
+    ),
+    Field::optional(
+        "cameras",
+        ValueType::Named(camera::FIELDS),
+        "",
+        "there are none",
+        "Stored cameras by name. The picture is taken from `[camera]`.",
+    ),
+    table("background", Background::FIELDS, "Radiance of rays that hit no surface."),
+    table("ambient", Ambient::FIELDS, "Ambient light: uniform, without shadows."),
+    Field::optional("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
+    Field::optional(
+        "materials",
+        ValueType::Named(material::FIELDS),
+        "",
+        "there are none",
+        "Materials by name, for the key `material` of objects.",
+    ),
+    Field::optional(
+        "object",
+        ValueType::Tables(Object::FIELDS),
+        "",
+        "there are none",
+        "The objects.",
+    ),
+];
+
+const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) -> Field {
+    Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
+}
+
+/// Adds the schema errors (unknown keys, wrong types, missing keys) in `root` to `errors`. `root`
+/// is the parsed `part` of the scene file.
+pub(crate) fn check(root: &Spanned<DeTable>, part: &Part, errors: &mut FirstDiagnostics) {
+    let mut walk = SchemaChecker { part, root: root.get_ref(), path: Vec::new(), errors };
+    walk.table(root.get_ref(), 0..0, FIELDS);
+}
+
+/// Formats a path of keys as a phrase: `shape.sphere`, `step 2 of transform`,
+/// `shape.cube of part 1 of shape.union`.
+fn phrase(keys: &[String]) -> String {
+    let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
+    if let Some(of) = keys.iter().rposition(|key| key == "of")
+        && let [position, inner @ ..] = &keys[of + 1..]
+    {
+        let part = format!("part {} of {}", number(position), phrase(&keys[..of]));
+        return if inner.is_empty() { part } else { format!("{} of {part}", phrase(inner)) };
+    }
+    match keys {
+        [transform, step, rest @ ..] if transform == "transform" => {
+            let suffix: String = rest.iter().map(|key| format!(".{key}")).collect();
+            format!("step {} of transform{suffix}", number(step))
+        }
+        keys => keys.join("."),
+    }
+}
+
+struct SchemaChecker<'a> {
+    part: &'a Part,
+    root: &'a DeTable<'a>,
+    path: Vec<String>,
+    errors: &'a mut FirstDiagnostics,
+}
+
+impl SchemaChecker<'_> {
+    fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
+        self.errors.add(self.part.in_file(span.start), || Diagnostic {
+            subject: subject_in(self.root, &self.path, self.part.first_object),
+            found,
+            help,
+            ..Diagnostic::default()
+        });
+    }
+
+    /// Returns the keys of the current path below the table that diagnostics name (an object,
+    /// light, material, camera or another table): `shape.sphere` for the path
+    /// `object.3.shape.sphere`.
+    fn inner(&self) -> String {
+        let above = match self.path.first().map(String::as_str) {
+            Some("object" | "light" | "materials" | "cameras") => 2,
+            _ => 1,
+        };
+        phrase(self.path.get(above..).unwrap_or_default())
+    }
+
+    /// Adds an error about `value`, which has the wrong type. `span` is its byte range in this part
+    /// of the file. `expected` describes valid values.
+    fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
+        if self.errors.skips(self.part.in_file(span.start)) {
+            return;
+        }
+        let name = match self.inner() {
+            inner if inner.is_empty() => "it".to_string(),
+            inner => inner,
+        };
+        self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
+    }
+
+    /// Adds an error about the unknown key `key`. The error suggests the most similar name in
+    /// `fields`. Returns this name. Returns `None` if no name is similar, or if the error is only
+    /// counted, because enough errors earlier in the file are stored.
+    fn unknown(
+        &mut self,
+        key: &Spanned<toml::de::DeString>,
+        fields: &[Field],
+    ) -> Option<&'static str> {
+        if self.errors.skips(self.part.in_file(key.span().start)) {
+            return None;
+        }
+        let known = || fields.iter().map(|f| f.name);
+        let help = format!("Known: {}.{}", names(fields), did_you_mean(key.get_ref(), known()));
+        let place = match self.inner() {
+            inner if inner.is_empty() => String::new(),
+            inner => format!(" in {}", truncated(&inner)),
+        };
+        let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
+        self.add(key.span(), found, help);
+        nearest(key.get_ref(), known())
+    }
+
+    fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+        let mut intended = Vec::new();
+        for (key, value) in table {
+            match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
+                Some(field) => self.field(field, value),
+                None => intended.extend(self.unknown(key, fields)),
+            }
+        }
+        for field in fields.iter().filter(|f| f.preset == DefaultValue::Required) {
+            if !table.contains_key(field.name) && !intended.contains(&field.name) {
+                let place = match self.inner() {
+                    inner if inner.is_empty() => String::new(),
+                    inner => format!(" in {inner}"),
+                };
+                self.add(
+                    span.clone(),
+                    format!("key \"{}\" is missing{place}", field.name),
+                    format!("Expected {} = {}.", field.name, field.takes),
+                );
+            }
+        }
+    }
+
+    fn one_of(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+        let mut known: Vec<_> = Vec::new();
+        for (key, value) in table {
+            match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
+                Some(field) => known.push((key, value, field)),
+                None => {
+                    self.unknown(key, fields);
+                }
+            }
+        }
+        sort_by_number(&mut known, |(key, ..)| key.span().start as i64);
+        for (_, value, field) in known.iter().take(1) {
+            self.field(field, value);
+        }
+        let expected =
+            || format!("Expected {}.", ValueType::OneOf(fields)).replace("a table with ", "");
+        if let [_, second, ..] = known.as_slice() {
+            let found =
+                format!("{} has both {} and {}", self.inner(), known[0].2.name, second.2.name);
+            self.add(second.0.span(), found, expected());
+        } else if table.is_empty() {
+            self.add(span, format!("{} is empty", self.inner()), expected());
+        }
+    }
+
+    fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>) {
+        self.path.push(field.name.to_string());
+        self.value(field, value);
+        self.path.pop();
+    }
+
+    /// Validates a list of tables. Calls `each` for every entry that is a table; during the call,
+    /// the current path ends with the index of the entry. Adds an error for any other entry;
+    /// `expected` describes valid entries.
+    fn entries(
+        &mut self,
+        list: &[Spanned<DeValue>],
+        expected: &str,
+        each: impl Fn(&mut Self, &DeTable, ops::Range<usize>),
+    ) {
+        let first = self.part.first_index(&self.path);
+        for (i, entry) in (first..).zip(list) {
+            self.path.push(i.to_string());
+            match entry.get_ref() {
+                DeValue::Table(table) => each(self, table, entry.span()),
+                other => self.wrong(entry.span(), other, expected),
+            }
+            self.path.pop();
+        }
+    }
+
+    fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>) {
+        let (value, span) = (spanned.get_ref(), spanned.span());
+        match (field.takes, value) {
+            (ValueType::Table(fields), DeValue::Table(table)) => self.table(table, span, fields),
+            (ValueType::OneOf(fields), DeValue::Table(table)) => self.one_of(table, span, fields),
+            (ValueType::ListOf(fields), DeValue::Array(list)) => {
+                let expected = ValueType::OneOf(fields).to_string();
+                self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
+            }
+            (ValueType::Tables(fields), DeValue::Array(list)) => {
+                self.entries(list, "a table", |w, t, s| w.table(t, s, fields));
+            }
+            (ValueType::Named(fields), DeValue::Table(named)) => {
+                for (name, entry) in named {
+                    self.path.push(name.get_ref().to_string());
+                    match entry.get_ref() {
+                        DeValue::Table(table) => self.table(table, entry.span(), fields),
+                        other => self.wrong(entry.span(), other, "a table"),
+                    }
+                    self.path.pop();
+                }
+            }
+            (takes, value) if fits(takes, value) => {}
+            (ValueType::Choice(choices), DeValue::String(word)) => {
+                let intended = did_you_mean(word, choices.iter().map(|c| c.name));
+                let help = format!("Expected {}.{intended}", field.takes);
+                self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
+            }
+            (ValueType::Tables(_), _) if self.path.len() == 1 => {
+                let expected = format!("tables that begin with [[{}]]", field.name);
+                self.wrong(span, value, &expected);
+            }
+            (ValueType::Named(_), _) => {
+                let expected = format!("tables that begin with [{}.NAME]", field.name);
+                self.wrong(span, value, &expected);
+            }
+            (takes, _) => self.wrong(span, value, &takes.to_string()),
+        }
+    }
+}
+
+/// Returns `true` if a value that is not a table has the type `takes`. A whole number must also be
+/// within its range, because the unsigned integers in a scene's fields cannot store other numbers.
+/// Other ranges are checked in [`Scene::faults`](crate::Scene::faults).
+fn fits(takes: ValueType, value: &DeValue) -> bool {
+    let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
+        DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
+        _ => false,
+    };
+    match takes {
+        ValueType::Text => value.is_str(),
+        ValueType::Switch => value.is_bool(),
+        ValueType::Choice(choices) => {
+            value.as_str().is_some_and(|word| choices.iter().any(|c| c.name == word))
+        }
+        ValueType::Whole(range) => is_whole(value, range),
+        ValueType::Wholes(n, range) => list(n, &|v| is_whole(v, range)),
+        ValueType::Number(_) => is_number(value),
+        ValueType::Numbers(n, _) => list(n, &is_number),
+        ValueType::Direction => list(3, &is_number),
+        ValueType::Factor => is_number(value) || list(3, &is_number),
+        ValueType::Color(_) => match value {
+            DeValue::String(text) => Color::from_hex(text).is_some(),
+            _ => list(3, &is_number),
+        },
+        ValueType::Table(_)
+        | ValueType::OneOf(_)
+        | ValueType::ListOf(_)
+        | ValueType::Tables(_)
+        | ValueType::Named(_) => false,
+    }
+}
+
+fn integer(digits: &DeInteger) -> Option<i64> {
+    i64::from_str_radix(digits.as_str(), digits.radix()).ok()
+}
+
+fn is_whole(value: &DeValue, range: NumberRange) -> bool {
+    value.as_integer().and_then(integer).is_some_and(|i| range.holds(i as f64))
+}
+
+fn is_number(value: &DeValue) -> bool {
+    value.is_float() || value.as_integer().and_then(integer).is_some()
+}
+
+/// Describes a TOML value in words: `the string "abc"`, `the number -2`, `a list of 2`.
+fn describe(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("the string \"{}\"", truncated(text)),
+        DeValue::Integer(digits) => match integer(digits) {
+            Some(number) => format!("the number {number}"),
+            None => format!("a whole number too large for 64 bits, {}", truncated(digits.as_str())),
+        },
+        DeValue::Float(digits) => format!("the number {}", truncated(digits.as_str())),
+        DeValue::Boolean(yes) => format!("{yes}"),
+        DeValue::Datetime(_) => "a date or time".to_string(),
+        DeValue::Array(list) => describe_list(list),
+        DeValue::Table(_) => "a table".to_string(),
+    }
+}
+
+fn describe_list(list: &[Spanned<DeValue>]) -> String {
+    if list.is_empty() {
+        return "an empty list".to_string();
+    }
+    let items: Vec<_> = list
+        .iter()
+        .take(4)
+        .map(|entry| match entry.get_ref() {
+            DeValue::String(text) => format!("\"{}\"", truncated(text)),
+            DeValue::Integer(digits) => truncated(digits.as_str()),
+            DeValue::Float(digits) => truncated(digits.as_str()),
+            DeValue::Boolean(yes) => yes.to_string(),
+            DeValue::Datetime(_) => "a date".to_string(),
+            DeValue::Array(_) => "a list".to_string(),
+            DeValue::Table(_) => "a table".to_string(),
+        })
+        .collect();
+    let ellipsis = if list.len() > items.len() { ", …" } else { "" };
+    format!("[{}{ellipsis}]", items.join(", "))
+}

@@ -1,0 +1,134 @@
+//! Source map of a scene file: lines and columns of keys and values.
+
+use crate::diagnostic::{Diagnostic, FirstDiagnostics};
+use crate::format::migrate::migrate;
+use crate::format::parts::Part;
+use crate::validate::{Problem, subject};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+
+/// Returns line and column of the byte offset `at` in `text`. Both are counted from 1; columns
+/// count characters.
+pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
+    LineCounter::new(text).line_column(at)
+}
+
+/// Converter of ascending byte offsets of a text to lines and columns, in one pass over the text.
+pub(crate) struct LineCounter<'a> {
+    text: &'a str,
+    /// Byte offset up to which line endings have been counted in `lines`.
+    counted: usize,
+    lines: usize,
+}
+
+impl<'a> LineCounter<'a> {
+    pub fn new(text: &'a str) -> Self {
+        Self { text, counted: 0, lines: 0 }
+    }
+
+    /// Returns line and column of the byte offset `at`. Both are counted from 1; columns count
+    /// characters. `at` must not be less than in the previous call.
+    pub fn line_column(&mut self, at: usize) -> (usize, usize) {
+        let mut at = at.min(self.text.len());
+        while !self.text.is_char_boundary(at) {
+            at -= 1;
+        }
+        let new = &self.text.as_bytes()[self.counted.min(at)..at];
+        self.lines += new.iter().filter(|byte| **byte == b'\n').count();
+        self.counted = at;
+        let before = &self.text[..at];
+        let line = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let visible = before[line..].trim_start_matches('\u{feff}');
+        (self.lines + 1, visible.chars().count() + 1)
+    }
+}
+
+/// Returns the byte range of the value at `path` in a scene file. If the file does not have this
+/// value, returns the range of its nearest ancestor.
+fn span(root: &DeTable, path: &[String]) -> Range<usize> {
+    let mut keys = path.iter();
+    let Some(mut value) = keys.next().and_then(|key| root.get(key.as_str())) else { return 0..0 };
+    for key in keys {
+        let inner = match value.get_ref() {
+            DeValue::Table(table) => table.get(key.as_str()),
+            DeValue::Array(list) => key.parse().ok().and_then(|i: usize| list.get(i)),
+            _ => None,
+        };
+        let Some(inner) = inner else { break };
+        value = inner;
+    }
+    value.span()
+}
+
+/// Adds diagnostics for `problems` of the scene to `found`. `text` is the text of the scene file,
+/// which consists of `parts`. The parts that contain the problems are parsed again.
+pub(crate) fn locate(
+    text: &str,
+    parts: &[Part],
+    problems: Vec<Problem>,
+    found: &mut FirstDiagnostics,
+) {
+    let part_of = |problem: &Problem| match problem.path.as_slice() {
+        [list, index, ..] if list == "object" && parts.len() > 1 => {
+            let index: usize = index.parse().unwrap_or(0);
+            parts[1..].partition_point(|part| part.first_object <= index)
+        }
+        _ => 0,
+    };
+    let mut by_part: BTreeMap<usize, Vec<Problem>> = BTreeMap::new();
+    for problem in problems {
+        by_part.entry(part_of(&problem)).or_default().push(problem);
+    }
+    for (number, problems) in by_part {
+        let part = &parts[number];
+        let part_text = part.text(text);
+        let (mut root, _) = DeTable::parse_recoverable(&part_text);
+        migrate(text, root.get_mut(), part, &mut FirstDiagnostics::default());
+        for Problem { mut path, subject, found: finding, help } in problems {
+            if let [list, index, ..] = path.as_mut_slice()
+                && list == "object"
+                && let Ok(number) = index.parse::<usize>()
+            {
+                *index = number.saturating_sub(part.first_object).to_string();
+            }
+            let at = part.in_file(span(root.get_ref(), &path).start);
+            found.add(at, || Diagnostic { subject, found: finding, help, ..Diagnostic::default() });
+        }
+    }
+}
+
+/// Returns the name that diagnostics use for the table at `path` in the file: `object "queen"`.
+/// `root` is a part of the file. `first_object` is the index of the first object of this part among
+/// all objects of the file.
+pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
+    subject(path, |list, index| {
+        let index = if list == "object" { index.checked_sub(first_object)? } else { index };
+        let entry = root.get(list)?.get_ref().as_array()?.get(index)?;
+        entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LineCounter, line_column};
+
+    #[test]
+    fn columns_count_characters_and_skip_a_byte_order_mark() {
+        let text = "\u{feff}a = 1\nöäü = 2\n";
+        assert_eq!(line_column(text, 3), (1, 1));
+        assert_eq!(line_column(text, text.find('=').unwrap()), (1, 3));
+        assert_eq!(line_column(text, text.rfind('=').unwrap()), (2, 5));
+        assert_eq!(line_column(text, 1), (1, 1), "inside a character");
+        assert_eq!(line_column(text, 10_000), (3, 1));
+    }
+
+    #[test]
+    fn line_counter_agrees_with_single_lookups() {
+        let text = "\u{feff}a = 1\nöäü = 2\n\n\n# é\nb = 3";
+        let mut lines = LineCounter::new(text);
+        for at in 0..text.len() + 3 {
+            assert_eq!(lines.line_column(at), line_column(text, at), "{at}");
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Undo and redo of whole scenes, and coalescing of successive edits into one undo step.
+
+use crate::camera::Camera;
+use crate::light::Light;
+use crate::material::Material;
+use crate::{Object, Scene, TransformOp};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Largest estimated memory of all scenes to which undo can return [bytes].
+const MAX_BYTES: usize = 64 << 20;
+/// Largest number of edits that can be undone.
+const MAX_STEPS: usize = 10_000;
+
+/// Undo history of an editor. Each step has a label. Edits with the same label during a gesture (a
+/// drag or mode), or by the repeats of a held key, are coalesced into one step.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    /// Scenes to which undo returns, the oldest first: one for each step, as it was before the
+    /// step.
+    past: VecDeque<HistoryEntry>,
+    now: Arc<Scene>,
+    /// Scenes to which redo returns: one for each undone step, as it was after the step. The step
+    /// to redo next is the last entry.
+    future: Vec<HistoryEntry>,
+    /// `true` if the next edit may be merged with the previous step: during a gesture (a drag or
+    /// mode) or the repeats of a held key.
+    open: bool,
+    saved: Arc<Scene>,
+}
+
+#[derive(Clone, Debug)]
+struct HistoryEntry {
+    scene: Arc<Scene>,
+    label: String,
+    bytes: usize,
+}
+
+impl HistoryEntry {
+    fn new(scene: Arc<Scene>, label: String) -> Self {
+        let bytes = bytes(&scene);
+        Self { scene, label, bytes }
+    }
+}
+
+impl History {
+    /// Creates an undo history without steps. `scene` is the current and the saved scene.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let saved = Arc::clone(&scene);
+        Self { past: VecDeque::new(), now: scene, future: Vec::new(), open: false, saved }
+    }
+
+    /// Returns the current scene: the result of all edits that have not been undone.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.now
+    }
+
+    /// Makes `scene` the current scene, by a step with the label `label`. `held` is `true` if the
+    /// step belongs to a gesture (a drag or mode) or to the repeats of a held key. It is then
+    /// coalesced with the previous step, if that has the same label and belongs to the same gesture
+    /// or held key. Returns `false`, and records nothing, if the scene has not changed.
+    pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
+        if *scene == *self.now {
+            return false;
+        }
+        self.future.clear();
+        let grows = held && self.open && self.past.back().is_some_and(|last| last.label == label);
+        let before = std::mem::replace(&mut self.now, scene);
+        self.open = held;
+        if grows {
+            // A gesture that returns to the scene from which it started leaves no step.
+            if self.past.back().is_some_and(|last| *last.scene == *self.now) {
+                self.now = self.past.pop_back().map_or(before, |last| last.scene);
+                self.open = false;
+            }
+        } else {
+            self.past.push_back(HistoryEntry::new(before, label.to_string()));
+            self.forget();
+        }
+        true
+    }
+
+    /// Ends a gesture (a drag or mode) or the repeats of a held key: the next step is not merged
+    /// with the previous one.
+    pub fn end_gesture(&mut self) {
+        self.open = false;
+    }
+
+    /// Undoes the last step of the history and returns its label; `None` if no step can be undone.
+    pub fn undo(&mut self) -> Option<String> {
+        self.open = false;
+        let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
+        let after = std::mem::replace(&mut self.now, scene);
+        self.future.push(HistoryEntry::new(after, label.clone()));
+        Some(label)
+    }
+
+    /// Redoes the step undone last and returns its label; `None` if no step can be redone.
+    pub fn redo(&mut self) -> Option<String> {
+        self.open = false;
+        let HistoryEntry { scene, label, .. } = self.future.pop()?;
+        let before = std::mem::replace(&mut self.now, scene);
+        self.past.push_back(HistoryEntry::new(before, label.clone()));
+        Some(label)
+    }
+
+    /// Records that `scene`, the current or an earlier one, has been written to the file.
+    pub fn mark_saved(&mut self, scene: Arc<Scene>) {
+        self.saved = scene;
+        self.open = false;
+    }
+
+    /// Returns `true` if the current scene equals the saved one, even if edits were made and
+    /// reverted since saving.
+    pub fn is_saved(&self) -> bool {
+        Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
+    }
+
+    /// Drops all steps of the undo history and makes `scene` the current and the saved scene.
+    pub fn restart(&mut self, scene: Arc<Scene>) {
+        *self = Self::new(scene);
+    }
+
+    /// Drops the oldest steps until the undo history is within its limits of memory and of steps.
+    /// The latest step is always kept.
+    fn forget(&mut self) {
+        let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
+        while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {
+            total -= self.past.pop_front().map_or(0, |entry| entry.bytes);
+        }
+    }
+}
+
+/// Returns the estimated memory of a scene in bytes.
+fn bytes(scene: &Scene) -> usize {
+    let objects: usize = scene
+        .objects
+        .iter()
+        .map(|o| o.name.len() + o.material.len() + o.transform.len() * size_of::<TransformOp>())
+        .sum();
+    size_of::<Scene>()
+        + objects
+        + scene.objects.len() * size_of::<Object>()
+        + scene.lights.len() * (size_of::<Light>() + 16)
+        + scene.materials.len() * (size_of::<Material>() + 32)
+        + scene.cameras.len() * (size_of::<Camera>() + 32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(depth: u32) -> Arc<Scene> {
+        let mut scene = Scene::default();
+        scene.trace.max_depth = depth;
+        Arc::new(scene)
+    }
+
+    fn depth(history: &History) -> u32 {
+        history.scene().trace.max_depth
+    }
+
+    #[test]
+    fn undo_and_redo_restore_scenes() {
+        let mut history = History::new(scene(0));
+        assert!(history.is_saved() && history.undo().is_none() && history.redo().is_none());
+        assert!(history.record(scene(1), "one", false));
+        assert!(history.record(scene(2), "two", false));
+        assert!(!history.record(scene(2), "nothing", false));
+        assert!(history.redo().is_none());
+        assert_eq!(history.undo().as_deref(), Some("two"));
+        assert_eq!(depth(&history), 1);
+        assert_eq!(history.redo().as_deref(), Some("two"));
+        assert_eq!(depth(&history), 2);
+        history.undo();
+        history.undo();
+        assert!(depth(&history) == 0 && history.is_saved());
+        history.record(scene(3), "three", false);
+        assert!(history.redo().is_none(), "another way was taken");
+    }
+
+    #[test]
+    fn steps_of_a_gesture_are_coalesced() {
+        let mut history = History::new(scene(0));
+        for i in 1..50 {
+            history.record(scene(i), "drag", true);
+        }
+        history.record(scene(60), "other", true);
+        history.record(scene(61), "other", true);
+        history.end_gesture();
+        history.record(scene(62), "other", true);
+        let back: Vec<_> = std::iter::from_fn(|| {
+            history.undo()?;
+            Some(depth(&history))
+        })
+        .collect();
+        assert_eq!(back, [61, 49, 0]);
+        history.record(scene(7), "drag", true);
+        history.record(scene(0), "drag", true);
+        assert!(history.undo().is_none(), "back where it began");
+        assert_eq!(depth(&history), 0);
+    }
+
+    #[test]
+    fn is_saved_compares_scenes_not_steps() {
+        let mut history = History::new(scene(0));
+        history.record(scene(1), "one", true);
+        history.mark_saved(Arc::clone(history.scene()));
+        history.record(scene(2), "one", true);
+        assert!(!history.is_saved());
+        history.record(scene(1), "back", false);
+        assert!(history.is_saved());
+        assert_eq!(history.undo().as_deref(), Some("back"), "a saved step has ended");
+        history.restart(scene(9));
+        assert!(history.is_saved() && history.undo().is_none());
+    }
+
+    #[test]
+    fn history_memory_is_bounded() {
+        let mut large = (*scene(0)).clone();
+        let text = "object = [{ shape.sphere = { center = [0, 0, 0], radius = 1 } }]";
+        let ball = Scene::parse(text, "").unwrap().objects.remove(0);
+        large.objects = vec![ball; 20_000];
+        let mut history = History::new(Arc::new(large.clone()));
+        for depth in 1..100 {
+            large.trace.max_depth = depth;
+            history.record(Arc::new(large.clone()), "deeper", false);
+        }
+        let held: usize = history.past.iter().map(|entry| entry.bytes).sum();
+        assert!(held <= MAX_BYTES && history.past.len() > 3, "{held}");
+        assert!(history.past.len() < 99);
+    }
+}

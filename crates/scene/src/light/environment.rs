@@ -1,0 +1,238 @@
+//! Environment light: radiance from all directions, from an equirectangular image or a gradient.
+//!
+//! ```toml
+//! environment = { file = "sky.hdr", rotation = 90.0 }
+//! environment = { zenith = [0.2, 0.4, 0.9], horizon = [0.9, 0.9, 0.8], nadir = [0.2, 0.2, 0.2] }
+//! ```
+
+use crate::asset::{AssetError, Loaded, RadianceMap};
+use crate::light::Light;
+use crate::value::{Color, ValidationError, description};
+use std::f64::consts::PI;
+use std::sync::Arc;
+use zerkalo_kernel::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
+
+/// Number of rows of the image that represents a gradient environment.
+const GRADIENT_ROWS: u32 = 512;
+
+description! {
+    /// Light from all directions, infinitely far away: an image around the scene, or a gradient.
+    pub struct Environment: Default {
+        /// Name of an equirectangular image (Radiance HDR, OpenEXR, PNG, JPEG), relative to the
+        /// folder of the scene file. The middle of the image is towards -z. An empty name selects
+        /// the gradient.
+        file: String = "";
+        /// Radiance of the gradient straight above.
+        zenith: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Radiance of the gradient at the horizon. Above and below, the radiance changes linearly
+        /// with the sine of the elevation.
+        horizon: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Radiance of the gradient straight below.
+        nadir: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Rotation of the image about the vertical, counter-clockwise seen from above.
+        rotation: f64 = 0.0, in closed(-360.0, 360.0) "degrees";
+        skip map: Loaded<RadianceMap>;
+    }
+}
+
+impl Environment {
+    /// Returns the name of the image file; `None` for a gradient.
+    pub fn file(&self) -> Option<&str> {
+        (!self.file.is_empty()).then_some(self.file.as_str())
+    }
+
+    /// Returns the image of the environment; `None` for a gradient, or if no readable file has been
+    /// loaded.
+    pub fn map(&self) -> Option<&Arc<RadianceMap>> {
+        self.file().and(self.map.content())
+    }
+
+    /// Calls `load` with the name of the image and stores the result. Does nothing for a gradient,
+    /// or if an image or an error is stored already.
+    pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
+        if !self.file.is_empty() {
+            self.map.resolve(|| load(&self.file));
+        }
+    }
+
+    /// Copies the image from `other` if both name the same file.
+    pub fn resolve_as(&mut self, other: &Self) {
+        if self.file == other.file {
+            self.map = other.map.clone();
+        }
+    }
+
+    /// Returns the error of reading the environment image; `None` if there was none.
+    pub(super) fn fault(&self) -> Option<ValidationError> {
+        self.file().and_then(|_| self.map.fault())
+    }
+
+    /// Returns an image of the gradient, with a single column, because the radiance depends on the
+    /// elevation alone.
+    fn gradient(&self) -> RadianceMap {
+        let row = |row: u32| {
+            let height = (PI * (f64::from(row) + 0.5) / f64::from(GRADIENT_ROWS)).cos();
+            let end = if height > 0.0 { self.zenith.0 } else { self.nadir.0 };
+            let horizon = self.horizon.0;
+            std::array::from_fn(|c| (horizon[c] + height.abs() * (end[c] - horizon[c])) as f32)
+        };
+        RadianceMap::new([1, GRADIENT_ROWS], (0..GRADIENT_ROWS).map(row).collect())
+    }
+}
+
+/// Environment light compiled for the kernels, white and with intensity 1.
+pub struct EnvironmentLight {
+    map: Arc<RadianceMap>,
+    /// Sine and cosine of the environment's rotation about the vertical.
+    rotation: (f64, f64),
+}
+
+/// Light that arrives from sampled directions of an environment, one direction per lane.
+#[derive(Clone, Copy, Debug)]
+pub struct EnvironmentSample<L> {
+    /// Unit vector towards the environment, from which the light arrives.
+    pub wi: Vec3<L>,
+    /// Probability density \[1/sr\] with which the direction `wi` is sampled.
+    pub density: L,
+    /// Estimate of the irradiance from one sample: the radiance of the environment divided by
+    /// `density`.
+    pub irradiance: Vec3<L>,
+}
+
+impl EnvironmentLight {
+    /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
+    /// its image is not loaded.
+    pub fn new(light: &Light) -> Option<Self> {
+        let environment = light.environment.as_ref()?;
+        let map = match environment.file() {
+            Some(_) => environment.map()?.clone(),
+            None => Arc::new(environment.gradient()),
+        };
+        Some(Self { map, rotation: environment.rotation.to_radians().sin_cos() })
+    }
+
+    /// Returns the image of the environment. For a gradient, this is the image of one column that
+    /// represents it.
+    pub fn map(&self) -> &RadianceMap {
+        &self.map
+    }
+
+    /// Rotates `direction` of lane `lane` from scene coordinates into the coordinates of the
+    /// environment image.
+    fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
+        let (sin, cos) = self.rotation;
+        let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
+        [x * cos - z * sin, y, x * sin + z * cos]
+    }
+
+    /// Returns two values for the unit vectors `direction`: the radiance that arrives from them,
+    /// and the density \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero
+    /// outside of `lanes`.
+    #[inline(never)]
+    pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
+        let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
+        for_each(lanes, |lane| {
+            let direction = self.in_image(direction, lane);
+            radiance[lane] = self.map.radiance(direction);
+            density[lane] = self.map.density(direction);
+        });
+        (
+            Vec3::from_fn(|lane| radiance[lane].map(L::Scalar::from_f64)),
+            L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
+        )
+    }
+
+    /// Samples a direction for each of `lanes`, with a density in proportion to the environment's
+    /// luminance. In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
+    #[inline(never)]
+    pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> EnvironmentSample<L> {
+        let (sin, cos) = self.rotation;
+        let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
+        let mut density = [1.0; MAX_WIDTH];
+        for_each(lanes, |lane| {
+            let (direction, p) = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
+            let [x, y, z] = direction;
+            wi[lane] = [x * cos + z * sin, y, z * cos - x * sin];
+            irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
+            density[lane] = p;
+        });
+        EnvironmentSample {
+            wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
+            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
+            irradiance: Vec3::from_fn(|lane| irradiance[lane].map(L::Scalar::from_f64)),
+        }
+    }
+}
+
+/// Calls `action` with the number of each lane that is true in the mask `lanes`.
+#[inline(always)]
+fn for_each(lanes: impl Mask, mut action: impl FnMut(usize)) {
+    let mut remaining = lanes.bits();
+    while remaining != 0 {
+        action(remaining.trailing_zeros() as usize);
+        remaining &= remaining - 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zerkalo_kernel::lanes::Double;
+
+    fn light(environment: Environment) -> EnvironmentLight {
+        let light = Light { environment: Some(environment), ..Light::default() };
+        EnvironmentLight::new(&light).expect("an environment")
+    }
+
+    fn radiance(light: &EnvironmentLight, direction: [f64; 3]) -> [f64; 3] {
+        light.radiance(Vec3::<Double>::of(direction), Double::mask(true)).0.lane(0)
+    }
+
+    #[test]
+    fn gradient_changes_with_the_sine_of_the_height() {
+        let light = light(Environment {
+            zenith: Color([1.0, 2.0, 0.0]),
+            horizon: Color([3.0, 2.0, 0.0]),
+            nadir: Color([5.0, 0.0, 0.5]),
+            ..Environment::default()
+        });
+        for (height, expected) in [
+            (1.0, [1.0, 2.0, 0.0]),
+            (0.6, [1.8, 2.0, 0.0]),
+            (0.0, [3.0, 2.0, 0.0]),
+            (-0.6, [4.2, 0.8, 0.3]),
+            (-1.0, [5.0, 0.0, 0.5]),
+        ] {
+            let across = f64::sqrt(1.0 - height * height);
+            let found = radiance(&light, [0.6 * across, height, -0.8 * across]);
+            for c in 0..3 {
+                // The image is least exact at the horizon, where the slope of the gradient changes.
+                // The tolerance is the largest change over two rows of the image: two rows of pi /
+                // `GRADIENT_ROWS` radians, times the largest slope 2.
+                let difference = (found[c] - expected[c]).abs();
+                assert!(difference < 4.0 * PI / f64::from(GRADIENT_ROWS), "{height}: {found:?}");
+            }
+        }
+    }
+
+    /// Checks that a rotation of the environment by 90 degrees moves the middle of its image from
+    /// -z to -x.
+    #[test]
+    fn rotation_is_counter_clockwise_from_above() {
+        let pixels = (0..8).map(|i| [f32::from(u8::from(i % 4 == 1 || i % 4 == 2)); 3]).collect();
+        let map = Arc::new(RadianceMap::new([4, 2], pixels));
+        let mut environment =
+            Environment { file: "a".to_string(), rotation: 90.0, ..Environment::default() };
+        environment.resolve(|_| Ok(map));
+        let light = light(environment);
+        assert!((radiance(&light, [-1.0, 0.0, 0.0])[0] - 1.0).abs() < 1e-12);
+        assert!(radiance(&light, [1.0, 0.0, 0.0])[0].abs() < 1e-12);
+        let numbers = (Double::from_f64(0.5), Double::from_f64(0.5));
+        let sample = light.sample(numbers, Double::mask(true));
+        let (radiance, density) = light.radiance(sample.wi, Double::mask(true));
+        let first = |x: Double| SimdFloat::lane(x, 0);
+        assert!((first(density) / first(sample.density) - 1.0).abs() < 1e-9);
+        let expected = first(radiance.x) / first(density);
+        assert!((first(sample.irradiance.x) / expected - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,129 @@
+//! Lints: legal values of a scene that are probably mistakes.
+
+use crate::Scene;
+use crate::light::Light;
+use crate::material::{Fresnel, Highlight, Material};
+use crate::validate::Problem;
+use crate::value::{Color, number};
+
+/// Doubtful value: its path in the scene, and a phrase that states the problem, such as
+/// `alpha has no effect here`.
+type Case = (Vec<String>, String);
+
+/// Lint of materials: returns the key of a doubtful value and a phrase that states the problem.
+/// Returns `None` if the material has no such value.
+type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
+
+/// Lints of materials, each with the help text of its warning.
+const MATERIAL_LINTS: [(MaterialLint, &str); 4] = [
+    (brighter_than_its_light, "Allowed: the picture is clipped only for display."),
+    (
+        |m| {
+            let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
+            Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
+        },
+        "Surfaces have an alpha from 0 to about 1.",
+    ),
+    (
+        |m| without_effect("alpha", m.alpha.is_some() && !m.has_microfacets()),
+        "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
+    ),
+    (
+        |m| {
+            let is_opaque = m.transmission == 0.0;
+            without_effect("attenuation_color", is_opaque && m.attenuation_color != Color::WHITE)
+        },
+        "It colours light inside of solids: give the material a transmission.",
+    ),
+];
+
+fn without_effect(key: &'static str, is_found: bool) -> Option<(&'static str, String)> {
+    is_found.then(|| (key, format!("{key} has no effect here")))
+}
+
+impl Scene {
+    /// Returns one warning for each kind of doubtful value in the scene. The warning states the
+    /// first such value and the number of others.
+    /// [`Document::warnings`](crate::Document::warnings) adds file, line and column.
+    pub fn warnings(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        let mut add = |help: &str, cases: &mut dyn Iterator<Item = Case>| {
+            let Some((path, found)) = cases.next() else { return };
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            let more = match cases.count() {
+                0 => String::new(),
+                1 => " (and one more like it)".to_string(),
+                n => format!(" (and {n} more like it)"),
+            };
+            problems.push(self.problem(&path, found + &more, help.to_string()));
+        };
+        for (lint, help) in MATERIAL_LINTS {
+            let case = |(name, material): (&String, &Material)| {
+                let (key, found) = lint(material)?;
+                Some((vec!["materials".to_string(), name.clone(), key.to_string()], found))
+            };
+            add(help, &mut self.materials.iter().filter_map(case));
+        }
+        let dark = |(i, light): (usize, &Light)| {
+            let (key, what) = match light {
+                light if light.intensity == 0.0 => ("intensity", "intensity is 0"),
+                light if light.color == Color::BLACK => ("color", "color is black"),
+                _ => return None,
+            };
+            let path = vec!["light".to_string(), i.to_string(), key.to_string()];
+            light.on.then(|| (path, format!("{what}, so that it gives no light")))
+        };
+        let dark = &mut self.lights.iter().enumerate().filter_map(dark);
+        add("Leave the light out, or write on = false.", dark);
+        let whole = |found: &str| (Vec::new(), found.to_string());
+        add(
+            "The picture will show nothing but the background. An object begins with [[object]].",
+            &mut self.objects.is_empty().then(|| whole("there is no object")).into_iter(),
+        );
+        let no_light = "there is no light, no ambient and no background";
+        add(
+            "The picture will be black. A light begins with [[light]].",
+            &mut self.is_dark().then(|| whole(no_light)).into_iter(),
+        );
+        problems
+    }
+
+    fn is_dark(&self) -> bool {
+        !self.objects.is_empty()
+            && self.lights.is_empty()
+            && self.ambient.color == Color::BLACK
+            && self.background.color == Color::BLACK
+            && !self.materials.values().any(Material::emits)
+    }
+}
+
+/// Returns a warning if a material may reflect more light than it receives: if the weights of its
+/// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
+/// returns `None`. The warning is `(key, phrase)`: the key that it refers to, and a statement of
+/// the sum. A Cook-Torrance highlight is the mirror reflection of lights; the key `reflection` is
+/// the weight of the mirror reflection of surfaces. Both stand for one physical reflection; only
+/// the larger of the two weights is therefore added.
+fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
+    let mirrored = match m.highlight {
+        Highlight::Phong => m.specular + m.reflection,
+        Highlight::CookTorrance => m.specular.max(m.reflection),
+    };
+    let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
+    let passed = match m.fresnel_mode() {
+        // A dielectric reflects the share F of the light and transmits 1 - F. The larger of the two
+        // weights is therefore an upper bound.
+        Fresnel::Dielectric => mirrored.max(m.transmission),
+        _ => mirrored * f0 + m.transmission,
+    };
+    let sum = m.diffuse * m.color.largest() + passed;
+    (sum > 1.0 + 1e-9).then(|| {
+        let key = if m.reflection > 0.0 { "reflection" } else { "diffuse" };
+        let through =
+            if m.transmission > 0.0 { ", reflection and transmission" } else { " and reflection" };
+        let found = format!(
+            "diffuse x color, specular{through} add up to {}, more than the light that comes in",
+            number((sum * 1000.0).round() / 1000.0)
+        );
+        (key, found)
+    })
+}

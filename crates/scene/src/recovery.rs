@@ -1,0 +1,374 @@
+//! Recovery files: unsaved edits on disk, similar to the swap files of vim.
+//!
+//! The text that saving would write is kept in a hidden file beside the scene. This recovery file
+//! is replaced atomically, and removed when the scene is saved or closed deliberately. The process
+//! that writes the file holds a lock on it; the lock ends with the process. An unlocked recovery
+//! file is an orphan of a process that was killed. The lock is taken before the file gets its name,
+//! so that other processes never see the file of a running process unlocked.
+
+use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
+use crate::format::read::MAX_BYTES;
+use crate::value::{fnv1a64, sort_by_number};
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+use tempfile::NamedTempFile;
+
+/// Largest number of recovery files of one scene in one folder, from crashed or concurrent
+/// processes.
+const MAX_FILES: u32 = 9;
+/// Beginning of the first line of a recovery file. The fingerprint (hash) of the scene file
+/// follows.
+const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
+/// Word in the first line of a recovery file in place of the fingerprint, if the scene has no file.
+const NO_FILE: &str = "none";
+/// Age (time since the last modification) from which an unlocked temporary file is taken to be that
+/// of a killed process. Such a file is removed.
+const STALE_AFTER: Duration = Duration::from_secs(60);
+
+/// Writer and finder of the recovery files of one scene.
+#[derive(Debug)]
+pub struct Recovery {
+    /// Folder of the scene file, and name of the recovery file in this folder. `None` for a scene
+    /// without a file.
+    beside: Option<(PathBuf, OsString)>,
+    /// Program's folder in the user's state folder, and name of the recovery file in it. It is used
+    /// if the recovery file cannot be written `beside` the scene file. `None` if the user has no
+    /// state folder.
+    state: Option<(PathBuf, OsString)>,
+    saved: Option<Saved>,
+}
+
+/// Recovery file that this process has written or opened, and the handle that holds its lock.
+#[derive(Debug)]
+struct Saved {
+    path: PathBuf,
+    file: File,
+}
+
+/// Result of the search for recovery files of a scene.
+#[derive(Debug, Default)]
+pub struct RecoveryFile {
+    /// Unsaved edits of processes that were killed, in recovery files; the newest first.
+    pub orphans: Vec<Orphan>,
+    /// Recovery files that cannot be read, each as `(path, reason)`. These files stay on disk.
+    pub unreadable: Vec<(PathBuf, String)>,
+    /// Recovery files of other users, each as `(path, name or number of the user)`. They are not
+    /// read.
+    pub foreign: Vec<(PathBuf, String)>,
+    /// `true` if another running process has unsaved edits of the scene.
+    pub elsewhere: bool,
+}
+
+/// Unsaved edits of a process that was killed. The recovery file stays locked while this value
+/// exists, so that other processes do not offer it.
+#[derive(Debug)]
+pub struct Orphan {
+    kept: Saved,
+    /// Text that saving would have written to the scene file.
+    pub text: String,
+    /// Fingerprint of the scene file that was edited (see
+    /// [`crate::SceneFile::fingerprint`]); `None` if there was no file or the fingerprint
+    /// cannot be read.
+    pub base: Option<u64>,
+    /// Time at which the recovery file was written.
+    pub written: SystemTime,
+}
+
+/// Returns the program's folder for recovery files in the user's state folder (XDG Base Directory
+/// Specification). It is used for scenes without a file, or in a folder that is not writable.
+/// `variable` returns the value of an environment variable. Returns `None` if the environment does
+/// not define the folder.
+pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
+    let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let folder = absolute("XDG_STATE_HOME");
+    let folder = folder.or_else(|| absolute("HOME").map(|home| home.join(".local/state")));
+    folder.map(|folder| folder.join("zerkalo"))
+}
+
+impl Recovery {
+    /// Creates the writer and finder of the recovery files for a scene. The scene is in the file at
+    /// `path`, or has no file and the name `name`. `state` is the folder from [`state_folder`].
+    pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
+        let mut beside = None;
+        let stem = match path {
+            Some(path) => {
+                // The path is made canonical, so that every path to the same file gives the same
+                // name.
+                let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
+                let canonical = canonical.unwrap_or_else(|_| path.to_path_buf());
+                let name = canonical.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
+                let mut hidden = OsString::from(".");
+                hidden.push(&name);
+                hidden.push(".unsaved");
+                let folder = canonical.parent().filter(|folder| !folder.as_os_str().is_empty());
+                beside = Some((folder.unwrap_or(Path::new(".")).to_path_buf(), hidden));
+                let hash = fnv1a64(canonical.as_os_str().as_encoded_bytes());
+                format!("{:.40}-{hash:016x}", name.to_string_lossy())
+            }
+            None => format!("{:.40}", name.replace('/', "-")),
+        };
+        let state = state.map(|folder| (folder.to_path_buf(), format!("{stem}.unsaved").into()));
+        Self { beside, state, saved: None }
+    }
+
+    /// Returns the places where the recovery file may be written, each as `(folder, file name)`,
+    /// the preferred one first: beside the scene file, then in the state folder.
+    fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
+        self.beside.iter().chain(&self.state)
+    }
+
+    /// Returns a writer and finder of recovery files for the same scene that uses only the state
+    /// folder.
+    pub fn elsewhere(&self) -> Self {
+        Self { beside: None, state: self.state.clone(), saved: None }
+    }
+
+    /// Returns the path of the recovery file; `None` if none is written.
+    pub fn path(&self) -> Option<&Path> {
+        self.saved.as_ref().map(|saved| saved.path.as_path())
+    }
+
+    /// Writes the recovery file. `text` is the text that saving would write, and `base` is the
+    /// fingerprint of the scene file that saving would replace.
+    ///
+    /// # Errors
+    ///
+    /// Fails if none of the possible folders is writable; the previous recovery file then stays.
+    pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
+        let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
+        let text = format!("{HEAD}{base}.\n{text}");
+        if let Some(saved) = self.saved.as_mut().filter(|saved| saved.has_its_name()) {
+            let folder = saved.path.parent().unwrap_or(Path::new("."));
+            saved.file = locked_temporary(folder, &text)?.persist(&saved.path)?;
+            return Ok(());
+        }
+        self.saved = None;
+        let mut kept = Err(io::Error::new(ErrorKind::NotFound, "no folder to keep them in"));
+        for (folder, name) in self.candidates() {
+            kept = kept.or_else(|_| create_numbered(folder, name, &text));
+        }
+        self.saved = Some(kept?);
+        Ok(())
+    }
+
+    /// Removes the recovery file. Callers use this when no edits are unsaved.
+    pub fn forget(&mut self) {
+        if let Some(saved) = self.saved.take() {
+            saved.remove();
+        }
+    }
+
+    /// Finds the unsaved edits of the scene that killed processes have left. Empty files are
+    /// removed. Files of other users are not read, because they are not this user's work.
+    pub fn find(&self) -> RecoveryFile {
+        let mut found = RecoveryFile::default();
+        for (folder, name) in self.candidates() {
+            for number in 1..=MAX_FILES {
+                let path = folder.join(numbered(name, number));
+                if self.path() == Some(&*path) {
+                    continue;
+                }
+                match read_orphan(&path) {
+                    Ok(Found::Orphan(lost)) if lost.text.trim().is_empty() => lost.kept.remove(),
+                    Ok(Found::Orphan(lost)) => found.orphans.push(lost),
+                    Ok(Found::OfUser(id)) => found.foreign.push((path, user_name(id))),
+                    Ok(Found::Nothing) => {}
+                    Err(error) if error.kind() == ErrorKind::WouldBlock => found.elsewhere = true,
+                    Err(error) => found.unreadable.push((path, error.to_string())),
+                }
+            }
+        }
+        let age = |lost: &Orphan| match lost.written.duration_since(SystemTime::UNIX_EPOCH) {
+            Ok(since) => -(since.as_nanos() as i64),
+            Err(before) => before.duration().as_nanos() as i64,
+        };
+        sort_by_number(&mut found.orphans, age);
+        found
+    }
+
+    /// Takes over the recovery file of `lost`: this process writes to it from now on.
+    pub fn adopt(&mut self, lost: Orphan) {
+        self.forget();
+        self.saved = Some(lost.kept);
+    }
+}
+
+impl Orphan {
+    /// Returns the path of the recovery file.
+    pub fn path(&self) -> &Path {
+        &self.kept.path
+    }
+
+    /// Removes the recovery file of these unsaved edits.
+    pub fn discard(self) {
+        self.kept.remove();
+    }
+}
+
+impl Saved {
+    /// Returns `true` if the path still leads to the locked file, which another process may have
+    /// replaced.
+    fn has_its_name(&self) -> bool {
+        let named = fs::symlink_metadata(&self.path);
+        self.file.metadata().is_ok_and(|saved| named.is_ok_and(|named| is_same(&saved, &named)))
+    }
+
+    /// Removes the recovery file, then releases its lock.
+    fn remove(self) {
+        if self.has_its_name() {
+            // A file that cannot be removed is found, and reported, at the next start.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn is_same(a: &Metadata, b: &Metadata) -> bool {
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+/// Returns `name` for the number 1, `name-2` for 2, `name-3` for 3.
+fn numbered(name: &OsStr, number: u32) -> OsString {
+    let mut name = name.to_os_string();
+    if number > 1 {
+        name.push(format!("-{number}"));
+    }
+    name
+}
+
+/// Creates a locked temporary file in `folder` with the content `text`, readable by the user only.
+fn locked_temporary(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
+    let [prefix, suffix] = TEMPORARY;
+    let mut file = tempfile::Builder::new().prefix(prefix).suffix(suffix).tempfile_in(folder)?;
+    lock(&file);
+    file.write_all(text.as_bytes())?;
+    file.as_file().sync_data()?;
+    Ok(file)
+}
+
+/// Writes `text` to a new recovery file in `folder` and returns the file, which is locked. Its name
+/// is the first free one of `name`, `name-2`, `name-3` and so on.
+fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
+    let mut folders = DirBuilder::new();
+    folders.recursive(true);
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut folders, 0o700);
+    folders.create(folder)?;
+    let mut file = locked_temporary(folder, text)?;
+    for number in 1..=MAX_FILES {
+        let path = folder.join(numbered(name, number));
+        match file.persist_noclobber(&path) {
+            Ok(file) => return Ok(Saved { path, file }),
+            Err(taken) if taken.error.kind() == ErrorKind::AlreadyExists => file = taken.file,
+            Err(failed) => return Err(failed.error),
+        }
+    }
+    let name = name.display();
+    Err(io::Error::new(
+        ErrorKind::AlreadyExists,
+        format!("{MAX_FILES} files {name} are there already"),
+    ))
+}
+
+/// Opens the recovery file at `path` for reading and writing, because some file systems lock only
+/// files that are open for writing.
+fn open(path: &Path) -> io::Result<File> {
+    open_regular_with(File::options().read(true).write(true), path)
+}
+
+/// Result of opening a recovery file for reading: its edits, or a reason why there are none.
+enum Found {
+    /// No recovery file exists at the path.
+    Nothing,
+    /// The recovery file belongs to the user with this number.
+    OfUser(u32),
+    Orphan(Orphan),
+}
+
+/// Reads the unsaved edits in the recovery file at `path`.
+///
+/// # Errors
+/// [`ErrorKind::WouldBlock`] if a running process holds the lock; any other error if the file
+/// cannot be read.
+fn read_orphan(path: &Path) -> io::Result<Found> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    // If another process replaces the file after it was opened here, the loop opens the new file.
+    for _ in 0..5 {
+        // The type is checked before opening, so that the target of a symbolic link is never
+        // opened.
+        match fs::symlink_metadata(path) {
+            Ok(metadata) if !metadata.is_file() => {
+                return Err(io::Error::other("it is not a regular file"));
+            }
+            Ok(metadata) if !is_own(&metadata, folder) => return Ok(Found::OfUser(metadata.uid())),
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(error) => return Err(error),
+        }
+        let kept = match open(path) {
+            Ok(file) => Saved { path: path.to_path_buf(), file },
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+            Err(error) => return Err(error),
+        };
+        let metadata = kept.file.metadata()?;
+        if !is_own(&metadata, folder) {
+            return Ok(Found::OfUser(metadata.uid()));
+        }
+        match kept.file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(ErrorKind::WouldBlock.into()),
+            // File systems without locks report an error: the file counts as unlocked.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+        }
+        if kept.has_its_name() {
+            return read(kept).map(Found::Orphan);
+        }
+    }
+    Err(ErrorKind::WouldBlock.into())
+}
+
+fn read(kept: Saved) -> io::Result<Orphan> {
+    let mut bytes = Vec::new();
+    (&kept.file).take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(io::Error::other(format!("it is larger than {} MiB", MAX_BYTES >> 20)));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| io::Error::other("it is not UTF-8 text"))?;
+    let written = kept.file.metadata()?.modified()?;
+    let head = text.strip_prefix(HEAD).and_then(|rest| rest.split_once(".\n"));
+    let (base, text) = match head {
+        Some((base, text)) => (u64::from_str_radix(base, 16).ok(), text.to_string()),
+        None => (None, text),
+    };
+    Ok(Orphan { kept, text, base, written })
+}
+
+/// Returns the paths of the recovery files in `folder`.
+pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");
+    let mut kept: Vec<_> = entries.filter(is_kept).map(|entry| entry.path()).collect();
+    kept.sort_unstable();
+    kept
+}
+
+/// Removes the incomplete temporary files of killed processes in `folder`.
+pub fn remove_stale(folder: &Path) {
+    let [prefix, suffix] = TEMPORARY;
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_ours = name.starts_with(prefix) && name.ends_with(suffix);
+        let Some(metadata) = entry.metadata().ok().filter(|m| is_ours && m.is_file()) else {
+            continue;
+        };
+        let age = metadata.modified().ok().and_then(|written| written.elapsed().ok());
+        if age.is_some_and(|age| age >= STALE_AFTER)
+            && open(&entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Settings of the whole picture: film, integrator, background, ambient light.
+
+use crate::Acceleration;
+use crate::value::{Color, choices, description};
+
+description! {
+    /// Film settings: size, pixel filter, sample limit of glossy pixels.
+    pub struct FilmSettings: Default {
+        /// Width and height of the picture.
+        size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
+        /// Distribution of samples over a pixel.
+        filter: Filter = "box";
+        /// Largest number of samples of a pixel that shows glossy reflections; 0 is no cap.
+        rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
+    }
+}
+
+choices! {
+    /// Distribution of samples over a pixel.
+    pub enum Filter {
+        /// samples uniform over the pixel's square
+        Box = "box",
+        /// all samples at the pixel's centre: no anti-aliasing
+        Point = "point",
+    }
+}
+
+description! {
+    /// Integrator settings, the table `[trace]`.
+    pub struct IntegratorSettings: Default {
+        /// Kinds of rays that are traced.
+        ray_types: RayTypes = "full";
+        /// Largest number of surfaces that a path hits after the first, or after a diffuse bounce;
+        /// 0: no reflection, no transmission.
+        max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
+        /// Largest number of diffuse bounces of a path; 0: no indirect diffuse light. Ambient light
+        /// stands for further bounces.
+        max_diffuse_depth: u32 = 0, in closed(0.0, 100.0) "bounces";
+        /// Caustics: after a diffuse bounce, too, mirrors reflect and glass transmits light. `false`
+        /// leaves this light out.
+        caustics: bool = true;
+        /// Smallest throughput of a path; a path with less ends.
+        min_throughput: f64 = 0.0, in SHARE;
+        /// Treatment of sampled reflections below the surface's horizon.
+        below_horizon: BelowHorizon = "fold";
+        /// Acceleration structure. Every choice renders the same image; only speed differs.
+        acceleration: Acceleration = "auto";
+    }
+}
+
+choices! {
+    /// Kinds of rays that are traced.
+    #[derive(PartialOrd, Ord)]
+    pub enum RayTypes {
+        /// camera rays only: no shadows, no reflections
+        Primary = "primary",
+        /// camera rays and shadow rays
+        Shadows = "shadows",
+        /// camera, shadow, reflected and transmitted rays
+        Full = "full",
+    }
+}
+
+choices! {
+    /// Treatment of sampled reflections below the surface's horizon.
+    pub enum BelowHorizon {
+        /// directions below the horizon are mirrored at the surface: no light is lost
+        Fold = "fold",
+        /// directions below the horizon are dropped: their light is lost
+        Absorb = "absorb",
+    }
+}
+
+description! {
+    /// Radiance of rays that hit no surface.
+    pub struct Background: Default {
+        /// Radiance of rays that hit no surface.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
+    }
+}
+
+description! {
+    /// Ambient light: uniform, without shadows.
+    pub struct Ambient: Default {
+        /// Ambient light i_a from all directions, without shadows. Materials multiply it by k_a.
+        color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
+    }
+}

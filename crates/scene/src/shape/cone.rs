@@ -1,0 +1,38 @@
+//! Right circular cone between the centre of its flat base and its apex.
+
+use crate::shape::ShapeDesc;
+use crate::shape::axial::{axis_faults, by_axis, frustum_between};
+use crate::value::{Description, ValidationError, description};
+use glam::DVec3;
+use zerkalo_kernel::primitive::Form;
+
+description! {
+    /// A right circular cone with a flat base.
+    pub struct Cone {
+        /// Centre of the base.
+        base: [f64; 3], in COORDINATE "scene units";
+        /// Apex of the cone.
+        apex: [f64; 3], in COORDINATE "scene units";
+        /// Radius of the base.
+        radius: f64, in SIZE "scene units";
+    }
+}
+
+impl ShapeDesc for Cone {
+    fn form(&self) -> Form {
+        frustum_between(self.base, self.apex, self.radius, 0.0)
+    }
+
+    fn faults(&self) -> Vec<ValidationError> {
+        let sizes = vec![("radius", self.radius)];
+        axis_faults(self.validator(), [self.base, self.apex], "apex", sizes)
+    }
+
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+        let top = base + DVec3::Y * size.y;
+        let radius = size.x.min(size.z) / 2.0;
+        Self { base: base.to_array(), apex: top.to_array(), radius }
+    }
+
+    by_axis!(base, apex);
+}

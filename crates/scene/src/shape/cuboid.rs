@@ -1,0 +1,42 @@
+//! Box with sides parallel to the axes.
+//!
+//! A box is described by its centre and size, like the shapes `platform` and `rectangle`. A change
+//! of the key `center` alone moves the box. Two opposite corners would need two changes, and could
+//! be given in the wrong order. A `transform` rotates the box.
+
+use crate::shape::ShapeDesc;
+use crate::shape::prismoid::prismoid;
+use crate::value::{Description, ValidationError, description};
+use glam::{DVec2, DVec3};
+use zerkalo_kernel::primitive::Form;
+
+description! {
+    /// A box with sides parallel to the axes; an object's `transform` can rotate it.
+    pub struct Cuboid {
+        /// Centre of the box.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Lengths of the box along x, y and z.
+        size: [f64; 3], in SIZE "scene units";
+    }
+}
+
+impl ShapeDesc for Cuboid {
+    fn form(&self) -> Form {
+        let [x, y, z] = self.size;
+        let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;
+        let base = [(0.0, 0.0), (x, 0.0), (x, -z), (0.0, -z)].map(DVec2::from);
+        prismoid(corner, &base, y, 1.0, 0.0)
+    }
+
+    fn faults(&self) -> Vec<ValidationError> {
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
+    }
+
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+        Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() }
+    }
+
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+}

@@ -1,0 +1,45 @@
+//! Platform: a horizontal rectangle, such as the ground.
+
+use crate::shape::ShapeDesc;
+use crate::shape::texture_space::on_plane;
+use crate::value::{Description, ValidationError, description};
+use glam::{DMat3, DVec3};
+use zerkalo_kernel::primitive::{Form, ParallelogramForm};
+
+description! {
+    /// A horizontal rectangle that faces up, such as the ground.
+    pub struct HorizontalRectangle {
+        /// Centre of the rectangle.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Lengths of the rectangle along x and z.
+        size: [f64; 2], in SIZE "scene units";
+    }
+}
+
+impl ShapeDesc for HorizontalRectangle {
+    fn form(&self) -> Form {
+        let [x, z] = self.size;
+        Form::Parallelogram(ParallelogramForm {
+            corner: DVec3::from_array(self.center) - DVec3::new(x, 0.0, z) / 2.0,
+            u: DVec3::new(0.0, 0.0, z),
+            v: DVec3::new(x, 0.0, 0.0),
+        })
+    }
+
+    fn faults(&self) -> Vec<ValidationError> {
+        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
+    }
+
+    /// Creates the rectangle that is the upper side of a box; see [`ShapeDesc::fitted_to`].
+    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+        Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
+    }
+
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+        vec![&mut self.center]
+    }
+
+    fn texture_axes(&self) -> DMat3 {
+        on_plane(DVec3::Y)
+    }
+}

@@ -1,0 +1,168 @@
+//! Triangle meshes from files.
+
+use crate::asset::{AssetError, Loaded};
+use crate::shape::{Shape, ShapeDesc};
+use crate::value::{ValidationError, choices, description};
+use glam::{DAffine3, DVec3};
+use std::sync::{Arc, LazyLock};
+use zerkalo_kernel::primitive::{Form, Mesh, MeshForm, TriangleMesh};
+
+description! {
+    /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by
+    /// `transform`. The front of a triangle is the side from which its corners are in
+    /// counter-clockwise order; the back is lit if the material is two-sided.
+    pub struct MeshDesc: Default {
+        /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron.
+        file: String = "";
+        /// Normals used for shading: curved triangles or flat ones.
+        normals: Normals = "smooth";
+        skip content: Loaded<Mesh>;
+    }
+}
+
+choices! {
+    /// Kind of the shading normals of a mesh.
+    pub enum Normals {
+        /// normals of the vertices, interpolated: those of the file, else the means of the adjacent
+        /// triangles
+        Smooth = "smooth",
+        /// normal of each triangle, without interpolation
+        Flat = "flat",
+    }
+}
+
+/// Placeholder mesh: an icosahedron of height 1 that stands on the origin.
+static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
+    let golden = 0.5 * (1.0 + 5.0f64.sqrt());
+    let mut corners = Vec::new();
+    for axis in 0..3 {
+        for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+            let mut corner = [0.0; 3];
+            (corner[axis], corner[(axis + 1) % 3]) = (a, b);
+            corners.push(DVec3::from(corner));
+        }
+    }
+    // The edges of the icosahedron have the squared length 4; all other pairs of corners have a
+    // squared distance above 10. Every three corners that are pairwise neighbours form a triangle.
+    let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
+    let mut triangles = Vec::new();
+    for a in 0..12 {
+        for b in (a + 1..12).filter(|b| near(a, *b)) {
+            for c in (b + 1..12).filter(|c| near(a, *c) && near(b, *c)) {
+                let [p, q, r] = [a, b, c].map(|i| corners[i]);
+                let outward = (q - p).cross(r - p).dot(p) > 0.0;
+                triangles.push(if outward { [a, b, c] } else { [a, c, b] }.map(|i| i as u32));
+            }
+        }
+    }
+    let (half, scale) = (0.5, 0.5 / golden);
+    let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+    let place = |corner: &DVec3| {
+        let position = (*corner * scale + DVec3::Y * half).to_array().map(|x| x as f32);
+        for (axis, x) in position.into_iter().enumerate() {
+            bounds[0][axis] = bounds[0][axis].min(x);
+            bounds[1][axis] = bounds[1][axis].max(x);
+        }
+        position
+    };
+    Arc::new(Mesh::new(TriangleMesh {
+        positions: corners.iter().map(place).collect(),
+        center: [0.0; 3],
+        triangles,
+        normals: None,
+        uvs: None,
+        colors: Vec::new(),
+        color_of: Vec::new(),
+        bounds,
+        notes: Vec::new(),
+    }))
+});
+
+impl MeshDesc {
+    /// Returns the mesh of the file, or the placeholder if no mesh was read.
+    fn mesh(&self) -> &Arc<Mesh> {
+        self.content.content().unwrap_or(&PLACEHOLDER)
+    }
+}
+
+impl ShapeDesc for MeshDesc {
+    fn form(&self) -> Form {
+        let mesh = self.mesh().clone();
+        Form::Mesh(MeshForm {
+            scene_from_mesh: DAffine3::from_translation(mesh.mesh().center.into()),
+            smooth: self.normals == Normals::Smooth,
+            mesh,
+        })
+    }
+
+    fn faults(&self) -> Vec<ValidationError> {
+        self.content.fault().into_iter().collect()
+    }
+
+    /// Creates a mesh without a file: the placeholder at the origin. The box to fill is ignored,
+    /// because only a transform moves a mesh.
+    fn fitted_to(_: DVec3, _: DVec3) -> Self {
+        Self::default()
+    }
+}
+
+impl Shape {
+    /// Reads the mesh file that the shape names: calls `load` with the file's name and stores the
+    /// result. Does nothing if a result is stored already, or if the shape names no file.
+    pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
+        if let Self::MeshDesc(mesh) = self
+            && !mesh.file.is_empty()
+        {
+            mesh.content.resolve(|| load(&mesh.file));
+        }
+    }
+
+    /// Copies the loaded mesh from `other`, if both shapes name the same file.
+    pub fn resolve_as(&mut self, other: &Self) {
+        if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
+            && new.file == old.file
+        {
+            new.content.clone_from(&old.content);
+        }
+    }
+
+    /// Returns the mesh file that the shape names; `None` if the shape is no mesh or names no file.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
+            _ => None,
+        }
+    }
+
+    /// Returns the mesh that was read from the file that the shape names. Returns `None` if the
+    /// shape names no file or the file could not be read.
+    pub fn mesh(&self) -> Option<&Arc<Mesh>> {
+        match self {
+            Self::MeshDesc(mesh) => mesh.content.content(),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placeholder_is_icosahedron_on_origin() {
+        let mesh = PLACEHOLDER.mesh();
+        assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
+        let form = MeshDesc::fitted_to(DVec3::ZERO, DVec3::ONE).form();
+        let (low, high) = form.bounds().unwrap();
+        assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
+        assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
+        // All corners are at the same distance from the centre, and all fronts face outwards.
+        let point =
+            |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(point);
+            assert!((b - a).cross(c - a).dot(a) > 0.0);
+            assert!((a.length() - point(0).length()).abs() < 1e-6);
+        }
+    }
+}

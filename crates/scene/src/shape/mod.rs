@@ -1,0 +1,56 @@
+//! Shapes: descriptions of geometry in scene files, one kind per file, with keys, ranges and help.
+//! Rays do not intersect descriptions. Each description is converted to a canonical form: one of a
+//! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
+//! intersection kernels.
+
+mod axial;
+mod cone;
+mod csg;
+mod cube;
+mod cuboid;
+mod cylinder;
+mod horizontal_rectangle;
+mod mesh;
+mod plane;
+mod prism;
+mod prismoid;
+mod pyramid;
+mod rectangle;
+mod registry;
+mod sphere;
+mod tapered_cylinder;
+mod texture_space;
+mod torus;
+mod transform;
+mod unit_frustum;
+
+pub use cone::Cone;
+pub use csg::{CsgOperand, Difference, Intersection, MAX_DEPTH, Union};
+pub use cube::Cube;
+pub use cuboid::Cuboid;
+pub use cylinder::Cylinder;
+pub use horizontal_rectangle::HorizontalRectangle;
+pub use mesh::{MeshDesc, Normals};
+pub use plane::Plane;
+pub use prism::Prism;
+pub use pyramid::Pyramid;
+pub use rectangle::Rectangle;
+pub use registry::{KINDS, Shape, ShapeDesc};
+pub use sphere::Sphere;
+pub use tapered_cylinder::TaperedCylinder;
+pub use texture_space::TextureSpace;
+pub use torus::Torus;
+pub use transform::{Rotate, Scale, TransformOp, compose, ill_conditioned};
+pub use unit_frustum::UnitFrustum;
+pub use zerkalo_kernel::primitive::DefaultMapping;
+
+#[cfg(test)]
+mod normals_at_test;
+#[cfg(test)]
+mod ray_query_test;
+#[cfg(test)]
+#[path = "../../../../tests/common/shape_examples.rs"]
+mod shape_examples;
+
+#[cfg(test)]
+pub use shape_examples::EXAMPLES;

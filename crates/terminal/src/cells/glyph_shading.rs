@@ -1,0 +1,173 @@
+//! Picture cells in 16 colours, or without colours, with shading glyphs of different density.
+
+use crate::cells::oklab::{Oklab, level, linear};
+use crate::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
+use crate::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
+use ratatui::style::Color;
+use std::sync::LazyLock;
+
+/// Glyphs, each with the share of the cell that it covers. The shares of the shades ░▒▓ are nominal
+/// (25, 50, 75 %). The other shares were measured in DejaVu Sans Mono.
+const COVERAGE: [(char, f32); 9] = [
+    (' ', 0.0),
+    ('.', 0.025),
+    (':', 0.05),
+    ('+', 0.11),
+    ('%', 0.18),
+    ('░', 0.25),
+    ('▒', 0.5),
+    ('▓', 0.75),
+    ('█', 1.0),
+];
+/// Shading glyphs for mixtures of two colours in a cell.
+const SHADES: [char; 3] = ['░', '▒', '▓'];
+/// Background colours of cells that mix two colours: black, two greys and white. They leave the hue
+/// of the foreground unchanged.
+const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
+/// Smallest gain for which a half block is preferred to a shading glyph. The gain is the sum of the
+/// OKLab errors of both halves with the shading glyph, minus the same sum with the half block.
+/// Without this limit, a changing picture would flicker between half blocks and shades.
+const HALVES_GAIN: f32 = 0.05;
+
+/// Returns the share of the cell that `glyph` covers, 0..=1. Returns 0.5 for glyphs that are not in
+/// [`COVERAGE`], such as half blocks.
+pub fn coverage(glyph: char) -> f32 {
+    COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
+}
+
+/// Returns the mean colour of a cell. `fg` covers the share `coverage`, and `bg` covers the
+/// remainder.
+pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
+    let (fg, bg) = (linear(fg), linear(bg));
+    Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
+}
+
+/// Candidate cells of a picture in 16 colours: each colour alone, and each shading glyph in one
+/// colour on a neutral background (black, grey or white).
+static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
+    let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
+    let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
+        SHADES.map(|glyph| PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) })
+    });
+    (0..16).map(flat).chain(mixed).collect()
+});
+
+/// Palette of the mean colours of the terminal cells in [`CELLS`], in OKLab.
+static SHADED: LazyLock<QuantisedPalette> = LazyLock::new(|| {
+    let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
+        (Color::Indexed(fg), Color::Indexed(bg)) => {
+            mixture(xterm_rgb(fg), xterm_rgb(bg), coverage(cell.glyph))
+        }
+        (_, Color::Indexed(bg)) => Oklab::of(xterm_rgb(bg)),
+        _ => Oklab::of(PLAIN_BG),
+    };
+    QuantisedPalette::new(CELLS.iter().map(look).collect())
+});
+
+/// Palette of the 16 ANSI colours alone, without shading glyphs.
+static BARE: LazyLock<QuantisedPalette> = LazyLock::new(|| {
+    QuantisedPalette::new((0..16).map(|index| Oklab::of(xterm_rgb(index))).collect())
+});
+
+fn flat(index: u8) -> PictureCell {
+    PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::Indexed(index) }
+}
+
+/// Returns the index of the ANSI colour, 0 to 15, nearest to `rgb`.
+pub fn nearest(rgb: [u8; 3]) -> u8 {
+    BARE.nearest(rgb) as u8
+}
+
+/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves.
+/// Its glyph is a shading glyph, a half block or a space.
+pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
+    let target = [upper, lower].map(Oklab::of);
+    let [a, b] = [upper, lower].map(linear);
+    let shade = SHADED.nearest([0, 1, 2].map(|c| level(0.5 * (a[c] + b[c]))));
+    // If the halves have similar colours, a half block gains too little over a shading glyph.
+    if target[0].distance(target[1]) < HALVES_GAIN {
+        return CELLS[shade];
+    }
+    let [top, bottom] = [upper, lower].map(nearest);
+    let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
+    let halves_error = error([top, bottom].map(|index| BARE.colors[usize::from(index)]));
+    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.colors[shade]; 2]) {
+        return PictureCell { glyph: '▀', fg: Color::Indexed(top), bg: Color::Indexed(bottom) };
+    }
+    CELLS[shade]
+}
+
+/// Returns the cell without colours whose glyph approximates the lightness of its halves, `upper`
+/// and `lower`.
+pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
+    static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
+        COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()
+    });
+    let [top, bottom] = [upper, lower].map(|rgb| Oklab::of(rgb).l);
+    let target = mixture(upper, lower, 0.5).l;
+    let (glyph, look) = LIGHTNESS
+        .iter()
+        .min_by(|a, b| (a.1 - target).abs().total_cmp(&(b.1 - target).abs()))
+        .copied()
+        .unwrap_or((' ', 0.0));
+    let shade_error = (top - look).abs() + (bottom - look).abs();
+    let white = LIGHTNESS.last().map_or(1.0, |(_, l)| *l);
+    let halves = |glyph, light: f32, dark: f32| {
+        let error = (light - white).abs() + dark;
+        (error + HALVES_GAIN < shade_error).then_some(glyph)
+    };
+    let glyph = if top > bottom { halves('▀', top, bottom) } else { halves('▄', bottom, top) }
+        .unwrap_or(glyph);
+    PictureCell { glyph, fg: Color::Reset, bg: Color::Reset }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mono_glyph_density_rises_with_lightness() {
+        let mut last = 0.0;
+        for level in 0..=255u8 {
+            let cell = pair_mono([level; 3], [level; 3]);
+            assert_eq!((cell.fg, cell.bg), (Color::Reset, Color::Reset));
+            assert!(coverage(cell.glyph) >= last, "{level}: {}", cell.glyph);
+            last = coverage(cell.glyph);
+        }
+        assert_eq!(last, 1.0);
+        assert_eq!(pair_mono([0; 3], [0; 3]).glyph, ' ');
+        // An edge between the halves of a cell gives a half block.
+        assert_eq!(pair_mono([255; 3], [0; 3]).glyph, '▀');
+        assert_eq!(pair_mono([0; 3], [255; 3]).glyph, '▄');
+    }
+
+    #[test]
+    fn sixteen_colors_keep_hues_and_edges() {
+        let flat = |rgb| pair(rgb, rgb);
+        assert_eq!(flat([255, 0, 0]), super::flat(9));
+        assert_eq!(flat([0, 0, 0]), super::flat(0));
+        // Dark red is a shade of red on black; light red is a shade of red on white.
+        for (rgb, neutral) in [([110, 0, 0], 0), ([255, 150, 140], 15)] {
+            let PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) } = flat(rgb)
+            else {
+                panic!("{rgb:?}");
+            };
+            assert!(SHADES.contains(&glyph) && [1, 9].contains(&fg), "{rgb:?} {fg}");
+            assert!(bg == neutral || bg == 7, "{rgb:?} {bg}");
+        }
+        let edge = pair([255, 255, 255], [0, 0, 238]);
+        assert_eq!(edge, PictureCell { glyph: '▀', fg: Color::Indexed(15), bg: Color::Indexed(4) });
+    }
+
+    #[test]
+    fn shades_are_closer_than_sixteen_colors_alone() {
+        let (mut bare, mut shaded) = (0.0, 0.0);
+        for i in 0..512usize {
+            let rgb = [i / 64, i / 8 % 8, i % 8].map(|c| (c * 36) as u8);
+            let target = Oklab::of(rgb);
+            bare += Oklab::of(xterm_rgb(nearest(rgb))).distance(target);
+            shaded += pair(rgb, rgb).halves()[0].distance(target);
+        }
+        assert!(shaded < 0.6 * bare, "{shaded} of {bare}");
+    }
+}

@@ -1,0 +1,103 @@
+use crate::cells::*;
+
+const RED: [u8; 3] = [255, 0, 0];
+const SKY: [u8; 3] = [90, 140, 220];
+
+fn checker(width: usize, height: usize) -> Raster {
+    Raster::from_fn(width, height, |i| {
+        if (i % width + i / width).is_multiple_of(2) { RED } else { SKY }
+    })
+}
+
+#[test]
+fn cell_shows_two_pixels() {
+    let cells = PictureCells::new(&checker(3, 4), Colors::True, false);
+    assert_eq!((cells.columns, cells.rows, cells.cells.len()), (3, 2, 6));
+    let [red, sky] = [Color::from(RED), Color::from(SKY)];
+    assert_eq!(cells.cell(0, 0), Some(&PictureCell { glyph: '▀', fg: red, bg: sky }));
+    assert_eq!(cells.cell(1, 0), Some(&PictureCell { glyph: '▀', fg: sky, bg: red }));
+    assert_eq!([cells.cell(3, 0), cells.cell(0, 2)], [None, None]);
+}
+
+#[test]
+fn equal_halves_are_a_space() {
+    let cells = PictureCells::new(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
+    assert_eq!(cells.cells, [PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::from(SKY) }]);
+}
+
+#[test]
+fn odd_last_row_leaves_lower_half_plain() {
+    for colors in Colors::ALL {
+        for settled in [false, true] {
+            let cells = PictureCells::new(&checker(2, 3), colors, settled);
+            assert_eq!((cells.columns, cells.rows, cells.cells.len()), (2, 2, 4));
+            for cell in &cells.cells[2..] {
+                assert_eq!(cell.bg, Color::Reset, "{colors:?}");
+                assert!(cell.glyph == '▀' || cell.glyph == ' ', "{colors:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn any_size_is_converted() {
+    for (width, height) in [(0, 0), (0, 3), (3, 0), (1, 1)] {
+        for colors in Colors::ALL {
+            let cells = PictureCells::new(&Raster::from_fn(width, height, |_| SKY), colors, true);
+            assert_eq!(cells.cells.len(), width * height.div_ceil(2));
+        }
+    }
+}
+
+/// Returns the mean OKLab distance between the pixels of an image with gradients and the terminal
+/// cells that show it. `settled` is passed to [`PictureCells::new`].
+fn mean_error(colors: Colors, settled: bool) -> f32 {
+    let (width, height) = (64, 64);
+    let raster = Raster::from_fn(width, height, |i| {
+        let (x, y) = (i % width * 4, i / width * 4);
+        [x as u8, y as u8, (255 - (x + y) / 2) as u8]
+    });
+    let cells = PictureCells::new(&raster, colors, settled);
+    let mut sum = 0.0;
+    for (i, rgb) in raster.pixels.iter().enumerate() {
+        let cell = cells.cell((i % width) as u16, (i / width / 2) as u16).unwrap();
+        sum += cell.halves()[i / width % 2].distance(Oklab::of(*rgb));
+    }
+    sum / raster.pixels.len() as f32
+}
+
+#[test]
+fn error_of_fewer_colors_is_bounded() {
+    assert_eq!(mean_error(Colors::True, false), 0.0);
+    let errors = [
+        mean_error(Colors::Indexed, false),
+        mean_error(Colors::Indexed, true),
+        mean_error(Colors::Sixteen, false),
+    ];
+    for (error, most) in errors.into_iter().zip([0.04, 0.05, 0.055]) {
+        assert!(error > 0.01 && error < most, "{errors:?}");
+    }
+}
+
+/// Measures the time of the conversion of a picture to terminal cells:
+/// `cargo test --release --test application conversion_time -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement"]
+fn picture_conversion_time() {
+    let (width, height) = (160, 90);
+    for colors in Colors::ALL {
+        for settled in [false, true] {
+            let mut best = f64::INFINITY;
+            for seed in 0..20 {
+                let raster = Raster::from_fn(width, height, |i| {
+                    let noise = (i.wrapping_mul(2_654_435_761).wrapping_add(seed) >> 7) as u8 / 8;
+                    [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
+                });
+                let start = std::time::Instant::now();
+                std::hint::black_box(PictureCells::new(&raster, colors, settled));
+                best = best.min(start.elapsed().as_secs_f64());
+            }
+            println!("{colors:?} settled {settled}: {:.2} ms", 1e3 * best);
+        }
+    }
+}

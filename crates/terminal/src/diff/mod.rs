@@ -1,0 +1,358 @@
+//! Frame difference: selects the cells that the next frame sends to the terminal.
+//!
+//! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
+//! largest difference first, within the byte budget of the frame. If a new picture does not fit
+//! into this budget, a mosaic of coarse blocks is sent first. While samples accumulate, not every
+//! frame compares all cells. The next full comparison is due when the number of samples per pixel
+//! has grown by a factor of 2^(1/4), or of 2^(1/2) from 64 samples on. Invisible differences are
+//! sent when the connection is otherwise idle.
+
+mod encode;
+mod perceptual;
+#[cfg(test)]
+mod tests;
+
+use crate::flow::FrameBudget;
+pub use encode::Encoder;
+use perceptual::PerceptualDiff;
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::{Position, Rect};
+use std::time::Duration;
+
+/// Number of bytes that are reserved in each frame for everything except cells: cursor,
+/// synchronised update, acknowledgement request.
+const FRAME_OVERHEAD: usize = 64;
+/// Time without a change of the picture after which differences below the threshold of visibility
+/// are sent.
+const IDLE: Duration = Duration::from_secs(2);
+
+/// Contents that the terminal should show.
+#[derive(Clone, Copy, Debug)]
+pub struct TargetFrame<'a> {
+    /// All cells of the screen.
+    pub cells: &'a Buffer,
+    /// Position of the text cursor. `None` hides the cursor.
+    pub cursor: Option<Position>,
+    /// Area of the picture on the screen; may be empty.
+    pub picture: Rect,
+    /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
+    /// `false` if text covers it.
+    pub uncovered: &'a [bool],
+    /// Number of the shown picture. It increases when an edit, a camera movement or another action
+    /// changes what the picture shows. Additional samples do not increase it.
+    pub subject: u64,
+    /// Number that increases when the picture may have changed for any reason, such as additional
+    /// samples.
+    pub version: u64,
+    /// Number of samples per pixel of the picture in this frame.
+    pub samples: f64,
+    /// `true` if the picture changes rarely or only by user input.
+    pub settled: bool,
+}
+
+/// Summary of an encoded frame. The encoded bytes are in a buffer of the caller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Frame {
+    /// `true` if the frame contains cells of the picture.
+    pub picture: bool,
+    /// Number of bytes of the frame that encode cells whose differences are below the threshold of
+    /// visibility.
+    pub flushed: usize,
+}
+
+/// Differences between terminal and target frame that remain to be sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pending {
+    /// `true` if some text of the target frame remains to be sent.
+    pub text: bool,
+    /// `true` if visible differences of the picture remain to be sent.
+    pub visible: bool,
+    /// Earliest time at which picture differences below the threshold of visibility may be sent.
+    /// `None` if there are no such differences.
+    pub hidden: Option<Duration>,
+}
+
+/// Difference between the contents of the terminal and a target frame. The default value is for a
+/// terminal with unknown contents.
+#[derive(Debug, Default)]
+pub struct FrameDiff {
+    /// Contents of the terminal. An empty buffer means that they are unknown and the terminal must
+    /// be cleared.
+    shown: Buffer,
+    cursor: Option<Position>,
+    encoder: Encoder,
+    picture_diff: PerceptualDiff,
+    subject: Option<u64>,
+    /// `true` until cells of a new picture have been sent, exactly or as a mosaic (large blocks of
+    /// one colour). A picture is new after an edit or a camera movement.
+    fresh: bool,
+    /// Number of samples per pixel at which the next full comparison of the picture is due. A full
+    /// comparison considers all cells. The comparisons between two full ones consider only cells
+    /// that still differ visibly from the target frame.
+    next_samples: f64,
+    version: u64,
+    /// Time at which the version of the target frame's picture last changed.
+    version_at: Duration,
+    pending: Pending,
+}
+
+impl FrameDiff {
+    /// Returns the differences that remain to be sent after the last frame.
+    pub fn pending(&self) -> Pending {
+        self.pending
+    }
+
+    /// Records that other output has moved the terminal's cursor, so that its position is unknown.
+    pub fn moved(&mut self) {
+        self.encoder.moved();
+    }
+
+    /// Appends the bytes of the next frame to `out`, within the limits of `allowance`, and returns
+    /// a summary of the frame. Appends nothing if the terminal shows `target` already. OKLab
+    /// differences up to `threshold` are treated as invisible: they are sent only when the
+    /// connection is otherwise idle.
+    pub fn frame(
+        &mut self,
+        target: &TargetFrame,
+        now: Duration,
+        allowance: FrameBudget,
+        threshold: f32,
+        out: &mut Vec<u8>,
+    ) -> Frame {
+        if target.cells.area != self.shown.area {
+            self.shown = Buffer::empty(target.cells.area);
+            self.encoder = Encoder::new(target.cells.area.width);
+            self.encoder.clear(out);
+            self.picture_diff.forget();
+        }
+        if self.cursor.is_some() {
+            out.extend(b"\x1b[?25l");
+        }
+        let before = out.len();
+        let mut frame = Frame { picture: true, flushed: 0 };
+        if allowance.bytes == usize::MAX {
+            self.send_all(target, out);
+        } else {
+            let room = allowance.bytes.saturating_sub(FRAME_OVERHEAD);
+            self.pending.text = !self.send_text(target, room, out);
+            let room = room.saturating_sub(out.len());
+            self.compare(target, now, threshold);
+            frame = self.send_picture(target, now, FrameBudget { bytes: room, ..allowance }, out);
+        }
+        if out.len() == before && target.cursor == self.cursor {
+            // No cell is sent. If the sequence that hides the cursor (6 bytes) was appended, it is
+            // removed again.
+            out.truncate(if self.cursor.is_some() { before - 6 } else { before });
+            return frame;
+        }
+        if let Some(Position { x, y }) = target.cursor {
+            self.encoder.go(out, x, y);
+            out.extend(b"\x1b[?25h");
+        }
+        self.cursor = target.cursor;
+        frame
+    }
+
+    /// Appends to `out` the bytes of every cell that differs from the terminal's contents, without
+    /// limit.
+    fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
+        for (x, y, cell) in self.shown.diff_iter(target.cells) {
+            self.encoder.cell(out, x, y, cell);
+        }
+        self.shown.clone_from(target.cells);
+        self.pending = Pending::default();
+    }
+
+    /// Appends to `out` the rows of text that differ from the terminal's contents: as many as fit
+    /// into `room` bytes, but at least one. Returns `true` if no such rows remain.
+    fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
+        let differences = self.shown.diff(target.cells);
+        let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
+        let text: Vec<_> = text.collect();
+        let start = out.len();
+        for row in text.chunk_by(|a, b| a.1 == b.1) {
+            let (mut encoder, length) = (self.encoder.clone(), out.len());
+            for (x, y, cell) in row {
+                encoder.cell(out, *x, *y, cell);
+            }
+            if out.len() > room && length > start {
+                out.truncate(length);
+                return false;
+            }
+            self.encoder = encoder;
+            for (x, y, cell) in row {
+                // A wide character covers the next cell as well.
+                let width = unicode_width::UnicodeWidthStr::width(cell.symbol()).max(1) as u16;
+                for x in (*x..x.saturating_add(width)).take_while(|x| *x < target.cells.area.width)
+                {
+                    self.shown[(x, *y)] = target.cells[(x, *y)].clone();
+                    if let Some(index) = target.index(x, *y) {
+                        self.picture_diff.covered(index);
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// Compares the picture of the target frame with the contents of the terminal. OKLab
+    /// differences up to `threshold` are treated as invisible.
+    fn compare(&mut self, target: &TargetFrame, now: Duration, threshold: f32) {
+        if self.version != target.version {
+            (self.version, self.version_at) = (target.version, now);
+        }
+        self.picture_diff.fit(target.picture);
+        if self.subject != Some(target.subject) {
+            self.subject = Some(target.subject);
+            self.fresh = true;
+            self.next_samples = 0.0;
+        }
+        let is_due = target.samples >= self.next_samples || target.settled;
+        if is_due {
+            let power = if target.samples < 64.0 { 0.25 } else { 0.5 };
+            self.next_samples = target.samples * 2f64.powf(power);
+        }
+        self.picture_diff.compare(target, &self.shown, is_due, threshold);
+    }
+
+    /// Appends as many cells of the picture to `out` as fit into the byte budget `allowance`. Cells
+    /// with the largest difference from the terminal come first.
+    fn send_picture(
+        &mut self,
+        target: &TargetFrame,
+        now: Duration,
+        allowance: FrameBudget,
+        out: &mut Vec<u8>,
+    ) -> Frame {
+        let area = target.picture;
+        let mut visible = self.picture_diff.visible();
+        let idle_at = if target.settled { now } else { self.version_at + IDLE };
+        let mut frame = Frame::default();
+        self.pending.visible = !visible.is_empty();
+        self.fresh &= self.pending.visible;
+        if !visible.is_empty() && allowance.picture {
+            let count = visible.len();
+            let exact = |index: usize| &target.cells[position(area, index)];
+            let mut part = self.fitting(area, &mut visible, allowance.bytes, exact);
+            if std::mem::take(&mut self.fresh) && part.cells.len() < count {
+                for side in [2, 4, 8, 16] {
+                    let (cells, mut order) = self.picture_diff.coarse(target, side);
+                    let coarse = |index: usize| &cells[index];
+                    let all = order.len();
+                    let blocks = self.fitting(area, &mut order, allowance.bytes, coarse);
+                    let fits = blocks.cells.len() == all;
+                    if all > 0 && (fits || side == 16) {
+                        part = blocks;
+                    }
+                    if fits {
+                        break;
+                    }
+                }
+            }
+            frame.picture = !part.cells.is_empty();
+            self.send(target, part, out);
+            self.pending.visible = !self.picture_diff.visible().is_empty();
+        } else if visible.is_empty()
+            && allowance.picture
+            && idle_at <= now
+            && allowance.refinement > 0
+        {
+            let mut hidden = self.picture_diff.hidden();
+            let exact = |index: usize| &target.cells[position(area, index)];
+            let room = allowance.refinement.min(allowance.bytes);
+            let part = self.fitting(area, &mut hidden, room, exact);
+            frame = Frame { picture: !part.cells.is_empty(), flushed: part.bytes.len() };
+            self.send(target, part, out);
+        }
+        let has_hidden = !self.picture_diff.hidden().is_empty();
+        self.pending.hidden = has_hidden.then_some(idle_at);
+        frame
+    }
+
+    /// Encodes as many cells of `order` as fit into `room` bytes, the largest differences first.
+    /// `order` has a pair `(difference, index)` for each cell to send; the index is that of the
+    /// cell in the rectangle `area`. `cell(i)` returns the contents of the cell with index i.
+    fn fitting<'a>(
+        &self,
+        area: Rect,
+        order: &mut [(f32, usize)],
+        room: usize,
+        cell: impl Fn(usize) -> &'a Cell,
+    ) -> Part {
+        // Cells of equal difference are sorted by index, so that frames are deterministic.
+        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let encoded = |count: usize| {
+            let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();
+            indices.sort_unstable();
+            let (mut encoder, mut bytes) = (self.encoder.clone(), Vec::new());
+            let mut cells = Vec::with_capacity(count);
+            for index in indices {
+                let Position { x, y } = position(area, index);
+                encoder.cell(&mut bytes, x, y, cell(index));
+                cells.push((index, cell(index).clone()));
+            }
+            Part { bytes, encoder, cells }
+        };
+        let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
+        let mut count = order.len();
+        // The estimate assumes that every cell needs the same number of bytes. A smaller selection
+        // of cells needs more bytes for each cell, because its cells are farther apart. The
+        // estimate is therefore rarely too low.
+        while count > 0 {
+            let part = encoded(count);
+            if part.bytes.len() <= room {
+                best = part;
+                break;
+            }
+            count = (count * room / part.bytes.len()).min(count - 1);
+        }
+        // If more than a tenth of `room` is left, a second estimate tries to use it.
+        if best.cells.len() < order.len() && 10 * best.bytes.len() < 9 * room {
+            let estimate = best.cells.len() * room / best.bytes.len().max(1);
+            let part = encoded((estimate - estimate / 50).clamp(best.cells.len(), order.len()));
+            if part.bytes.len() <= room {
+                best = part;
+            }
+        }
+        best
+    }
+
+    fn send(&mut self, target: &TargetFrame, part: Part, out: &mut Vec<u8>) {
+        out.extend(&part.bytes);
+        self.encoder = part.encoder;
+        for (index, cell) in part.cells {
+            let cell_position = position(target.picture, index);
+            let is_exact = cell == target.cells[cell_position];
+            self.picture_diff.sent(index, &cell, is_exact);
+            self.shown[cell_position] = cell;
+        }
+    }
+}
+
+/// Part of the picture that fits into a frame, as encoded cells.
+struct Part {
+    bytes: Vec<u8>,
+    /// State of the cell encoder after the bytes of this part.
+    encoder: Encoder,
+    cells: Vec<(usize, Cell)>,
+}
+
+impl TargetFrame<'_> {
+    /// Returns the index of the cell at column `x` and row `y` within the area of the picture.
+    /// Returns `None` for a cell outside of this area.
+    fn index(&self, x: u16, y: u16) -> Option<usize> {
+        let area = self.picture;
+        let inside = area.contains(Position { x, y });
+        inside.then(|| usize::from(y - area.y) * usize::from(area.width) + usize::from(x - area.x))
+    }
+
+    fn shows_picture(&self, x: u16, y: u16) -> bool {
+        self.index(x, y).is_some_and(|index| self.uncovered.get(index).copied().unwrap_or(false))
+    }
+}
+
+/// Returns the position of cell `index` of `area`, counted row by row.
+fn position(area: Rect, index: usize) -> Position {
+    let width = usize::from(area.width).max(1);
+    Position { x: area.x + (index % width) as u16, y: area.y + (index / width) as u16 }
+}

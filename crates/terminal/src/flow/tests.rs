@@ -1,0 +1,473 @@
+use crate::flow::*;
+use crate::{Capabilities, Environment};
+
+fn ms(n: u64) -> Duration {
+    Duration::from_millis(n)
+}
+
+fn start(mode: PacingMode) -> InitialLink {
+    InitialLink { mode, round_trip: Some(ms(100)), queue: false, fixed_rate: DEFAULT_RATE }
+}
+
+/// Simulated connection of `rate` bytes per second to a terminal. The terminal's reply arrives
+/// `round_trip` after the end of the transmission.
+struct Wire {
+    rate: f64,
+    round_trip: Duration,
+    free_at: Duration,
+}
+
+impl Wire {
+    /// Sends `bytes` bytes at the time `now`. Returns the time at which the terminal's reply
+    /// arrives.
+    fn send(&mut self, now: Duration, bytes: usize) -> Duration {
+        self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.rate);
+        self.free_at + self.round_trip
+    }
+}
+
+/// Sends frames of the size that flow control permits, for `seconds`. If `is_active` is `true`,
+/// user input is recorded every 50 ms. Returns `(share, wait)` for the second half of this time.
+/// `share` is the ratio of the bytes sent to those that the connection could transmit. `wait` is
+/// the longest time from the sending of a frame to the end of its transmission.
+fn saturate(
+    flow: &mut FlowControl,
+    wire: &mut Wire,
+    seconds: u64,
+    is_active: bool,
+) -> (f64, Duration) {
+    let mut replies = std::collections::VecDeque::new();
+    let (mut used, mut longest_wait) = (0, Duration::ZERO);
+    for at in 0..seconds * 1000 {
+        let now = ms(at);
+        while replies.front().is_some_and(|at| *at <= now) {
+            flow.on_ack(replies.pop_front().unwrap());
+        }
+        flow.expire(now);
+        if is_active && at % 50 == 0 {
+            flow.record_input(now);
+        }
+        if let Some(allowance) = flow.allowance(now, false) {
+            let bytes = allowance.bytes;
+            flow.sent(now, bytes, allowance.picture, 0);
+            replies.push_back(wire.send(now, bytes));
+            if at >= seconds * 500 {
+                used += bytes;
+                longest_wait = longest_wait.max(wire.free_at.saturating_sub(now));
+            }
+        }
+    }
+    (used as f64 / (wire.rate * seconds as f64 / 2.0), longest_wait)
+}
+
+#[test]
+fn rate_is_measured_and_connection_kept_busy() {
+    for (rate, round_trip) in [(125e3, 100), (125e3, 30), (1.25e6, 40), (20e3, 300), (12.5e6, 10)] {
+        let mut flow = FlowControl::new(InitialLink {
+            round_trip: None,
+            ..start(PacingMode::AckClocked(None))
+        });
+        let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
+        let (busy, waited) = saturate(&mut flow, &mut wire, 70, false);
+        let rate_found = flow.reading().unwrap().rate;
+        let what =
+            format!("{rate} B/s, {round_trip} ms: {rate_found:.0}, busy {busy:.2}, {waited:?}");
+        // The byte budget and the interval of frames are limited, so that frames cannot fill the
+        // fastest of these connections.
+        let expected = (BUDGET[2] / 0.033 / rate).min(1.0);
+        assert!(busy > 0.6 * expected, "{what}");
+        assert!(rate_found > 0.6 * rate.min(8e6) && rate_found < 1.6 * rate, "{what}");
+        assert!(waited < ms(400), "{what}");
+    }
+}
+
+#[test]
+fn input_waits_for_one_frame_only() {
+    let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
+    let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
+    let (busy, waited) = saturate(&mut flow, &mut wire, 20, true);
+    assert!(waited < ms(160) && busy > 0.8, "{waited:?}, busy {busy:.2}");
+    let now = ms(20_000);
+    flow.record_input(now);
+    flow.forget_frames();
+    flow.sent(now, 9000, true, 0);
+    // While the frame of 9000 bytes is in flight, a frame with the effect of one key may be sent,
+    // but not one with the effect of the next key.
+    assert!(flow.allowance(now + ms(40), false).is_none());
+    let effect = flow.allowance(now + ms(1), true).unwrap();
+    assert!(effect.picture);
+    flow.sent(now + ms(1), effect.bytes, true, 0);
+    let text = flow.allowance(now + ms(2), true).unwrap();
+    assert_eq!(text, FrameBudget { bytes: MAX_TEXT, picture: false, refinement: 0 });
+    flow.sent(now + ms(2), MAX_TEXT, false, 0);
+    assert_eq!(flow.allowance(now + ms(3), true), None);
+}
+
+#[test]
+fn first_effect_of_input_does_not_wait_for_earlier_frames() {
+    let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
+    (0..2).for_each(|i| flow.sent(ms(40 * i), 8000, true, 0));
+    let now = ms(80);
+    assert_eq!(flow.allowance(now, false), None);
+    flow.record_input(now);
+    assert!(flow.allowance(now, true).unwrap().picture);
+    flow.sent(now, 8000, true, 0);
+    // The frame with the effect of the next input waits for those in flight.
+    flow.record_input(ms(110));
+    assert!(!flow.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
+}
+
+#[test]
+fn local_terminal_has_no_byte_limit() {
+    let mut flow = FlowControl::new(start(PacingMode::Unlimited));
+    let all = FrameBudget { bytes: usize::MAX, picture: true, refinement: usize::MAX / 2 };
+    assert_eq!(flow.allowance(ms(5), false), Some(all));
+    flow.sent(ms(5), 100_000, true, 0);
+    assert_eq!(flow.allowance(ms(6), true), Some(all));
+    assert_eq!(flow.allowance(ms(6), false), None);
+    assert_eq!(flow.wakes_at(ms(6), false), ms(38));
+    assert_eq!(flow.allowance(ms(38), false), Some(all));
+    assert_eq!((flow.ack_request(), flow.reading(), flow.threshold()), (None, None, 0.0));
+}
+
+#[test]
+fn lost_replies_stop_requests_and_late_ones_resume_them() {
+    let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
+    let mut now = ms(0);
+    for _ in 0..MAX_LOSSES {
+        assert!(flow.ack_request().is_some());
+        flow.sent(now, 4000, true, 0);
+        flow.sent(now, 4000, true, 0);
+        assert!(flow.wakes_at(now, false) <= now + LOST_AFTER);
+        now += LOST_AFTER;
+        flow.expire(now);
+    }
+    let reading = flow.reading().unwrap();
+    assert_eq!((reading.mode, reading.rate), (PacingMode::FixedRate, DEFAULT_RATE));
+    assert_eq!(flow.ack_request(), None);
+    // Without replies, frames are still sent, at the fixed rate.
+    let mut sent = 0;
+    for _ in 0..10_000 {
+        now += ms(1);
+        flow.expire(now);
+        if let Some(allowance) = flow.allowance(now, false) {
+            flow.sent(now, allowance.bytes, true, 0);
+            sent += allowance.bytes;
+        }
+    }
+    assert!((0.9..1.1).contains(&(sent as f64 / 10.0 / DEFAULT_RATE)), "{sent}");
+    assert!(flow.on_ack(now));
+    assert_eq!(flow.reading().unwrap().mode, PacingMode::AckClocked(None));
+}
+
+#[test]
+fn send_queue_replaces_lost_replies() {
+    let mut flow =
+        FlowControl::new(InitialLink { queue: true, ..start(PacingMode::AckClocked(None)) });
+    for i in 0..u64::from(MAX_LOSSES) {
+        flow.sent(LOST_AFTER * i as u32, 4000, true, 0);
+        flow.expire(LOST_AFTER * (i as u32 + 1));
+    }
+    assert_eq!(flow.reading().unwrap().mode, PacingMode::SendQueue);
+    let now = LOST_AFTER * MAX_LOSSES;
+    // The kernel no longer lists the connection.
+    flow.sent(now, 4000, true, 0);
+    assert!(flow.measures_at(now).is_some_and(|at| flow.wants_queue_length(at)));
+    flow.held_back(now, None);
+    assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
+}
+
+/// Simulated connection with a send queue. Bytes reach the queue `LAG` after they were sent, and
+/// leave it when the other end acknowledges them.
+struct MeasuredWire {
+    wire: Wire,
+    /// Frames that were sent: time of arrival in the send queue, start and end of transmission, and
+    /// size in bytes.
+    frames: std::collections::VecDeque<(Duration, Duration, Duration, f64)>,
+}
+
+impl MeasuredWire {
+    const LAG: Duration = Duration::from_millis(6);
+
+    fn new(rate: f64, round_trip: u64) -> Self {
+        let wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
+        Self { wire, frames: Default::default() }
+    }
+
+    fn send(&mut self, now: Duration, bytes: usize) {
+        let queued_at = now + Self::LAG;
+        let start = self.wire.free_at.max(queued_at);
+        let end = self.wire.send(queued_at, bytes) - self.wire.round_trip;
+        self.frames.push_back((queued_at, start, end, bytes as f64));
+    }
+
+    /// Returns the number of bytes in the send queue at the time `now`.
+    fn queue(&mut self, now: Duration) -> usize {
+        let acked_at = now.saturating_sub(self.wire.round_trip);
+        while self.frames.front().is_some_and(|(_, _, end, _)| *end <= acked_at) {
+            self.frames.pop_front();
+        }
+        let in_queue = |(queued_at, start, end, bytes): &(Duration, Duration, Duration, f64)| {
+            let share =
+                acked_at.saturating_sub(*start).as_secs_f64() / (*end - *start).as_secs_f64();
+            if *queued_at <= now { bytes * (1.0 - share) } else { 0.0 }
+        };
+        self.frames.iter().map(in_queue).sum::<f64>().ceil() as usize
+    }
+
+    /// Simulates a dashboard that sends frames for `seconds`, beginning `from` seconds after the
+    /// start of the simulation. `wants(time, limit)` returns the number of bytes that the dashboard
+    /// sends; `time` is in milliseconds, and `limit` is the permitted number of bytes. Returns the
+    /// longest time for which bytes waited to be transmitted, in the last quarter of the simulated
+    /// time.
+    fn run(
+        &mut self,
+        flow: &mut FlowControl,
+        from: u64,
+        seconds: u64,
+        wants: impl Fn(u64, usize) -> usize,
+    ) -> Duration {
+        let mut longest = Duration::ZERO;
+        for at in from * 1000..(from + seconds) * 1000 {
+            let now = ms(at);
+            if flow.wants_queue_length(now) {
+                let queue = self.queue(now);
+                flow.held_back(now, Some(queue));
+            }
+            let Some(allowance) = flow.allowance(now, false) else { continue };
+            let bytes = wants(at, allowance.bytes);
+            if bytes > 0 {
+                flow.sent(now, bytes, allowance.picture, 0);
+                self.send(now, bytes);
+                if at >= (from + seconds) * 1000 - seconds * 250 {
+                    longest = longest.max(self.wire.free_at.saturating_sub(now));
+                }
+            }
+        }
+        longest
+    }
+}
+
+#[test]
+fn send_queue_holds_a_round_trip_and_a_frame() {
+    for (rate, round_trip) in [(32e3, 300), (125e3, 100), (125e3, 30), (1.25e6, 40), (20e3, 300)] {
+        let start = InitialLink { round_trip: None, ..start(PacingMode::SendQueue) };
+        let mut flow = FlowControl::new(start);
+        let mut wire = MeasuredWire::new(rate, round_trip);
+        let waited = wire.run(&mut flow, 0, 60, |_, permitted| permitted);
+        let found = flow.reading().unwrap().rate;
+        let what = format!("{rate} B/s, {round_trip} ms: {found:.0} B/s, {waited:?}");
+        assert!((0.85..1.2).contains(&(found / rate)), "{what}");
+        // At most two frames of 0.1 s wait: one in the queue, and the new one. Another 0.1 s is
+        // allowed for the error of the estimated round trip and for the interval between
+        // measurements.
+        assert!(waited < ms(300), "{what}");
+    }
+}
+
+#[test]
+fn rate_stays_true_after_convergence() {
+    for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
+        let mut flow = FlowControl::new(start(PacingMode::SendQueue));
+        let mut wire = MeasuredWire::new(rate, round_trip);
+        wire.run(&mut flow, 0, 30, |_, permitted| permitted);
+        // Every 450 ms one or two small frames are sent. They do not fill the connection.
+        wire.run(
+            &mut flow,
+            30,
+            60,
+            |at, permitted| {
+                if at % 450 < 40 { permitted.min(1400) } else { 0 }
+            },
+        );
+        let found = flow.reading().unwrap().rate;
+        assert!((0.7..1.2).contains(&(found / rate)), "{found:.0} of {rate}");
+    }
+    // Two acknowledgements that arrive at the same time must not change the estimated rate much.
+    let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
+    let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
+    saturate(&mut flow, &mut wire, 40, false);
+    flow.forget_frames();
+    for i in 41..60 {
+        let now = ms(1000 * i);
+        flow.sent(now, 900, false, 0);
+        flow.sent(now + ms(40), 3600, true, 0);
+        flow.on_ack(now + ms(175));
+        flow.on_ack(now + ms(175));
+    }
+    let found = flow.reading().unwrap().rate;
+    assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
+}
+
+/// Checks that late replies do not lower the estimated rate of the connection. Some replies of the
+/// simulated terminal are late: those that measure the round trip, and the acknowledgement of the
+/// first of two frames.
+#[test]
+fn late_replies_prove_no_rate() {
+    for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
+        let link = InitialLink { round_trip: None, ..start(PacingMode::AckClocked(None)) };
+        let mut flow = FlowControl::new(link);
+        let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
+        saturate(&mut flow, &mut wire, 25, false);
+        flow.forget_frames();
+        let is_true = |flow: &FlowControl| {
+            let found = flow.reading().unwrap().rate;
+            assert!((0.7..1.3).contains(&(found / rate)), "{found:.0} of {rate}");
+        };
+        for i in 10..30 {
+            let at = |after| ms(3000 * i + after);
+            // The reply that measures the round trip arrives after four times the true round trip.
+            flow.round_trip_at = Duration::ZERO;
+            flow.sent(at(0), 500, false, 0);
+            flow.on_ack(at(4 * round_trip));
+            assert_eq!(flow.round_trip, Some(ms(4 * round_trip)));
+            let bytes = (rate * 0.1) as usize;
+            flow.sent(at(1500), bytes, true, 0);
+            flow.on_ack(wire.send(at(1500), bytes));
+            is_true(&flow);
+            flow.sent(at(2000), 300, false, 0);
+            flow.on_ack(wire.send(at(2000), 300));
+            // The acknowledgement of the first of two frames is held back.
+            let [first, second] = [2500, 2560].map(|after| {
+                flow.sent(at(after), bytes / 2, true, 0);
+                wire.send(at(after), bytes / 2)
+            });
+            flow.on_ack(first.max(second - ms(25)));
+            flow.on_ack(second);
+            is_true(&flow);
+        }
+    }
+}
+
+/// Checks the estimated rate of the connection behind a relay. The relay accepts bytes at once
+/// until its buffer is full, and sends them at the rate of the connection.
+#[test]
+fn rate_is_true_behind_a_relay_that_buffers() {
+    const RELAYED: f64 = 8e3;
+    for (rate, frames) in [(125e3, 6000), (125e3, 1400), (32e3, 1500)] {
+        let mut flow =
+            FlowControl::new(InitialLink { round_trip: None, ..start(PacingMode::SendQueue) });
+        let mut wire = Wire { rate, round_trip: Duration::ZERO, free_at: Duration::ZERO };
+        let mut pass = |seconds: std::ops::Range<u64>, wants: &dyn Fn(u64, usize) -> usize| {
+            for at in seconds.start * 1000..seconds.end * 1000 {
+                let now = ms(at);
+                if flow.wants_queue_length(now) {
+                    let backlog = wire.free_at.saturating_sub(now).as_secs_f64() * rate;
+                    flow.held_back(now, Some((backlog - RELAYED).max(0.0) as usize));
+                }
+                let Some(allowance) = flow.allowance(now, false) else { continue };
+                let bytes = wants(at, allowance.bytes);
+                if bytes > 0 {
+                    flow.sent(now, bytes, allowance.picture, 0);
+                    wire.send(now, bytes);
+                }
+            }
+            flow.reading().unwrap().rate
+        };
+        let busy = pass(0..30, &|_, permitted| permitted);
+        let converged = pass(30..90, &|at, permitted| match at % 240 < 35 {
+            true => permitted.min(frames),
+            false => 0,
+        });
+        let what = format!("{rate}, {frames} bytes a frame: {busy:.0}, then {converged:.0}");
+        assert!((0.7..1.3).contains(&(busy / rate)), "{what}");
+        assert!((0.7..1.3).contains(&(converged / rate)), "{what}");
+    }
+}
+
+#[test]
+fn unknown_round_trip_is_measured_by_a_small_frame() {
+    let mut flow =
+        FlowControl::new(InitialLink { round_trip: None, ..start(PacingMode::SendQueue) });
+    let mut wire = MeasuredWire::new(125e3, 200);
+    assert_eq!(flow.allowance(ms(0), false).unwrap().bytes, SMALL);
+    wire.run(&mut flow, 0, 5, |_, permitted| permitted);
+    let found = flow.round_trip.unwrap();
+    assert!((ms(200)..ms(260)).contains(&found), "{found:?}");
+}
+
+#[test]
+fn connection_without_acknowledgements_becomes_silent() {
+    let mut flow = FlowControl::new(start(PacingMode::SendQueue));
+    assert_eq!(flow.silent_at(None), None, "nothing is under way");
+    flow.sent(ms(0), 5000, true, 0);
+    let mut now = ms(0);
+    while flow.silent_at(None).unwrap() > now {
+        assert!(now < ms(60_000));
+        now += ms(20);
+        if flow.wants_queue_length(now) {
+            flow.held_back(now, Some(5000));
+        }
+    }
+    assert_eq!(
+        flow.measures_at(now),
+        Some(flow.send_queue.measured_at.unwrap() + STALLED_INTERVAL)
+    );
+    // Input delays the time at which the connection is treated as silent. When all bytes are
+    // acknowledged, there is no such time.
+    flow.record_input(now);
+    assert!(flow.silent_at(None).unwrap() > now);
+    flow.held_back(now, Some(0));
+    assert_eq!(flow.silent_at(None), None);
+    // At a fixed rate, without acknowledgements, only a write that does not return shows that the
+    // connection is silent.
+    let flow = FlowControl::new(start(PacingMode::FixedRate));
+    assert_eq!(flow.silent_at(Some(ms(7))), Some(ms(7) + SILENT_AFTER));
+}
+
+#[test]
+fn refinement_takes_a_quarter_of_the_rate() {
+    let mut flow = FlowControl::new(start(PacingMode::FixedRate));
+    let mut refined = 0;
+    for at in 0..20_000 {
+        let Some(allowance) = flow.allowance(ms(at), false) else { continue };
+        if allowance.refinement > 0 {
+            flow.sent(ms(at), allowance.refinement, true, allowance.refinement);
+            refined += allowance.refinement;
+        }
+    }
+    let share = refined as f64 / 20.0 / DEFAULT_RATE;
+    assert!((0.2..=0.26).contains(&share), "{share}");
+}
+
+#[test]
+fn threshold_depends_on_rate() {
+    let threshold = |rate| {
+        FlowControl { rate, ..FlowControl::new(start(PacingMode::AckClocked(None))) }.threshold()
+    };
+    assert_eq!([threshold(30e3), threshold(125e3), threshold(2e6)], [0.04, 0.02, 0.01]);
+}
+
+#[test]
+fn acknowledgement_source_follows_capabilities() {
+    let ssh = |multiplexer, round_trip, passthrough| {
+        let environment = Environment {
+            ssh: Some("10.0.0.1 5000 10.0.0.2 22".into()),
+            multiplexer,
+            ..Environment::default()
+        };
+        let defaults = Capabilities::from_environment(environment);
+        Capabilities { round_trip, passthrough, ..defaults }
+    };
+    let tmux = Some(Multiplexer::Tmux);
+    for (terminal, queue, rate, expected) in [
+        (ssh(None, Some(ms(100)), None), true, None, PacingMode::AckClocked(None)),
+        (ssh(None, Some(ms(1)), None), true, None, PacingMode::SendQueue),
+        (ssh(None, Some(ms(1)), None), false, None, PacingMode::FixedRate),
+        (ssh(None, None, None), false, None, PacingMode::FixedRate),
+        (ssh(tmux, Some(ms(1)), Some(ms(100))), true, None, PacingMode::AckClocked(tmux)),
+        (ssh(tmux, Some(ms(1)), None), true, None, PacingMode::SendQueue),
+        (ssh(tmux, Some(ms(1)), None), false, None, PacingMode::FixedRate),
+        (ssh(None, Some(ms(100)), None), true, Some(5e3), PacingMode::FixedRate),
+        (
+            Capabilities::from_environment(Environment::default()),
+            false,
+            None,
+            PacingMode::Unlimited,
+        ),
+    ] {
+        let start = InitialLink::of(&terminal, queue, rate);
+        assert_eq!(start.mode, expected, "{terminal:?}");
+        assert_eq!(start.fixed_rate, rate.unwrap_or(DEFAULT_RATE));
+    }
+}

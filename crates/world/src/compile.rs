@@ -1,0 +1,494 @@
+//! Compilation of a scene into a [`World`], step by step: geometry translated to the scene's
+//! centre, materials, lights, transmission, culling.
+
+use crate::culling::light_buffer::LightBuffer;
+use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
+use crate::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
+use crate::emissive_sheets::{Emits, move_off_surfaces};
+use crate::integrator::indirect_diffuse::DiffuseLimits;
+use crate::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
+use crate::integrator::surface_textures::SurfaceTextures;
+use crate::light_choice::LightChoice;
+use crate::light_groups::{LightGroupSource, LightGroups};
+use crate::lights_on_surfaces::OnSurface;
+use crate::radiance_range::SceneDistances;
+use crate::scene_inventory::inventory;
+use crate::surface_emission::SurfaceEmission;
+use crate::truncation_bias;
+use crate::world::{
+    DeltaSource, EmitterSource, EnvironmentSource, LightSource, ShadowRayTarget, World,
+};
+use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
+use zerkalo_kernel::lanes::{Float, SimdFloat};
+use zerkalo_kernel::primitive::{
+    AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
+};
+use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
+use zerkalo_scene::material::{Bsdf, Material};
+use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
+
+/// Geometry of all objects in double precision, translated so that the scene's centre is the
+/// origin.
+pub(super) struct RecenteredGeometry {
+    /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
+    pub origin: DVec3,
+    /// Geometry of each object in canonical form, with its transform applied.
+    pub forms: Vec<Form>,
+    /// Largest absolute coordinate, relative to `origin`, of the camera's lens and of all shapes
+    /// with finite bounds.
+    pub extent: f64,
+}
+
+impl RecenteredGeometry {
+    pub fn new(scene: &Scene) -> Self {
+        let forms: Vec<Form> = scene
+            .objects
+            .iter()
+            .map(|object| object.shape.form().transformed(&object.scene_from_object()))
+            .collect();
+        let bounds = || forms.iter().filter_map(|form| form.bounds());
+        let low = bounds().map(|b| b.0).reduce(DVec3::min);
+        let high = bounds().map(|b| b.1).reduce(DVec3::max);
+        let scene_eye = DVec3::from(scene.camera.eye);
+        let origin = match (low, high) {
+            (Some(low), Some(high)) => 0.5 * (low + high),
+            _ => scene_eye,
+        };
+        let to_origin = DAffine3::from_translation(-origin);
+        let forms: Vec<Form> = forms.into_iter().map(|f| f.transformed(&to_origin)).collect();
+        let farthest_corners = forms
+            .iter()
+            .filter_map(|form| form.bounds())
+            .map(|(low, high)| low.abs().max(high.abs()));
+        let lens = (scene_eye - origin).abs() + DVec3::splat(scene.camera.lens_radius());
+        let extent = farthest_corners.fold(lens, DVec3::max).max_element();
+        Self { origin, forms, extent }
+    }
+
+    /// Returns the largest rounding error of the coordinates in the scene file. The error is in
+    /// proportion to the distance between the scene's centre and the origin of the file's
+    /// coordinates.
+    pub fn input_error(&self) -> f64 {
+        f64::EPSILON * self.origin.abs().max_element()
+    }
+}
+
+/// Distinct materials of a scene and their BSDFs.
+struct CompiledMaterials<'a, S> {
+    /// Distinct materials, in order of first use.
+    materials: Vec<&'a Material>,
+    /// BSDF of each of `materials`.
+    bsdfs: Vec<Bsdf<S>>,
+    /// Indices into `materials`. The outer list has an entry for each object, the inner list has an
+    /// entry for each part of the object.
+    of_object: Vec<Vec<u32>>,
+}
+
+impl<'a, S: Float> CompiledMaterials<'a, S> {
+    /// Compiles the materials of all objects and their parts. `default` replaces materials whose
+    /// names the scene does not define.
+    fn new(scene: &'a Scene, default: &'a Material) -> Self {
+        let mut materials: Vec<&Material> = Vec::new();
+        let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
+        let mut index_of = |name: &'a str| {
+            *index_of_name.entry(name).or_insert_with(|| {
+                let material = scene.materials.get(name).unwrap_or(default);
+                let known = materials.iter().position(|m| *m == material);
+                if known.is_none() {
+                    materials.push(material);
+                }
+                known.unwrap_or(materials.len() - 1) as u32
+            })
+        };
+        let of_object = scene
+            .objects
+            .iter()
+            .map(|object| {
+                let parts = object.shape.part_materials(&object.material);
+                parts.into_iter().map(&mut index_of).collect()
+            })
+            .collect();
+        let reflects = scene.trace.ray_types == RayTypes::Full && scene.trace.max_depth > 0;
+        let bsdfs = materials.iter().map(|material| Bsdf::new(material, reflects)).collect();
+        Self { materials, bsdfs, of_object }
+    }
+
+    fn index(&self, primitive: &PrimitiveId) -> u32 {
+        self.of_object[primitive.form][primitive.part]
+    }
+
+    fn material(&self, primitive: &PrimitiveId) -> &'a Material {
+        self.materials[self.index(primitive) as usize]
+    }
+
+    /// Returns the materials of the parts of object number `object`.
+    fn of_parts(&self, object: usize) -> Vec<&'a Material> {
+        self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
+    }
+
+    /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
+    /// of the camera. Returns `None` if no object is moved.
+    fn move_emissive_sheets(
+        &self,
+        geometry: &RecenteredGeometry,
+        eye: DVec3,
+    ) -> Option<RecenteredGeometry> {
+        let emits = |materials: &Vec<u32>| {
+            let emissive = |index: &&u32| self.materials[**index as usize].emits();
+            match materials.iter().find(emissive) {
+                Some(index) if self.materials[*index as usize].two_sided => Emits::BothSides,
+                Some(_) => Emits::Front,
+                None => Emits::Nothing,
+            }
+        };
+        let emits: Vec<Emits> = self.of_object.iter().map(emits).collect();
+        if emits.iter().all(|emits| *emits == Emits::Nothing) {
+            return None;
+        }
+        let transmits = |index: &u32| self.bsdfs[*index as usize].transmission.is_some();
+        let of_object = self.of_object.iter();
+        let transmits: Vec<bool> = of_object.map(|list| list.iter().any(transmits)).collect();
+        move_off_surfaces(geometry, (&emits, &transmits), eye, emitter_lift::<S>(geometry))
+    }
+
+    /// Returns `true` if some material reflects light that arrives directly from lights.
+    fn has_direct(&self) -> bool {
+        self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
+    }
+
+    /// Returns `true` if some material reflects ambient light.
+    fn has_ambient(&self) -> bool {
+        self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
+    }
+
+    /// Returns the limits of indirect diffuse light: the largest number of bounces, and whether
+    /// caustics are included. Returns `None` if the scene switches indirect diffuse light off, or
+    /// if no material is matt.
+    fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
+        let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
+        let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
+        let traced = scene.trace.ray_types == RayTypes::Full && depth > 0;
+        (traced && self.materials.iter().any(is_matt)).then_some(DiffuseLimits { depth, caustics })
+    }
+
+    /// Returns `true` if some surface reflects or transmits rays.
+    fn has_secondary(&self) -> bool {
+        self.bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() || bsdf.transmission.is_some())
+    }
+}
+
+/// Height of emitters (lights with a size) above the surfaces that they touch. The unit is the
+/// larger of two rounding errors: that of the scene's extent, and that of the coordinates in the
+/// scene file. Rays that leave a surface start at about half this height, below the emitter, so
+/// they can hit the emitter.
+const EMITTER_LIFT: f64 = 16.0;
+
+/// Returns a distance that serves two purposes. Points are sampled at this height above emissive
+/// objects. Lights with a size are moved by this distance off the finite surfaces that they touch.
+fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
+    EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
+}
+
+/// Largest distance by which a sphere light, or a light whose centre is on no surface, is moved off
+/// the surfaces that it touches. The unit is the light's radius or shorter side.
+const MAX_LIFT: f64 = 1e-4;
+
+/// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
+/// touches; see [`Emitter::new`]. Infinite surfaces are not part of the scene's extent, so that the
+/// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
+/// own coordinates then counts as well.
+fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
+    let lift = emitter_lift::<S>(geometry);
+    let Some(surface) = light.surface() else { return lift };
+    let center = surface.center() - geometry.origin;
+    let largest = center.abs().max_element() + surface.radius();
+    let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
+    let max_lift = MAX_LIFT * surface.thickness();
+    // A sphere touches a flat surface at a single point, which is too small to see.
+    if matches!(surface, EmitterSurface::Sphere(_)) {
+        return lift.min(max_lift);
+    }
+    let lift_on = |form: &Form| {
+        let lift = if form.bounds().is_some() { lift } else { lift_on_infinite };
+        if lift <= max_lift && form.bounds().is_some() {
+            return None;
+        }
+        form.clearance(center).filter(|distance| *distance <= lift).map(|_| lift)
+    };
+    let lifts = geometry.forms.iter().filter_map(lift_on);
+    lifts.fold(lift.min(max_lift), f64::max)
+}
+
+/// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
+/// lights are left out. `emitting` has three values for each light that emits: its index in the
+/// scene, the index of its light group, and its emission. The tracer multiplies samples of the
+/// light by the emission.
+fn light_sources<T, S: Float>(
+    scene: &Scene,
+    emitting: &[(usize, usize, [f64; 3])],
+    compile: impl Fn(&Light) -> Option<T>,
+) -> Vec<LightSource<T, S>> {
+    let source = |&(index, group, emission): &(usize, usize, [f64; 3])| {
+        let light = compile(&scene.lights[index])?;
+        let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+        Some(LightSource { light, group, emission, visible: scene.lights[index].visible })
+    };
+    emitting.iter().filter_map(source).collect()
+}
+
+/// Lights of a scene and their light groups, with the scale of each group: the number of integer
+/// steps per unit of radiance in the film.
+struct CompiledLights<S> {
+    groups: LightGroups,
+    scales: Vec<f64>,
+    sources: Vec<DeltaSource<S>>,
+    choice: Option<LightChoice<S>>,
+    emitters: Vec<EmitterSource<S>>,
+    environments: Vec<EnvironmentSource<S>>,
+    emission: SurfaceEmission<S>,
+}
+
+impl<S: Float> CompiledLights<S> {
+    fn new(
+        scene: &Scene,
+        geometry: &RecenteredGeometry,
+        materials: &CompiledMaterials<S>,
+        primitives: &[PrimitiveId],
+        camera: &PerspectiveCamera,
+        merge_lights: bool,
+    ) -> Self {
+        let reflected = (materials.has_direct(), materials.has_ambient());
+        let groups = LightGroups::new(scene, reflected, merge_lights);
+        let lift = emitter_lift::<S>(geometry);
+        let materials_of = |object: usize| materials.of_parts(object);
+        let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
+        let emitter =
+            |light: &Light| Emitter::new(light, geometry.origin, light_lift::<S>(geometry, light));
+        let scales = groups.scales::<S>(scene, geometry.origin, emitter, &distances);
+        let emitting = groups.lights(scene);
+        let delta_light = |light: &Light| {
+            let delta = DeltaLight::new(light, geometry.origin)?;
+            let on_surface = light.apex().and_then(|position| {
+                let position = DVec3::from(position) - geometry.origin;
+                OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
+            });
+            Some(ShadowRayTarget { light: delta, on_surface })
+        };
+        let mut sources = light_sources(scene, &emitting, delta_light);
+        let choice = LightChoice::take(&mut sources, &groups.many, geometry.extent);
+        let emitters = light_sources(scene, &emitting, emitter);
+        let environments = light_sources(scene, &emitting, EnvironmentLight::new);
+        let start = start_region(scene, camera);
+        let is_entered = |form: usize| {
+            let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
+            materials.of_object[form].iter().any(transmits) || start.reaches(&geometry.forms[form])
+        };
+        let emission =
+            SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift, is_entered);
+        Self { groups, scales, sources, choice, emitters, environments, emission }
+    }
+
+    /// Returns the target of shadow rays to each light without a size: the position of the light,
+    /// or the direction to it.
+    fn targets(&self) -> Vec<LightTarget> {
+        let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
+        let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
+            DeltaLight::Point { position, .. } => LightTarget::Point(vector(position)),
+            DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
+        };
+        self.sources.iter().map(target_of_source).collect()
+    }
+
+    /// Returns bounding spheres in this order: lights with a size, emissive objects on which points
+    /// are sampled, and the spatial groups (strata) of lights in `self.choice`.
+    fn emitter_bounds(&self) -> Vec<BoundingSphere> {
+        let emitters = self.emitters.iter().map(|source| &source.light);
+        let emitters = emitters.map(|light| (light.center(), light.radius()));
+        let objects = self.emission.emitters().map(|light| (light.center, light.radius));
+        let balls = emitters.chain(objects);
+        let balls = balls.map(|(center, radius)| BoundingSphere { center, radius });
+        balls.chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
+    }
+
+    /// Returns the number of lists of possible occluders: one for each light in `sources`, each
+    /// light with a size, each object from which light is sampled, and each stratum (spatial group
+    /// of lights) of `choice`. Environments have no list.
+    fn count(&self) -> usize {
+        let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
+        self.sources.len() + self.emitters.len() + self.emission.counts()[0] + strata
+    }
+
+    /// Returns the largest distance between a light on a surface and the end point of its shadow
+    /// rays; 0 if no light is on a surface.
+    fn max_end_offset(&self) -> f64 {
+        let on_surfaces = self.sources.iter().filter_map(|source| source.light.on_surface.as_ref());
+        on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max)
+    }
+}
+
+/// Compiled culling of a scene: the method that makes the candidate lists of a tile (primitives
+/// that a ray must be tested against), the candidates of all rays of the picture together, and the
+/// light buffers.
+struct CompiledCulling<S> {
+    mode: CullingMode,
+    all_candidates: TileCandidates,
+    light_buffers: Vec<Option<LightBuffer<S>>>,
+}
+
+impl<S: Float> CompiledCulling<S> {
+    /// Compiles the culling data of a scene. `outside_only` has one entry for each primitive:
+    /// `true` if rays hit it only from outside.
+    fn new<L: SimdFloat<Scalar = S>>(
+        scene: &Scene,
+        recentered: &RecenteredGeometry,
+        geometry: &Aggregate<L>,
+        camera: &PerspectiveCamera,
+        lights: &CompiledLights<S>,
+        outside_only: &[bool],
+    ) -> Self {
+        let mut all_candidates = TileCandidates::all(geometry, lights.count());
+        let mut light_buffers = Vec::new();
+        let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
+        let forms = || geometry.sources().iter().map(form_of);
+        let mode = match scene.trace.acceleration {
+            Acceleration::Auto => {
+                let light_targets = (lights.targets(), lights.max_end_offset());
+                let emitters = lights.emitter_bounds();
+                let culler =
+                    FrustumCuller::new(forms().collect(), outside_only, light_targets, emitters);
+                all_candidates = culler.candidates(geometry, None);
+                if geometry.has_tree() {
+                    if scene.trace.ray_types >= RayTypes::Shadows {
+                        light_buffers = culler.light_buffers(geometry);
+                    }
+                    let project = |primitive: u32| {
+                        let form = form_of(&geometry.sources()[primitive as usize]);
+                        (primitive, ScreenBounds::project(form, camera))
+                    };
+                    let bounds = geometry.in_tree().into_iter().map(project);
+                    let size = scene.film.size.map(|n| n as usize);
+                    CullingMode::ScreenGrid(ScreenGrid::new(size, bounds))
+                } else {
+                    CullingMode::Frusta(culler)
+                }
+            }
+            Acceleration::ScreenBounds => CullingMode::ScreenBounds(
+                forms().map(|form| ScreenBounds::project(form, camera)).collect(),
+            ),
+            _ => CullingMode::Off,
+        };
+        Self { mode, all_candidates, light_buffers }
+    }
+}
+
+/// Returns the region in which camera rays start: a sphere around the eye. It contains the lens and
+/// every start point on the near plane.
+fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
+    let size = scene.film.size.map(|n| n as usize);
+    let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
+    let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
+    let near = scene.camera.near;
+    let lens = camera.lens().map_or(0.0, |lens| {
+        // The radius includes a margin for rounding errors of ray origins on the lens.
+        let error = F32_RAY_ERROR * (lens.radius + camera.eye().abs().max_element());
+        lens.blur(near) + error
+    });
+    StartRegion { eye: camera.eye(), radius: near * farthest_corner + lens }
+}
+
+impl<L: SimdFloat> World<L> {
+    /// Compiles `scene`, which must have no validation errors.
+    pub fn new(scene: &Scene) -> Self {
+        Self::compile(scene, &RecenteredGeometry::new(scene), false)
+    }
+
+    #[inline(never)]
+    pub(super) fn compile(
+        scene: &Scene,
+        recentered: &RecenteredGeometry,
+        merge_lights: bool,
+    ) -> Self {
+        let level = scene.trace.ray_types;
+        let default_material = Material::default();
+        let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
+        let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
+        let moved = materials.move_emissive_sheets(recentered, camera.eye());
+        let recentered = moved.as_ref().unwrap_or(recentered);
+        let structure = match scene.trace.acceleration {
+            Acceleration::Auto => AccelerationStructure::fastest(&recentered.forms),
+            Acceleration::None => AccelerationStructure::List("bare list"),
+            Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
+            Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
+            Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
+            Acceleration::Bvh => AccelerationStructure::Bvh,
+        };
+        let geometry = Aggregate::with_structure(&recentered.forms, structure);
+        let primitives = geometry.sources();
+        let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
+        let material_of = |id: &PrimitiveId| materials.material(id);
+        let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
+        let lights =
+            CompiledLights::new(scene, recentered, &materials, primitives, &camera, merge_lights);
+        let nested_dielectrics = NestedDielectrics::new(
+            recentered,
+            primitives,
+            &bsdf_of,
+            &materials.bsdfs,
+            start_region(scene, &camera),
+        );
+        let entered = nested_dielectrics
+            .as_ref()
+            .map_or(vec![false; bsdf_of.len()], NestedDielectrics::entered);
+        // Without a near plane, camera rays start on the lens. With one, they start on the plane
+        // and thus possibly inside of a primitive; `start` is `None` then.
+        let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
+        let start = (scene.camera.near == 0.0).then_some(lens);
+        let forms = primitives.iter().map(|id| &recentered.forms[id.form]);
+        let outside_only = outside_only(forms, start, &entered);
+        let culling =
+            CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
+        let smooth =
+            geometry.is_smooth() || textures.as_ref().is_some_and(SurfaceTextures::is_bumped);
+        let colored =
+            geometry.is_colored() || textures.as_ref().is_some_and(SurfaceTextures::is_colored);
+        let has_background = scene.background.color.0 != [0.0; 3];
+        let background = lights.groups.find(&LightGroupSource::Background);
+        let mut world = Self {
+            smooth,
+            colored,
+            simple: !smooth && !colored && geometry.has_no_tree(),
+            surface_textures: textures,
+            shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
+            depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },
+            diffuse_limits: materials.diffuse_limits(scene),
+            min_weight: scene.trace.min_throughput,
+            fold: scene.trace.below_horizon == BelowHorizon::Fold,
+            nested_dielectrics,
+            geometry,
+            outside_only,
+            bsdf_of,
+            bsdfs: materials.bsdfs,
+            ambient: lights.groups.find(&LightGroupSource::Ambient),
+            background: background.filter(|_| has_background),
+            group_names: lights.groups.names(scene),
+            groups: lights.groups,
+            scales: lights.scales,
+            sources: lights.sources,
+            light_choice: lights.choice,
+            emitters: lights.emitters,
+            environments: lights.environments,
+            emission: lights.emission,
+            culling: culling.mode,
+            all_candidates: culling.all_candidates,
+            light_buffers: culling.light_buffers,
+            camera,
+            jitter: scene.film.filter == Filter::Box,
+            inventory: String::new(),
+            truncation_biases: truncation_bias::truncation_bounds(scene),
+        };
+        world.inventory = inventory(scene, &world);
+        world
+    }
+}

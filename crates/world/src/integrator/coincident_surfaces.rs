@@ -1,0 +1,476 @@
+//! Coincident surfaces: surfaces of different primitives at the same position, such as the bottom
+//! of a glass and the table below it.
+//!
+//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
+//! them starts beyond the others. Paths therefore cross coincident surfaces in a fixed order if at
+//! least one of them transmits. The order is that of primitives with a gap of zero width: a ray
+//! first leaves the solids that it is inside, then crosses flat primitives, then enters the solids
+//! behind. Several solids on the same side of a surface count as nested. Transparent solids enclose
+//! opaque ones, and a transparent solid encloses those that the scene file lists before it. Flat
+//! transparent primitives are on both sides of opaque ones.
+//!
+//! The *layer* of a surface is a number that gives its position in this order along the ray.
+//! Surfaces where the ray leaves a solid have negative layers, surfaces where it enters a solid
+//! have positive ones. For a ray of the opposite direction the signs change. A *contact* is a
+//! primitive that may touch another one. Contacts are found at compilation, so that hits on other
+//! primitives cost no lookup.
+
+use crate::integrator::nested_dielectrics::MediumStack;
+use glam::DVec3;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
+use zerkalo_scene::value::{ascending, total_order};
+
+/// Tie distance: the largest distance along the normal at which a surface counts as coincident with
+/// the surface of a hit point. The unit is the rounding error of the largest coordinate. The module
+/// `primitive::csg` uses the same value for surfaces of parts of a compound.
+const TIE: f64 = 16.0;
+
+/// Height above coincident surfaces at which rays that leave them start, in tie distances. Surfaces
+/// within one tie distance of each other count as coincident.
+const OFFSET_TIES: f64 = 1.5;
+
+/// Smallest cosine between the normals of two surfaces that count as coincident. Surfaces at larger
+/// angles intersect in a line, and rays cross them in the order of distance.
+const MIN_COSINE: f64 = 0.5;
+
+/// Kind of a surface, which determines the order in which rays cross coincident surfaces.
+#[derive(Clone, Copy, Debug)]
+enum SurfaceKind {
+    /// Boundary of a transparent solid. The value is its priority (see [`MediumStack`]).
+    Transparent(u32),
+    /// Boundary of an opaque solid, which no ray enters.
+    Opaque,
+    /// Flat transparent primitive without inside, such as a window pane.
+    Pane,
+    /// Flat opaque primitive without inside, such as a sheet of paper.
+    Sheet,
+}
+
+/// Contact of a primitive, in the list of its contacts: another primitive that may touch it.
+#[derive(Clone, Copy, Debug)]
+struct Contact<S> {
+    /// Id of the touching primitive. For a compound, the id of its first part.
+    primitive: u32,
+    /// Distance \[scene units\] within which the surfaces of a primitive and of the one that
+    /// touches it count as coincident. It is larger at points with larger rounding errors; see
+    /// [`Contact::tie`].
+    tie: S,
+    /// Lowest corner of the touching primitive's bounding box; infinite along axes on which it is
+    /// unbounded.
+    low: [S; 3],
+    /// Highest corner of the touching primitive's bounding box.
+    high: [S; 3],
+}
+
+impl<S: Float> Contact<S> {
+    fn new(primitive: u32, form: &Form, tie: f64) -> Self {
+        let (low, high) = unbounded_box(form);
+        let [low, high] = [low, high].map(|corner| corner.to_array().map(S::from_f64));
+        Self { primitive, tie: S::from_f64(tie), low, high }
+    }
+
+    /// Returns the distance within which the surfaces of a primitive and of the one that touches it
+    /// count as coincident: the larger of the field `tie` and the parameter `rounding`. The
+    /// parameter is the result of the function [`rounding`] for the points that are tested.
+    #[inline(always)]
+    fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
+        rounding.max(L::splat(self.tie))
+    }
+
+    /// Returns the lanes whose point may be on the touching primitive: the distance of the point
+    /// from the primitive's bounding box is at most two tie distances (see [`Contact::tie`]). One
+    /// tie distance is the range of the search for coincident surfaces. The other is a margin for
+    /// the rounding error of the search. `rounding` is the parameter of [`Contact::tie`].
+    #[inline(always)]
+    fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
+        let distance =
+            |p: L, axis: usize| (L::splat(self.low[axis]) - p).max(p - L::splat(self.high[axis]));
+        let distance = distance(point.x, 0).max(distance(point.y, 1)).max(distance(point.z, 2));
+        let tie = self.tie(rounding);
+        distance.le(tie + tie)
+    }
+}
+
+/// Returns the largest rounding error of each point's coordinates, multiplied by [`TIE`]. Surfaces
+/// within this distance count as coincident.
+#[inline(always)]
+fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
+    point.max_abs() * L::from_f64(TIE * L::EPSILON)
+}
+
+/// Pairs of primitives that may touch each other. In each pair at least one primitive transmits.
+pub(crate) struct Contacts<S> {
+    /// For each primitive, the primitives that may touch it.
+    contacts: Vec<Vec<Contact<S>>>,
+    /// Two values for each primitive: the kind of its surface, and the magnitude of its layer. A
+    /// layer is the position of a surface in the order in which a ray crosses coincident surfaces;
+    /// its sign depends on the direction of the ray.
+    kinds: Vec<(SurfaceKind, S)>,
+}
+
+/// State of rays that start on a surface that may coincide with other surfaces.
+#[derive(Clone, Copy)]
+pub(crate) struct CoincidentState<L: SimdFloat> {
+    /// Lanes whose rays start on a surface that may coincide with others.
+    pub lanes: L::Mask,
+    /// Ids of the primitives on which the rays start, by lane.
+    pub primitive: L,
+    /// Points on the primitives at which the rays start.
+    pub point: Vec3<L>,
+    /// Unit normals of the start surfaces, on the side to which the rays leave.
+    pub axis: Vec3<L>,
+    /// Layer of each start surface: its position in the order in which a ray crosses coincident
+    /// surfaces.
+    pub layer: L,
+}
+
+/// Result of a search for the next coincident surface along the rays.
+pub(crate) struct CoincidentQuery<L: SimdFloat> {
+    /// Lanes in which a next coincident surface was found.
+    pub lanes: L::Mask,
+    /// Lanes whose start surface coincides with another one.
+    pub touching: L::Mask,
+    pub primitive: L,
+    pub triangle: L,
+    pub layer: L,
+    /// Distance between the surface and the origins of rays that leave it. It is so large that the
+    /// origins are beyond all coincident surfaces.
+    pub offset: L,
+}
+
+impl<L: SimdFloat> CoincidentState<L> {
+    /// Returns the state of rays that start at the same points but run in the opposite directions.
+    pub fn reversed(&self) -> Self {
+        Self { axis: -self.axis, layer: -self.layer, ..*self }
+    }
+
+    /// Returns the state `yes` in lanes where `mask` is true, and `no` elsewhere. The field `lanes`
+    /// is always that of `no`.
+    pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        Self {
+            lanes: no.lanes,
+            primitive: L::select(mask, yes.primitive, no.primitive),
+            point: Vec3::select(mask, yes.point, no.point),
+            axis: Vec3::select(mask, yes.axis, no.axis),
+            layer: L::select(mask, yes.layer, no.layer),
+        }
+    }
+}
+
+impl<S: Float> Contacts<S> {
+    /// Finds the primitives that may touch each other. Returns `None` if no primitive that
+    /// transmits touches another one.
+    ///
+    /// `epsilon` is the relative rounding error of coordinates. `input_error` is the absolute
+    /// rounding error of the coordinates in the scene file. `transparent` holds `true` for each
+    /// primitive that transmits. `priority_of` holds the priority of the transparent solid that
+    /// each primitive bounds.
+    pub fn new(
+        forms: &[Form],
+        primitives: &[PrimitiveId],
+        (transparent, priority_of): (&[bool], &[u32]),
+        (epsilon, input_error): (f64, f64),
+    ) -> Option<Self> {
+        let mut first = vec![0; forms.len()];
+        let mut transmits = vec![false; forms.len()];
+        for (primitive, source) in (0..).zip(primitives) {
+            if source.part == 0 {
+                first[source.form] = primitive;
+            }
+            transmits[source.form] |= transparent[primitive as usize];
+        }
+        let mut touching = vec![Vec::new(); forms.len()];
+        for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
+            let rounding = (epsilon * forms[a].max_coordinate().max(forms[b].max_coordinate()))
+                .max(input_error);
+            if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
+                let tie = TIE * rounding;
+                touching[a].push(Contact::new(first[b], &forms[b], tie));
+                touching[b].push(Contact::new(first[a], &forms[a], tie));
+            }
+        }
+        if touching.iter().all(Vec::is_empty) {
+            return None;
+        }
+        let count = forms.len() as f64;
+        let kind = |(primitive, source): (usize, &PrimitiveId)| {
+            let flat = forms[source.form].is_flat();
+            let number = source.form as f64;
+            let (kind, layer) = match (priority_of[primitive], flat, transparent[primitive]) {
+                (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
+                (0, true, false) => (SurfaceKind::Sheet, 0.0),
+                (0, false, _) => (SurfaceKind::Opaque, 4.0 * count + number),
+                (priority, ..) => {
+                    (SurfaceKind::Transparent(priority), 3.0 * count - f64::from(priority))
+                }
+            };
+            (kind, S::from_f64(layer))
+        };
+        let kinds = primitives.iter().enumerate().map(kind).collect();
+        let contacts = primitives.iter().map(|id| touching[id.form].clone()).collect();
+        Some(Self { contacts, kinds })
+    }
+
+    /// Returns the lanes whose `point`, on `primitives`, may be on a second primitive as
+    /// well. Points outside of the bounding boxes of all other primitives are excluded, because
+    /// most primitives touch others only in small regions.
+    #[inline(always)]
+    pub fn near<L: SimdFloat<Scalar = S>>(
+        &self,
+        primitives: L,
+        point: Vec3<L>,
+        lanes: L::Mask,
+    ) -> L::Mask {
+        let rounding = rounding(point);
+        let (mut near, mut remaining) = (L::mask(false), lanes);
+        while let Some((primitive, primitive_lanes)) = next_distinct(primitives, remaining) {
+            for contact in &self.contacts[primitive as usize] {
+                near = near | (primitive_lanes & contact.is_near(point, rounding));
+            }
+            remaining = remaining.and_not(primitive_lanes);
+        }
+        near
+    }
+
+    /// Returns the layer of `primitive`: its position in the order in which a ray crosses
+    /// coincident surfaces. `before` is the layer of the surface from which the rays come. `leaves`
+    /// selects rays that leave the primitive, along its outward normal.
+    fn layer<L: SimdFloat<Scalar = S>>(&self, primitive: u32, leaves: L::Mask, before: L) -> L {
+        let (kind, layer) = &self.kinds[primitive as usize];
+        let layer = L::splat(*layer);
+        let is_negative = match kind {
+            SurfaceKind::Pane => before.lt(L::zero()),
+            SurfaceKind::Sheet => return L::zero(),
+            SurfaceKind::Transparent(_) | SurfaceKind::Opaque => leaves,
+        };
+        L::select(is_negative, -layer, layer)
+    }
+
+    /// Finds the surface that the rays cross next among those that coincide with their start
+    /// points. `coincident` is the state of the rays: point, normal and position in the order of
+    /// crossing. `media` are the media of the rays.
+    pub fn next<L: SimdFloat<Scalar = S>>(
+        &self,
+        geometry: &Aggregate<L>,
+        coincident: &CoincidentState<L>,
+        media: &MediumStack<L>,
+    ) -> CoincidentQuery<L> {
+        let mut out = CoincidentQuery {
+            lanes: L::mask(false),
+            touching: L::mask(false),
+            primitive: coincident.primitive,
+            triangle: L::from_id(0),
+            layer: L::from_f64(L::MAX),
+            offset: L::zero(),
+        };
+        self.search(geometry, coincident, media, &mut out);
+        out
+    }
+
+    /// Finds the surface that the rays cross first: their start surface, given in `coincident`, or
+    /// one that coincides with it. The layer (position in the order of crossing) in `coincident` is
+    /// ignored. `leaves` selects rays that run in the direction of the outward normal of the start
+    /// surface. `media` are the media of the rays.
+    pub fn first<L: SimdFloat<Scalar = S>>(
+        &self,
+        geometry: &Aggregate<L>,
+        coincident: &CoincidentState<L>,
+        leaves: L::Mask,
+        media: &MediumStack<L>,
+    ) -> CoincidentQuery<L> {
+        let before = L::from_f64(-L::MAX);
+        let mut layer = L::zero();
+        let mut remaining = coincident.lanes;
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(coincident.primitive, remaining)
+        {
+            layer = L::select(primitive_lanes, self.layer(primitive, leaves, before), layer);
+            remaining = remaining.and_not(primitive_lanes);
+        }
+        let mut out = CoincidentQuery {
+            lanes: L::mask(false),
+            touching: L::mask(false),
+            primitive: coincident.primitive,
+            triangle: L::from_id(0),
+            layer,
+            offset: L::zero(),
+        };
+        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, media, &mut out);
+        out
+    }
+
+    /// Searches the surfaces that coincide with the start points of the rays in `coincident`. A
+    /// *layer* is the position of a surface in the fixed order in which a ray crosses coincident
+    /// surfaces. In each lane `out` holds the best candidate so far. A surface whose layer is above
+    /// that of `coincident` and below that of the candidate replaces the candidate. At the end
+    /// `out` therefore holds the surface that the ray crosses next.
+    #[inline(never)]
+    fn search<L: SimdFloat<Scalar = S>>(
+        &self,
+        geometry: &Aggregate<L>,
+        coincident: &CoincidentState<L>,
+        media: &MediumStack<L>,
+        out: &mut CoincidentQuery<L>,
+    ) {
+        let rounding = rounding(coincident.point);
+        let mut remaining = coincident.lanes;
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(coincident.primitive, remaining)
+        {
+            remaining = remaining.and_not(primitive_lanes);
+            for contact in &self.contacts[primitive as usize] {
+                let near = primitive_lanes & contact.is_near(coincident.point, rounding);
+                if near.none() {
+                    continue;
+                }
+                // The search ray runs along the surface normal through the start point, so that the
+                // result does not depend on the angle at which the path leaves.
+                let tie = contact.tie(rounding);
+                let origin = coincident.axis.mul_add(-tie, coincident.point);
+                let limit = L::select(near, tie + tie, L::from_f64(-1.0));
+                let ray = Ray { origin, direction: coincident.axis };
+                let hit = geometry.closest_to(contact.primitive, &ray, limit);
+                let mut found = near & hit.t.lt(limit);
+                while let Some((other, other_lanes)) = next_distinct(hit.primitive, found) {
+                    found = found.and_not(other_lanes);
+                    let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
+                    let cosine = normal.dot(coincident.axis);
+                    let leaves = cosine.gt(L::zero());
+                    let mut parallel = other_lanes & cosine.abs().gt(L::from_f64(MIN_COSINE));
+                    if let (SurfaceKind::Transparent(priority), _) = &self.kinds[other as usize] {
+                        // A path leaves only solids that it is inside of, and enters only solids
+                        // that it is outside of.
+                        let within = media.contains(L::from_f64(f64::from(*priority)));
+                        parallel = parallel & ((within & leaves) | (!within & !leaves));
+                    }
+                    let layer = self.layer(other, leaves, coincident.layer);
+                    out.touching = out.touching | parallel;
+                    out.offset = L::select(
+                        parallel,
+                        out.offset.max(tie * L::from_f64(OFFSET_TIES)),
+                        out.offset,
+                    );
+                    let nearer = parallel & layer.gt(coincident.layer) & layer.lt(out.layer);
+                    out.lanes = out.lanes | nearer;
+                    out.primitive = L::select(nearer, L::from_id(other), out.primitive);
+                    out.triangle = L::select(nearer, hit.triangle, out.triangle);
+                    out.layer = L::select(nearer, layer, out.layer);
+                }
+            }
+        }
+    }
+}
+
+/// Returns the lowest and the highest corner of an object's bounding box, with infinite coordinates
+/// if the object is unbounded. Planes perpendicular to an axis are bounded along that axis.
+fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
+    let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+    form.bounds().unwrap_or_else(|| {
+        let Some(plane) = form.plane() else { return (low, high) };
+        let is_normal = |axis: &&DVec3| plane.normal.dot(**axis).abs() == 1.0;
+        DVec3::AXES.iter().find(is_normal).map_or((low, high), |axis| {
+            let (bounded, point) = (axis.cmpne(DVec3::ZERO), plane.normal * plane.offset);
+            (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
+        })
+    })
+}
+
+/// Returns the indices of all pairs of objects for which `wanted` is true and whose bounding boxes
+/// overlap. Each box is enlarged by 1e-5 of its largest coordinate. The smaller index of a pair
+/// comes first, and the pairs are sorted.
+pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
+    let mut out = Vec::new();
+    let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+    let slack = 1e-5;
+    let padded_box = |form: &Form| {
+        form.bounds().map_or(infinite, |(low, high)| {
+            let margin = slack * low.abs().max(high.abs()).max_element();
+            (low - margin, high + margin)
+        })
+    };
+    let boxes: Vec<_> = forms.iter().map(padded_box).collect();
+    let order = ascending(boxes.iter().map(|(low, _)| total_order(low.x)).collect());
+    for (i, a) in order.iter().enumerate() {
+        let (low, high) = boxes[*a];
+        for b in order[i + 1..].iter().take_while(|b| boxes[**b].0.x <= high.x) {
+            let disjoint = boxes[*b].0.cmpgt(high).any() || boxes[*b].1.cmplt(low).any();
+            if !disjoint && wanted(*a, *b) {
+                out.push((*a.min(b), *a.max(b)));
+            }
+        }
+    }
+    // Sorted by index, so that the order does not depend on positions.
+    out.sort_unstable();
+    out
+}
+
+/// Returns the indices of all pairs of objects for which `wanted` is true and whose surfaces may
+/// come within `slack` of each other.
+pub(crate) fn touching_pairs(
+    forms: &[Form],
+    wanted: impl Fn(usize, usize) -> bool,
+    slack: f64,
+) -> impl Iterator<Item = (usize, usize)> {
+    pairs(forms, wanted).into_iter().filter(move |(a, b)| may_touch(&forms[*a], &forms[*b], slack))
+}
+
+/// Returns `true` if the surfaces of two objects may come within `slack` of each other.
+fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
+    let normal = |form: &Form| form.plane().map(|plane| plane.normal);
+    let separated = |axis: DVec3| match (a.extent_along(axis), b.extent_along(axis)) {
+        (Some(a), Some(b)) => a.0 > b.1 + slack || b.0 > a.1 + slack,
+        _ => false,
+    };
+    if DVec3::AXES.into_iter().chain(normal(a)).chain(normal(b)).any(separated) {
+        return false;
+    }
+    if let (
+        Form::Sphere(SphereForm { center, radius }),
+        Form::Sphere(SphereForm { center: other, radius: size }),
+    ) = (a, b)
+    {
+        let distance = center.distance(*other);
+        // Two spheres can touch side by side, or one inside the other.
+        return distance <= radius + size + slack && distance + slack >= (radius - size).abs();
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use zerkalo_kernel::primitive::PlaneForm;
+    use zerkalo_scene::shape::Shape;
+
+    #[test]
+    fn contacts_are_pairs_of_touching_forms() {
+        let ball =
+            |y: f64, radius| Form::Sphere(SphereForm { center: DVec3::new(0.0, y, 0.0), radius });
+        let plane = |normal: DVec3, offset| Form::Plane(PlaneForm { normal, offset });
+        let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
+        let slanted = DVec3::new(0.6, 0.8, 0.0);
+        for (a, b, touch) in [
+            (ball(1.0, 1.0), plane(DVec3::Y, 0.0), true),
+            (ball(1.1, 1.0), plane(DVec3::Y, 0.0), false),
+            (ball(1.0, 1.0), plane(slanted, -0.2), true),
+            (ball(1.1, 1.0), plane(slanted, -0.2), false),
+            (ball(0.0, 1.0), ball(2.0, 1.0), true),
+            (ball(0.0, 1.0), ball(0.0, 0.9), false),
+            (ball(0.0, 1.0), ball(0.1, 0.9), true),
+            (ball(0.0, 1.0), ball(2.1, 1.0), false),
+            (cube.clone(), plane(DVec3::NEG_Y, 0.0), true),
+            (cube.clone(), plane(DVec3::Y, -0.1), false),
+            (cube.clone(), ball(-1.0, 1.0), true),
+            (plane(DVec3::Y, 1.0), plane(DVec3::NEG_Y, -1.0), true),
+            (plane(DVec3::Y, 1.0), plane(DVec3::Y, 1.1), false),
+        ] {
+            assert_eq!(may_touch(&a, &b, 1e-6), touch, "{a:?} {b:?}");
+            assert_eq!(may_touch(&b, &a, 1e-6), touch, "{b:?} {a:?}");
+        }
+        let forms = [ball(0.0, 1.0), plane(DVec3::Y, 7.0), ball(5.0, 1.0), ball(0.5, 1.0)];
+        let found = pairs(&forms, |a, b| a == 1 || b == 1 || a + b == 3);
+        assert_eq!(found, [(0, 1), (0, 3), (1, 2), (1, 3)]);
+    }
+}

@@ -1,0 +1,208 @@
+//! Surface interactions: normals, ray offsets and BSDFs at the hit points of a packet.
+
+use crate::integrator::surface_textures::{ShadingPoints, albedo_factor, shading_normal};
+use crate::world::World;
+use zerkalo_kernel::bvh::{Hit, Ray};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+
+/// Surface properties at the hit points of a packet.
+pub(crate) struct SurfaceInteraction<L: SimdFloat> {
+    /// Unit shading normal, on the side from which the rays arrive.
+    pub normal: Vec3<L>,
+    /// Unit geometric normal, on the side from which the rays arrive. It differs from `normal` only
+    /// on smooth meshes and bump-mapped surfaces. Light from the other side of the geometric
+    /// surface does not reach the hit point.
+    pub geometric: Vec3<L>,
+    /// Hit points of the packet's rays.
+    pub point: Vec3<L>,
+    /// Distance between the hit point and the origins of secondary rays, along the geometric
+    /// normal.
+    pub offset: L,
+    /// Lanes whose rays hit the front of the primitive: the side to which the normal of the
+    /// primitive itself points.
+    pub front: L::Mask,
+    /// Ids of the primitives that are hit.
+    pub primitive: L,
+    /// Index of each hit point's BSDF in the world's list, stored as an id (see
+    /// [`SimdFloat::from_id`]).
+    bsdf: L,
+    /// Factor by which textures and vertex colours multiply the albedo of the BSDF.
+    pub albedo_factor: Vec3<L>,
+    /// Diffuse albedo at the hit points.
+    pub diffuse: Vec3<L>,
+    /// Lanes whose hit point has a BSDF. All hit points have one, except for those on the back of a
+    /// one-sided surface.
+    pub has_bsdf: L::Mask,
+    /// Lanes whose BSDF reflects light that arrives directly from lights.
+    pub direct_mask: L::Mask,
+    /// Lanes whose BSDF has a highlight model: a specular term that is evaluated for light that
+    /// arrives directly from lights.
+    pub highlight_mask: L::Mask,
+    /// Lanes whose BSDF has a reflection lobe, from which reflected rays are sampled.
+    pub reflecting: L::Mask,
+    /// Lanes whose hit point gets no light from any light, because a coincident surface is in front
+    /// of it; see [`Self::shade`].
+    pub shaded: L::Mask,
+}
+
+impl<L: SimdFloat> SurfaceInteraction<L> {
+    /// Iterates over the BSDFs that occur in `lanes`: the index of each, and the lanes that have
+    /// it.
+    #[inline(always)]
+    pub fn bsdfs(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
+        let (bsdf, mut remaining) = (self.bsdf, lanes);
+        std::iter::from_fn(move || {
+            let (index, lanes) = next_distinct(bsdf, remaining)?;
+            remaining = remaining.and_not(lanes);
+            Some((index as usize, lanes))
+        })
+    }
+
+    /// Returns the origins of rays that leave on the side from which the incoming rays arrived.
+    #[inline(always)]
+    pub fn ray_origin(&self) -> Vec3<L> {
+        self.geometric.mul_add(self.offset, self.point)
+    }
+
+    /// Returns the origins of rays that leave on the side opposite to that of the incoming rays.
+    #[inline(always)]
+    pub fn ray_origin_behind(&self) -> Vec3<L> {
+        self.geometric.mul_add(-self.offset, self.point)
+    }
+
+    /// Removes the BSDF from the hit points in `lanes`.
+    #[inline(always)]
+    pub fn mask_out(&mut self, lanes: L::Mask) {
+        self.has_bsdf = self.has_bsdf.and_not(lanes);
+        self.direct_mask = self.direct_mask.and_not(lanes);
+        self.highlight_mask = self.highlight_mask.and_not(lanes);
+        self.reflecting = self.reflecting.and_not(lanes);
+    }
+
+    /// Treats the hit points in `lanes` as unlit: neither lights nor emissive objects are sampled
+    /// for them.
+    #[inline(always)]
+    pub fn shade(&mut self, lanes: L::Mask) {
+        self.direct_mask = self.direct_mask.and_not(lanes);
+        self.shaded = self.shaded | lanes;
+    }
+
+    /// Returns `direction`. In lanes in which it points into the geometric surface, it is mirrored
+    /// at the tangent plane of this surface.
+    #[inline(always)]
+    pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
+        let height = direction.dot(self.geometric).min(L::zero());
+        self.geometric.mul_add(height * L::from_f64(-2.0), direction)
+    }
+
+    /// Replaces the hit points in `lanes` by those of `other`. All masks of `self` must be `false`
+    /// in these lanes.
+    #[inline(always)]
+    fn blend(&mut self, lanes: L::Mask, other: &Self) {
+        self.normal = Vec3::select(lanes, other.normal, self.normal);
+        self.geometric = Vec3::select(lanes, other.geometric, self.geometric);
+        self.albedo_factor = Vec3::select(lanes, other.albedo_factor, self.albedo_factor);
+        self.point = Vec3::select(lanes, other.point, self.point);
+        self.offset = L::select(lanes, other.offset, self.offset);
+        self.front = self.front | other.front;
+        self.bsdf = L::select(lanes, other.bsdf, self.bsdf);
+        self.diffuse = Vec3::select(lanes, other.diffuse, self.diffuse);
+        self.has_bsdf = self.has_bsdf | other.has_bsdf;
+        self.direct_mask = self.direct_mask | other.direct_mask;
+        self.highlight_mask = self.highlight_mask | other.highlight_mask;
+        self.reflecting = self.reflecting | other.reflecting;
+    }
+}
+
+/// Computes the surface properties at the hits of the active rays. `first` is the first result of
+/// [`next_distinct`]: the id of one of the primitives that are hit, and the lanes whose rays hit
+/// this primitive.
+#[inline(always)]
+pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    first: (u32, L::Mask),
+    active: L::Mask,
+) -> SurfaceInteraction<L> {
+    let (primitive, lanes) = first;
+    let remaining = active.and_not(lanes);
+    if remaining.none() {
+        interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes)
+    } else {
+        interact_mixed::<_, SIMPLE>(world, ray, hit, first, remaining)
+    }
+}
+
+/// Computes the surface properties at the hits of a packet whose rays hit several primitives.
+/// `first` is the id of one of these primitives. The lanes `first_lanes` hit this primitive, and
+/// the lanes `remaining` hit the others.
+#[inline(never)]
+fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    (first, first_lanes): (u32, L::Mask),
+    mut remaining: L::Mask,
+) -> SurfaceInteraction<L> {
+    let mut interaction = interact_one::<_, SIMPLE>(world, ray, hit, first, first_lanes);
+    while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+        interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes));
+        remaining = remaining.and_not(lanes);
+    }
+    interaction
+}
+
+/// Computes the surface properties at the hits of `lanes`, which must all be hits on the primitive
+/// `primitive`.
+#[inline(always)]
+fn interact_one<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    ray: &Ray<L>,
+    hit: &Hit<L>,
+    primitive: u32,
+    lanes: L::Mask,
+) -> SurfaceInteraction<L> {
+    let surface = world.geometry.surface(primitive, hit.triangle, ray.at(hit.t));
+    // At a silhouette edge, rounding of the hit point may select a face that points away from the
+    // ray. If rays hit the primitive only from outside, the hit counts as a hit on the front in any
+    // case.
+    let outside_only = L::mask(world.outside_only[primitive as usize]);
+    let front = outside_only | surface.normal.dot(ray.direction).lt(L::zero());
+    let geometric = Vec3::select(front, surface.normal, -surface.normal);
+    let index = world.bsdf_of[primitive as usize];
+    let bsdf = &world.bsdfs[index as usize];
+    let mut normal = geometric;
+    // The points are built at each use, because a shared instance would be spilled to memory in
+    // worlds without textures.
+    let shading_points = || ShadingPoints { primitive, triangle: hit.triangle, surface, lanes };
+    if !SIMPLE && world.smooth {
+        normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);
+    }
+    let mut factor = Vec3::of([1.0; 3]);
+    let mut diffuse = Vec3::splat(bsdf.diffuse);
+    if !SIMPLE
+        && world.colored
+        && let Some(color) = albedo_factor(world, &shading_points())
+    {
+        (factor, diffuse) = (color, diffuse.component_mul(color));
+    }
+    let has_bsdf = if bsdf.two_sided { lanes } else { lanes & front };
+    let lanes_if = |has_lobe: bool| if has_lobe { has_bsdf } else { L::mask(false) };
+    SurfaceInteraction {
+        normal,
+        geometric,
+        albedo_factor: factor,
+        point: surface.point,
+        offset: surface.ray_offset(),
+        front: front & lanes,
+        primitive: hit.primitive,
+        bsdf: L::from_id(index),
+        diffuse,
+        has_bsdf,
+        direct_mask: lanes_if(bsdf.has_direct),
+        highlight_mask: lanes_if(bsdf.has_highlight()),
+        reflecting: lanes_if(bsdf.reflection.is_some()),
+        shaded: L::mask(false),
+    }
+}

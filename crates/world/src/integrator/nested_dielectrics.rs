@@ -1,0 +1,330 @@
+//! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray
+//! Traced Images*).
+//!
+//! Transparent solids may overlap. The solid that comes last in the scene file has the highest
+//! priority: it fills the common space, and rays pass the boundaries of the other solids there. A
+//! bubble therefore comes after the glass ball that contains it. Water may overlap the wall of a
+//! glass that comes after the water. Outside of all solids the index of refraction is 1.
+
+use crate::compile::RecenteredGeometry;
+use crate::integrator::coincident_surfaces::Contacts;
+use crate::integrator::interaction::SurfaceInteraction;
+use glam::DVec3;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
+use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId};
+use zerkalo_scene::material::Bsdf;
+
+/// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
+/// inside of more solids, the stack holds those listed last in the scene file.
+const MAX_NESTING: usize = 4;
+
+/// Medium stack of each ray: priorities of the solids that the ray is inside of, in descending
+/// order. Priority 0 marks an empty entry. The solid with the highest priority fills the space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MediumStack<L> {
+    priorities: [L; MAX_NESTING],
+}
+
+impl<L: SimdFloat> MediumStack<L> {
+    /// Returns the stack of rays outside of all solids.
+    #[inline(always)]
+    pub fn vacuum() -> Self {
+        Self { priorities: [L::zero(); MAX_NESTING] }
+    }
+
+    /// Returns the priority of the solid that fills the space at the ray; 0 for vacuum.
+    #[inline(always)]
+    fn top(&self) -> L {
+        self.priorities[0]
+    }
+
+    /// Returns the mask of lanes whose ray is inside of the solid with `priority`.
+    pub fn contains(&self, priority: L) -> L::Mask {
+        self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
+    }
+
+    /// Returns this stack after the rays have left the solid with `priority`.
+    #[inline(always)]
+    fn without(&self, priority: L) -> Self {
+        let mut out = *self;
+        let mut found = L::mask(false);
+        for (i, entry) in self.priorities.iter().enumerate() {
+            found = found | equal(*entry, priority);
+            let next = self.priorities.get(i + 1).copied().unwrap_or(L::zero());
+            out.priorities[i] = L::select(found, next, *entry);
+        }
+        out
+    }
+
+    /// Returns this stack after the rays have entered the solid with `priority`.
+    #[inline(always)]
+    fn with(&self, priority: L) -> Self {
+        let mut out = self.without(priority);
+        let mut priority = priority;
+        for entry in &mut out.priorities {
+            let (high, low) = (entry.max(priority), entry.min(priority));
+            (*entry, priority) = (high, low);
+        }
+        out
+    }
+
+    /// Adds `priority` to the stack in lanes whose ray first hits the boundary of `solid` from
+    /// inside.
+    #[inline(never)]
+    fn add_if_inside(&mut self, ray: &Ray<L>, priority: u32, solid: &Aggregate<L>) {
+        let hit = solid.closest(ray, solid.all());
+        let mut remaining = hit.t.lt(L::from_f64(L::MAX));
+        let mut inside = L::mask(false);
+        while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+            let normal = solid.surface(primitive, hit.triangle, ray.at(hit.t)).normal;
+            inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
+            remaining = remaining.and_not(lanes);
+        }
+        *self = Self::select(inside, &self.with(L::from_f64(f64::from(priority))), self);
+    }
+
+    /// Returns the stack `yes` in lanes where `mask` is true and `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        Self { priorities: array_from_fn(|i| L::select(mask, yes.priorities[i], no.priorities[i])) }
+    }
+}
+
+#[inline(always)]
+fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
+    a.le(b) & b.le(a)
+}
+
+/// Media that the rays of a packet are inside of, with their properties.
+#[derive(Clone, Copy)]
+pub(crate) struct Media<'a, L: SimdFloat> {
+    pub nested_dielectrics: &'a NestedDielectrics<L>,
+    pub stack: &'a MediumStack<L>,
+}
+
+impl<L: SimdFloat> Media<'_, L> {
+    /// Returns the fraction of light that is left after `distance` [scene units], in each channel,
+    /// by Beer's law. `distance` may be the largest finite number. Returns `None` if no solid of
+    /// the world absorbs light.
+    #[inline(always)]
+    pub fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
+        let absorption = self.nested_dielectrics.absorption.as_ref()?;
+        Some(transmittance(absorption, self.stack.top(), distance))
+    }
+}
+
+/// Region in which camera rays start: a sphere around the eye.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StartRegion {
+    pub eye: DVec3,
+    pub radius: f64,
+}
+
+impl StartRegion {
+    /// Returns `true` if the bounding box of an object overlaps this region, in which camera rays
+    /// start, or if the object has no bounding box.
+    pub fn reaches(&self, form: &Form) -> bool {
+        form.bounds()
+            .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
+    }
+}
+
+/// Transmissive surfaces of a scene, and the media that they bound.
+pub(crate) struct NestedDielectrics<L: SimdFloat> {
+    /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
+    priority_of: Vec<u32>,
+    /// Indices of refraction of the transparent solids, by priority; 1 for priority 0 (vacuum).
+    indices: Vec<L::Scalar>,
+    /// Absorption coefficients of the transparent solids, by priority [1 / scene unit]; 0 for
+    /// priority 0 (vacuum). `None` if no solid absorbs light.
+    absorption: Option<Vec<[L::Scalar; 3]>>,
+    /// Transparent solids that may contain the origins of camera rays: the priority of each, and
+    /// its boundary as geometry.
+    around_eye: Vec<(u32, Aggregate<L>)>,
+    /// Pairs of primitives that may touch each other; at least one of each pair transmits. `None`
+    /// if there are none.
+    pub contacts: Option<Contacts<L::Scalar>>,
+}
+
+/// Hits of a packet on transmissive surfaces (interfaces).
+pub(crate) struct InterfaceHit<L: SimdFloat> {
+    /// Lanes whose ray hits a transmissive surface.
+    pub lanes: L::Mask,
+    /// Lanes whose ray hits the surface from outside of the solid that it bounds.
+    pub outer: L::Mask,
+    /// Lanes whose ray hits a thin surface, which bounds no solid.
+    pub thin: L::Mask,
+    /// Lanes whose ray hits a suppressed boundary. Such a boundary is inside of a solid with a
+    /// higher priority, and the ray passes it unchanged.
+    pub suppressed: L::Mask,
+    /// Index of refraction on the side from which the ray arrives.
+    pub n_i: L,
+    /// Index of refraction behind the surface. For thin surfaces, that of their material.
+    pub n_t: L,
+    /// Media that the reflected rays are inside of.
+    pub medium_reflected: MediumStack<L>,
+    /// Media that the transmitted rays are inside of.
+    pub medium_transmitted: MediumStack<L>,
+}
+
+impl<L: SimdFloat> NestedDielectrics<L> {
+    /// Compiles the transmissive surfaces of `primitives`. `bsdf_of` holds the index of the BSDF of
+    /// each primitive. Camera rays start in the region `start`. Returns `None` if no BSDF
+    /// transmits.
+    pub fn new(
+        geometry: &RecenteredGeometry,
+        primitives: &[PrimitiveId],
+        bsdf_of: &[u32],
+        bsdfs: &[Bsdf<L::Scalar>],
+        start: StartRegion,
+    ) -> Option<Self> {
+        let forms = &geometry.forms[..];
+        let transmission_of = |bsdf: u32| bsdfs[bsdf as usize].transmission;
+        if bsdfs.iter().all(|bsdf| bsdf.transmission.is_none()) {
+            return None;
+        }
+        let mut indices = vec![None; forms.len() + 1];
+        let mut absorption = vec![[L::Scalar::default(); 3]; forms.len() + 1];
+        let priority_of = primitives.iter().zip(bsdf_of).map(|(id, bsdf)| {
+            let flat = forms[id.form].is_flat();
+            let priority = id.form + 1;
+            match transmission_of(*bsdf) {
+                Some(transmission) if !flat => {
+                    // The first transmissive part of a compound determines the index of refraction
+                    // and the absorption.
+                    if indices[priority].is_none() {
+                        indices[priority] = Some(transmission.index);
+                        absorption[priority] = transmission.absorption;
+                    }
+                    priority as u32
+                }
+                _ => 0,
+            }
+        });
+        let priority_of: Vec<u32> = priority_of.collect();
+        let transparent: Vec<bool> =
+            bsdf_of.iter().map(|bsdf| transmission_of(*bsdf).is_some()).collect();
+        let rounding = (L::EPSILON, geometry.input_error());
+        let contacts = Contacts::new(forms, primitives, (&transparent, &priority_of), rounding);
+        let solid_around_eye = |(form, index): (usize, &Option<_>)| {
+            let may_contain_eye = index.is_some() && start.reaches(&forms[form]);
+            may_contain_eye
+                .then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
+        };
+        let around_eye = indices[1..].iter().enumerate().filter_map(solid_around_eye).collect();
+        let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
+        let absorbs = absorption.iter().flatten().any(|c| c.to_f64() > 0.0);
+        let absorption = absorbs.then_some(absorption);
+        Some(Self { priority_of, indices, absorption, around_eye, contacts })
+    }
+
+    /// Returns one value for each primitive: `true` if it bounds a solid that paths can be inside
+    /// of.
+    pub fn entered(&self) -> Vec<bool> {
+        self.priority_of.iter().map(|priority| *priority > 0).collect()
+    }
+
+    /// Adds to `media` the transparent solids in which camera rays start. In each lane, these are
+    /// the solids whose boundary the ray first hits from inside.
+    #[inline(always)]
+    pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
+        for (priority, solid) in &self.around_eye {
+            media.add_if_inside(ray, *priority, solid);
+        }
+    }
+
+    /// Returns the index of refraction of the transparent solid with `priority`.
+    fn index(&self, priority: L) -> L {
+        let index_of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
+        let first = priority.lane(0);
+        if equal(priority, L::splat(first)).all() {
+            return L::splat(index_of(first));
+        }
+        L::from_fn(|lane| index_of(priority.lane(lane)))
+    }
+
+    /// Returns the hits of `lanes`, which must be hits on transmissive surfaces. Returns `None` if
+    /// `lanes` is empty. `media` are the media of the rays. `thin_index` is the index of refraction
+    /// of thin surfaces.
+    #[inline(never)]
+    pub fn cross(
+        &self,
+        interaction: &SurfaceInteraction<L>,
+        lanes: L::Mask,
+        media: &MediumStack<L>,
+        thin_index: L,
+    ) -> Option<InterfaceHit<L>> {
+        if lanes.none() {
+            return None;
+        }
+        let outer = lanes & interaction.front;
+        let mut priority = L::zero();
+        let mut remaining = lanes;
+        while let Some((primitive, primitive_lanes)) =
+            next_distinct(interaction.primitive, remaining)
+        {
+            let of_primitive = L::from_f64(f64::from(self.priority_of[primitive as usize]));
+            priority = L::select(primitive_lanes, of_primitive, priority);
+            remaining = remaining.and_not(primitive_lanes);
+        }
+        let solid = priority.gt(L::zero());
+        let (outside, within) = (media.without(priority), media.with(priority));
+        let select = |if_outer, if_inner| {
+            let of_solid = MediumStack::select(outer, if_outer, if_inner);
+            MediumStack::select(solid, &of_solid, media)
+        };
+        let medium_reflected = select(&outside, &within);
+        let medium_transmitted = select(&within, &outside);
+        let n_i = self.index(medium_reflected.top());
+        Some(InterfaceHit {
+            lanes,
+            outer,
+            thin: lanes.and_not(solid),
+            suppressed: lanes & solid & equal(medium_reflected.top(), medium_transmitted.top()),
+            n_i,
+            n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+            medium_reflected,
+            medium_transmitted,
+        })
+    }
+}
+
+/// Returns the fraction of light that is left after `distance`: exp(-coefficient x distance) for
+/// each channel. `absorption` has the absorption coefficients of the solids, indexed by priority.
+/// `priority` is that of each lane's solid.
+#[inline(never)]
+fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
+    let of = |lane| absorption[priority.lane(lane).to_f64() as usize];
+    let coefficients = if equal(priority, L::splat(priority.lane(0))).all() {
+        Vec3::splat(of(0))
+    } else {
+        Vec3::from_fn(of)
+    };
+    let left = |c: L| (-(c * distance)).exp();
+    Vec3::new(left(coefficients.x), left(coefficients.y), left(coefficients.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn priorities(media: &MediumStack<f64>) -> [f64; MAX_NESTING] {
+        media.priorities
+    }
+
+    #[test]
+    fn medium_stack_is_sorted_and_keeps_solids_listed_last() {
+        let mut media = MediumStack::<f64>::vacuum();
+        for priority in [2.0, 5.0, 1.0, 5.0] {
+            media = media.with(priority);
+        }
+        assert_eq!(priorities(&media), [5.0, 2.0, 1.0, 0.0]);
+        assert_eq!(priorities(&media.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
+        assert_eq!(priorities(&media.without(3.0)), priorities(&media));
+        assert_eq!(priorities(&media.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
+        // With five nested solids the stack holds the four that are listed last.
+        let full = media.with(3.0).with(4.0);
+        assert_eq!(priorities(&full), [5.0, 4.0, 3.0, 2.0]);
+    }
+}

@@ -1,0 +1,56 @@
+//! State of a packet of paths, and the result of tracing it.
+
+use crate::light_groups::MAX_GROUPS;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{SimdFloat, Vec3};
+
+/// Radiance of a packet's samples in each light group (part of the picture that the film stores
+/// separately). The radiance of a light with a group of its own is that of a white light of
+/// intensity 1.
+pub struct Radiance<L> {
+    /// Radiance of each light group. Only the first [`World::groups`](crate::World::groups)
+    /// entries are in use.
+    pub groups: [Vec3<L>; MAX_GROUPS],
+}
+
+/// Number of rays traced, and a flag that is `true` if a random choice was made.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// Number of rays: camera, shadow, reflected and transmitted.
+    pub rays: u64,
+    /// `true` if a path sampled a glossy lobe or a point of an emitter, or chose between reflection
+    /// and transmission at random.
+    pub glossy: bool,
+}
+
+/// Packet of paths, each at its current vertex (the camera or a surface).
+#[derive(Clone, Copy)]
+pub struct Path<L> {
+    /// Rays from the current vertices of the paths.
+    pub ray: Ray<L>,
+    /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
+    pub throughput: Vec3<L>,
+    /// Density \[1/sr\] with which the ray was sampled; the largest finite number for camera rays,
+    /// mirrors and refraction. It is used only in worlds with emitters.
+    pub lobe_density: L,
+}
+
+impl<L: SimdFloat> Path<L> {
+    /// Largest throughput of a path. A larger throughput would saturate the film. An infinite
+    /// throughput times an albedo of 0 would be NaN.
+    const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
+
+    /// Creates the paths of the camera rays `ray`, with throughput 1.
+    #[inline(always)]
+    pub fn new(ray: Ray<L>) -> Self {
+        Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
+    }
+
+    /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let
+    /// it grow without limit.
+    #[inline(always)]
+    pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
+        let max = L::from_f64(Self::MAX_THROUGHPUT);
+        Vec3::new(max.min(throughput.x), max.min(throughput.y), max.min(throughput.z))
+    }
+}
