@@ -4,9 +4,9 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zerkalo_render::film::{
-    Depth, Display, Estimator, Film, Header, ImageData, ImageOutput, LightWeights, TILE_PIXELS,
-    Thumbnail, Tone, WholeFilm,
+    Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone,
 };
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 /// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
 /// replicates (halves of the samples) of 64 samples each. The noise is estimated from the

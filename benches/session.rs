@@ -40,7 +40,7 @@ fn figures(size: [u32; 2]) {
     };
     let settings = Settings {
         adaptive: true,
-        criterion: Criterion::Codes,
+        criterion: Criterion::Levels,
         rays_per_pixel: 0,
         stop: Stop::default(),
     };

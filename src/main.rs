@@ -5,6 +5,5 @@ use zerkalo::command;
 
 fn main() -> ExitCode {
     command::require_cpu();
-    command::limit_arenas();
     command::main()
 }

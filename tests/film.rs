@@ -4,10 +4,8 @@ use crate::harness::*;
 use proptest::prelude::*;
 use std::fs::File;
 use std::io::BufReader;
-use zerkalo_render::film::{
-    Depth, ImageData, ImageOutput, InvalidSample, Tile, TileHandle, WholeFilm, lattice_pixels,
-    quantised_8, quantised_16,
-};
+use zerkalo_render::film::{InvalidSample, TileHandle, lattice_pixels, quantised_8, quantised_16};
+use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;
@@ -201,7 +199,7 @@ fn strength_of_lights_does_not_change_the_bits() {
         }
         tile.advance(0, 1);
         let display = Display { exposure_ev: f64::from(-exponent), tone: Tone::Clip };
-        (0..256).map(|p| display.codes(film.pixel(p % 16, p / 16, &white))).collect::<Vec<_>>()
+        (0..256).map(|p| display.levels(film.pixel(p % 16, p / 16, &white))).collect::<Vec<_>>()
     };
     assert_eq!(shown(0), shown(40));
     assert_eq!(shown(0), shown(-40));
@@ -243,14 +241,14 @@ fn png_files_hold_the_displayed_picture() {
         assert_eq!(frame.color_type, png::ColorType::Rgb);
         let pixels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
         for (i, (x, y)) in pixels.enumerate() {
-            let codes = display.codes(film.pixel(x, y, &mix()));
+            let levels = display.levels(film.pixel(x, y, &mix()));
             for c in 0..3 {
                 match depth {
-                    Depth::Eight => assert_eq!(bytes[i * 3 + c], quantised_8(codes[c])),
+                    Depth::Eight => assert_eq!(bytes[i * 3 + c], quantised_8(levels[c])),
                     Depth::Sixteen => {
                         let offset = (i * 3 + c) * 2;
                         let value = u16::from_be_bytes([bytes[offset], bytes[offset + 1]]);
-                        assert_eq!(value, quantised_16(codes[c]));
+                        assert_eq!(value, quantised_16(levels[c]));
                     }
                 }
             }

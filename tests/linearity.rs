@@ -119,7 +119,7 @@ fn unit_of_light_does_not_change_the_picture() {
                 assert!(undone == expected, "{what}, 2^{ev} in {precision:?}");
                 for (other, original) in shown.chunks(3).zip(expected.chunks(3)) {
                     let [other, original] = [other, original].map(|rgb| [rgb[0], rgb[1], rgb[2]]);
-                    assert_eq!(display.codes(other), Display::default().codes(original));
+                    assert_eq!(display.levels(other), Display::default().levels(original));
                 }
             }
         }

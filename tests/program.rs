@@ -1,7 +1,6 @@
 //! Tests of the program other than those of pictures: scene files, editing, sessions, the command
 //! line, the dashboard, and the rules for the source.
 
-mod architecture;
 mod command_line;
 mod fuzz;
 mod harness;

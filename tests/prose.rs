@@ -76,7 +76,7 @@ fn faults(text: &str) -> Vec<(usize, String)> {
 fn doc_comments_begin_with_a_noun_and_avoid_vague_words() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut list = Vec::new();
-    for folder in ["src", "tests", "benches"] {
+    for folder in ["src", "crates", "tests", "benches"] {
         for path in rust_files(&root.join(folder)) {
             let name = path.strip_prefix(root).unwrap().display().to_string();
             for (line, fault) in faults(&fs::read_to_string(&path).unwrap()) {

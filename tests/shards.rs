@@ -22,7 +22,7 @@ fn options(seed: u64) -> Options {
 
 fn until(noise: f64) -> Settings {
     let stop = noise_stop(noise);
-    Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
+    Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
 }
 
 /// Renders a scene adaptively until its noise is at most `noise` 8-bit levels.
@@ -42,7 +42,7 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
         precision: pilot.state.world.precision().to_string(),
         display: Display::default(),
         rays_per_pixel: scene.film.rays_per_pixel,
-        noise_codes: noise,
+        noise_levels: noise,
         shards,
         base_plan: None,
     };
@@ -127,7 +127,7 @@ fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planne
     let total: u64 = shards.iter().sum();
     let largest = shards.iter().max().copied().unwrap_or(0) as f64;
     let result = Planned {
-        noise: noise(&sum).rmse_codes / target,
+        noise: noise(&sum).rmse_levels / target,
         rays: (pilot_rays + total as f64) / reference,
         pilot: pilot_rays / (pilot_rays + total as f64),
         imbalance: 8.0 * largest / total.max(1) as f64 - 1.0,

@@ -1,16 +1,17 @@
 //! Command-line arguments, parsed by clap. Doc comments of arguments are their help texts.
 
 use crate::dashboard::run::{Colors, TerminalSetup};
-use zerkalo_render::film::{Depth, Display, Tone};
 use crate::measure::Experiment;
-use zerkalo_render::plan::MAX_SHARDS;
-use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::{Acceleration, Scene};
-use zerkalo_terminal::Environment;
-use zerkalo_world::{self as world, Precision};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::film::{Display, Tone};
+use zerkalo_render::image_file::Depth;
+use zerkalo_render::plan::MAX_SHARDS;
+use zerkalo_scene::{Acceleration, Scene};
+use zerkalo_terminal::Environment;
+use zerkalo_world::{self as world, Precision};
 
 /// A progressive, accumulating ray tracer that lives in a terminal.
 #[derive(Debug, Parser)]

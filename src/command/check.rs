@@ -1,9 +1,9 @@
 //! `zerkalo check`: validates a scene and prints its contents.
 
 use crate::command::{Failure, print_line, read_scene_and_warn, warn};
+use std::path::Path;
 use zerkalo_render::memory_budget;
 use zerkalo_world::{self as world, AnyWorld};
-use std::path::Path;
 
 pub fn run(path: &Path) -> Result<(), Failure> {
     let document = read_scene_and_warn(path)?;

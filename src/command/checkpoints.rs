@@ -1,15 +1,15 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
 use crate::command::{Failure, warn};
-use zerkalo_scene::disk::{Existing, WriteError, check_writable};
-use zerkalo_render::film::file::is_film_file;
-use zerkalo_render::EncodedCheckpoint;
-use zerkalo_render::export::Provenance;
-use zerkalo_render::session::Session;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use zerkalo_render::EncodedCheckpoint;
+use zerkalo_render::export::Provenance;
+use zerkalo_render::film::file::is_film_file;
+use zerkalo_render::session::Session;
+use zerkalo_scene::disk::{Existing, WriteError, check_writable};
 
 /// Writer of checkpoints. A thread of its own writes the files; rendering pauses only while a
 /// checkpoint is encoded.

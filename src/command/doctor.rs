@@ -4,15 +4,15 @@
 use crate::command::{Failure, print_line};
 use crate::dashboard::overlay_layout::wrapped;
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
-use zerkalo_scene::{kept_in, state_folder};
-use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
-use zerkalo_terminal::image::Protocol;
-use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
-use zerkalo_scene::value::sanitized;
 use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{kept_in, state_folder};
+use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
+use zerkalo_terminal::image::Protocol;
+use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
 
 /// Width of the printed report, in columns of the terminal.
 const COLUMNS: usize = 80;

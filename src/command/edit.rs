@@ -1,25 +1,25 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
-use zerkalo_scene::asset::Assets;
 use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{DEFAULT_STOP, Ended, Setup, run as run_dashboard};
-use zerkalo_scene::disk::open_regular;
-use zerkalo_render::film::Display;
-use zerkalo_render::film::file::is_film_file;
-use zerkalo_render::schedule::Settings;
-use zerkalo_render::{Checkpoint, Options};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
-use zerkalo_terminal::Environment;
-use zerkalo_scene::value::sanitized;
-use zerkalo_world::{self as world, Precision};
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Display;
+use zerkalo_render::film::file::is_film_file;
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_scene::asset::Assets;
+use zerkalo_scene::disk::open_regular;
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
+use zerkalo_terminal::Environment;
+use zerkalo_world::{self as world, Precision};
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let environment = terminal_environment().map_err(|reason| {
@@ -172,7 +172,7 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
 /// 212 spp noise 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
-    let noise = match exported.noise_codes {
+    let noise = match exported.noise_levels {
         Some(levels) => format!("{levels:.2} 8-bit levels"),
         None => "unknown".to_string(),
     };
@@ -202,7 +202,7 @@ mod tests {
             path: PathBuf::from("room.png"),
             size: [60, 40],
             spp: 4.0,
-            noise_codes: None,
+            noise_levels: None,
             scp: String::new(),
         };
         Ended {

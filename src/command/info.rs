@@ -2,11 +2,11 @@
 
 use crate::command::args::InfoArgs;
 use crate::command::{Failure, print_line, read_scene};
-use zerkalo_render::film::FileMetadata;
+use std::path::Path;
 use zerkalo_render::SampleInputs;
 use zerkalo_render::export::{scene_hash, settings_text};
+use zerkalo_render::image_file::FileMetadata;
 use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
-use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let origin = match is_plan_file(&args.file) {
@@ -98,8 +98,8 @@ fn target(plan: &Plan) -> String {
         "{} shards, {:.2} samples per pixel, target {} 8-bit levels of noise, expected {:.3}",
         settings.shards,
         plan.spp(),
-        settings.noise_codes,
-        plan.predicted_codes
+        settings.noise_levels,
+        plan.predicted_levels
     )
 }
 

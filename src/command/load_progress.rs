@@ -1,10 +1,10 @@
 //! Progress messages while meshes and images of a scene are loaded.
 
-use zerkalo_scene::asset::{Assets, LoadProgress};
 use crate::command::warn;
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use zerkalo_scene::asset::{Assets, LoadProgress};
 
 /// Limits above which the loading of a file is reported, because it takes a noticeable time. The
 /// first is the length of a file in bytes, 8 MiB. The second is the number of triangles of a mesh

@@ -21,29 +21,29 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
         print_line(&format!(
             "missing of {} shards: {missing}; {}",
             plan.settings.shards,
-            cost(&report, plan.predicted_codes)
+            cost(&report, plan.predicted_levels)
         ))?;
     } else if let Some(noise) = report.noise
-        && noise.rmse_codes > plan.settings.noise_codes
+        && noise.rmse_levels > plan.settings.noise_levels
     {
         print_line(&format!(
             "the noise is {:.1} % above the target of {}: merge to a .zk file, and plan another \
              round by `zerkalo plan --from`",
-            100.0 * (noise.rmse_codes / plan.settings.noise_codes - 1.0),
-            plan.settings.noise_codes
+            100.0 * (noise.rmse_levels / plan.settings.noise_levels - 1.0),
+            plan.settings.noise_levels
         ))?;
     }
     Ok(())
 }
 
 /// Formats two values of noise in 8-bit levels. The first is the noise of the merged picture, which
-/// lacks the samples of some shards (parts of the render). The second is `predicted_codes`, the
+/// lacks the samples of some shards (parts of the render). The second is `predicted_levels`, the
 /// noise predicted for the picture with all shards.
-fn cost(report: &Report, predicted_codes: f64) -> String {
+fn cost(report: &Report, predicted_levels: f64) -> String {
     match report.noise {
         Some(noise) => format!(
-            "noise {:.3} instead of about {predicted_codes:.3} 8-bit levels",
-            noise.rmse_codes
+            "noise {:.3} instead of about {predicted_levels:.3} 8-bit levels",
+            noise.rmse_levels
         ),
         None => "noise unknown, because some tiles have no samples".to_string(),
     }

@@ -8,7 +8,6 @@ mod doctor;
 mod edit;
 mod info;
 mod load_progress;
-mod malloc_arenas;
 mod measure;
 mod merge;
 mod new;
@@ -23,11 +22,7 @@ mod stats;
 mod watch;
 
 pub use cpu::require as require_cpu;
-pub use malloc_arenas::limit as limit_arenas;
 
-use zerkalo_scene::{Document, Scene};
-use zerkalo_scene::value::sanitized;
-use zerkalo_world::{self as world, Precision, requires_double};
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
@@ -38,6 +33,9 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{Document, Scene};
+use zerkalo_world::{self as world, Precision, requires_double};
 
 /// Exit status for an invalid command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;

@@ -1,10 +1,10 @@
 //! `zerkalo new`: writes a starter scene to a new file.
 
 use crate::command::{Failure, print_line};
-use zerkalo_scene::disk::{Existing, replace_file};
-use zerkalo_scene::starter;
 use std::io::Write;
 use std::path::Path;
+use zerkalo_scene::disk::{Existing, replace_file};
+use zerkalo_scene::starter;
 
 pub fn run(path: &Path) -> Result<(), Failure> {
     let starter = starter().as_bytes();

@@ -3,14 +3,17 @@
 
 use crate::command::Failure;
 use crate::command::progress::noise;
-use zerkalo_scene::disk::{Existing, WriteError, check_writable};
-use zerkalo_render::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use zerkalo_render::film::{Depth, Film, ImageOutput};
+use std::path::{Path, PathBuf};
 use zerkalo_render::RenderState;
 use zerkalo_render::export::{Provenance, film_header};
+use zerkalo_render::film::Film;
+use zerkalo_render::film::file::{
+    FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
+};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::plan::Part;
 use zerkalo_render::session::Report;
-use std::path::{Path, PathBuf};
+use zerkalo_scene::disk::{Existing, WriteError, check_writable};
 
 /// Output of a film: a film file or a picture file.
 pub enum FilmOutput {
@@ -41,7 +44,7 @@ impl FilmOutput {
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
-            Self::Picture(output, depth) => header.write_picture(film, *depth, output),
+            Self::Picture(output, depth) => output.write_film(header, film, *depth),
         }
     }
 }

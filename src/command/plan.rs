@@ -4,17 +4,17 @@ use crate::command::args::PlanArgs;
 use crate::command::part_file;
 use crate::command::progress::style;
 use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
-use zerkalo_scene::disk::{self, check_writable};
+use indicatif::ProgressBar;
+use std::path::{Path, PathBuf};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::file::FilmReader;
 use zerkalo_render::film::{Estimator, Noise};
-use zerkalo_render::export::scene_hash;
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
 use zerkalo_render::schedule::{Settings, Stop, USUAL_SLOPE};
 use zerkalo_render::session::Report;
 use zerkalo_render::{Options, SyncRender};
-use zerkalo_kernel::sampling::SampleSettings;
-use indicatif::ProgressBar;
-use std::path::{Path, PathBuf};
+use zerkalo_scene::disk::{self, check_writable};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
 /// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the
@@ -39,7 +39,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         args.output.display(),
         plan.settings.shards,
         plan.spp(),
-        plan.predicted_codes
+        plan.predicted_levels
     ))?;
     print_line(&format!(
         "expected rays: {total:.3e}; base {:.1} %, largest shard {:.2} %",
@@ -73,7 +73,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
     let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
     while pilot.step().is_none() {
-        if let Some(noise) = pilot.noise_codes() {
+        if let Some(noise) = pilot.noise_levels() {
             bar.set_message(format!("pilot: noise {noise:.2} of {pilot_noise} 8-bit levels"));
         }
         bar.tick();
@@ -89,7 +89,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         precision: state.world.precision().to_string(),
         display: args.picture.display(),
         rays_per_pixel: scene.film.rays_per_pixel,
-        noise_codes: args.noise,
+        noise_levels: args.noise,
         shards: args.shards,
         base_plan: None,
     };
@@ -136,10 +136,10 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     print_line(&format!(
         "{}  noise {:.3} 8-bit levels (the base of the plan)",
         path.display(),
-        schedule.noise().map_or(0.0, |noise: Noise| noise.rmse_codes)
+        schedule.noise().map_or(0.0, |noise: Noise| noise.rmse_levels)
     ))?;
     let settings = PlanSettings {
-        noise_codes: args.noise,
+        noise_levels: args.noise,
         shards: args.shards,
         base_plan: Some(part.plan.checksum()),
         ..part.plan.settings.clone()
@@ -155,10 +155,10 @@ fn default_base(plan: &Path) -> PathBuf {
     plan.with_file_name(name)
 }
 
-fn stop(noise_codes: f64) -> Stop {
-    Stop { noise_codes: Some(noise_codes), ..Stop::default() }
+fn stop(noise_levels: f64) -> Stop {
+    Stop { noise_levels: Some(noise_levels), ..Stop::default() }
 }
 
-fn settings(noise_codes: f64) -> Settings {
-    Settings::new(true, stop(noise_codes))
+fn settings(noise_levels: f64) -> Settings {
+    Settings::new(true, stop(noise_levels))
 }

@@ -1,9 +1,9 @@
 //! Progress of a render on stderr: a bar if stderr is a terminal, otherwise lines for a log.
 
-use zerkalo_render::session::Report;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
+use zerkalo_render::session::Report;
 
 /// Seconds of rendering before the first output of progress. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
@@ -84,7 +84,7 @@ fn status(report: &Report) -> String {
     let mut text = counts(report);
     text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
     if let Some(noise) = report.noise {
-        text += &format!("  noise {:.2}", noise.rmse_codes);
+        text += &format!("  noise {:.2}", noise.rmse_levels);
     }
     if let Some((low, high)) = report.eta_seconds {
         text += &format!("  {} left", span(low, high));
@@ -105,7 +105,7 @@ pub fn counts(report: &Report) -> String {
 /// Formats the noise of the picture, such as `noise 0.500 8-bit levels`.
 pub fn noise(report: &Report) -> String {
     match report.noise {
-        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
+        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_levels),
         None => "noise unknown".to_string(),
     }
 }

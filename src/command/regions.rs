@@ -3,9 +3,9 @@
 
 use crate::command::args::RenderArgs;
 use crate::command::{Failure, warn};
-use zerkalo_scene::process_memory::{available_memory, megabytes, resident_memory};
 use zerkalo_render::memory_budget::{Regions, check, divide};
 use zerkalo_scene::Scene;
+use zerkalo_scene::process_memory::{available_memory, megabytes, resident_memory};
 use zerkalo_world::AnyWorld;
 
 /// Name of the memory limit in messages if `--memory` allows less memory than is available.

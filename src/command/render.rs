@@ -7,19 +7,19 @@ use crate::command::regions::Division;
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
 use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
-use zerkalo_scene::disk::{self, WriteError, check_writable};
-use zerkalo_render::film::ImageOutput;
-use zerkalo_scene::process_memory::resident_memory;
-use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{Checkpoint, Options, RegionRender};
-use zerkalo_kernel::sampling::SampleSettings;
-use zerkalo_scene::Scene;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::image_file::ImageOutput;
+use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo_render::session::{Report, Session, State};
+use zerkalo_render::{Checkpoint, Options, RegionRender};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::{self, WriteError, check_writable};
+use zerkalo_scene::process_memory::resident_memory;
 
 /// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
 /// of an 8-bit file.
@@ -97,8 +97,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             first_picture_seconds: report
                 .first_picture_seconds
                 .map(|s| s + set_after.as_secs_f64()),
-            noise_codes: report.noise.map(|n| n.rmse_codes),
-            noise_codes_p95: report.noise.map(|n| n.p95_codes),
+            noise_levels: report.noise.map(|n| n.rmse_levels),
+            noise_levels_p95: report.noise.map(|n| n.p95_levels),
             rmse_linear: report.noise.map(|n| n.rmse_linear),
             bad_samples: report.bad_samples,
             saturated_samples: report.saturated_samples,
@@ -313,11 +313,11 @@ fn options(args: &RenderArgs) -> Options {
 fn schedule_settings(args: &RenderArgs) -> Settings {
     let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
-    let noise_codes = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
+    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let linear = noise_codes.is_none() && (args.rmse.is_some() || linear_file);
-    let criterion = if linear { Criterion::Linear } else { Criterion::Codes };
-    let stop = Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time };
+    let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
+    let criterion = if linear { Criterion::Linear } else { Criterion::Levels };
+    let stop = Stop { spp: args.spp, noise_levels, rmse_linear: args.rmse, seconds: args.time };
     Settings { criterion, ..Settings::new(!args.uniform, stop) }
 }
 

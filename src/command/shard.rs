@@ -9,17 +9,17 @@ use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene, warn};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SampleSettings;
+use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::Film;
 use zerkalo_render::film::file::{FilmReader, ReadError};
-use zerkalo_render::export::scene_hash;
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use zerkalo_render::session::Report;
 use zerkalo_render::{Options, RenderState};
-use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_scene::Document;
 use zerkalo_world::{self as world, Precision};
-use std::path::Path;
-use std::time::{Duration, Instant};
 
 /// Time from the start of a shard's render to its first checkpoint. A shard is one process's part
 /// of a divided render. Each later interval is twice the previous one, up to [`LONGEST_INTERVAL`].

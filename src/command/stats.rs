@@ -46,9 +46,9 @@ pub struct Stats {
     /// Estimated RMSE of the displayed picture, in 8-bit levels. It is estimated from the
     /// difference between two halves of the samples, the replicates A and B. Null if A and B have
     /// never had equal numbers of samples.
-    pub noise_codes: Option<f64>,
+    pub noise_levels: Option<f64>,
     /// 95th percentile of the tiles' estimated RMSE, in 8-bit levels.
-    pub noise_codes_p95: Option<f64>,
+    pub noise_levels_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
     /// Number of samples that are not in the picture because they were NaN or negative.
     pub bad_samples: u64,

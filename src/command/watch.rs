@@ -4,8 +4,8 @@ use crate::command::Failure;
 use crate::command::args::WatchArgs;
 use crate::command::edit::{conclude, terminal_environment};
 use crate::dashboard::run::watch as watch_films;
-use zerkalo_render::plan::WatchedFilms;
 use std::io;
+use zerkalo_render::plan::WatchedFilms;
 
 pub fn run(args: &WatchArgs) -> Result<(), Failure> {
     let environment = terminal_environment().map_err(|reason| {

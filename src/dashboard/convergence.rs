@@ -8,7 +8,7 @@ pub struct Point {
     /// Seconds that the renderer has spent on tracing rays until this point of the plot.
     pub seconds: f64,
     /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
-    pub noise_codes: f64,
+    pub noise_levels: f64,
 }
 
 /// History of the noise of one picture, from the renderer's reports. It keeps at most 400 points:
@@ -26,16 +26,16 @@ pub struct Convergence {
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the render time in seconds at which the noise last fell to `codes` 8-bit levels. The
+    /// Returns the render time in seconds at which the noise last fell to `levels` 8-bit levels. The
     /// time is interpolated between two reports by a power law. Returns `None` if the latest noise
-    /// is above `codes`, or if no stored noise is above `codes`.
-    pub fn seconds_at(&self, codes: f64) -> Option<f64> {
-        // Only the last fall to `codes` counts, because switching on a light raises the noise
+    /// is above `levels`, or if no stored noise is above `levels`.
+    pub fn seconds_at(&self, levels: f64) -> Option<f64> {
+        // Only the last fall to `levels` counts, because switching on a light raises the noise
         // again.
-        let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;
+        let after = self.points.iter().rposition(|p| p.noise_levels > levels)? + 1;
         let (before, after) = (self.points[after - 1], self.points.get(after)?);
         let part =
-            (before.noise_codes / codes).ln() / (before.noise_codes / after.noise_codes).ln();
+            (before.noise_levels / levels).ln() / (before.noise_levels / after.noise_levels).ln();
         Some(before.seconds * (after.seconds / before.seconds).powf(part))
     }
 
@@ -47,13 +47,13 @@ impl Convergence {
         }
         self.generation = report.generation;
         self.samples = report.samples;
-        let Some(noise_codes) = report.noise.map(|n| n.rmse_codes).filter(|n| *n > 0.0) else {
+        let Some(noise_levels) = report.noise.map(|n| n.rmse_levels).filter(|n| *n > 0.0) else {
             return;
         };
-        let point = Point { seconds: report.seconds, noise_codes };
+        let point = Point { seconds: report.seconds, noise_levels };
         match self.points.last_mut() {
             // The error estimate has not been updated since the last report.
-            Some(last) if last.noise_codes == point.noise_codes => {}
+            Some(last) if last.noise_levels == point.noise_levels => {}
             // The report has no new samples. The noise has changed because a light was dimmed or
             // the render has finished, so the new point replaces the last one.
             Some(last) if last.seconds >= point.seconds => *last = point,
@@ -91,7 +91,7 @@ mod tests {
         let points = &convergence.points;
         assert!((MOST / 2..=MOST).contains(&points.len()), "{}", points.len());
         assert!(points.is_sorted_by(|a, b| a.seconds < b.seconds));
-        assert_eq!(points[0].noise_codes, 100.0);
+        assert_eq!(points[0].noise_levels, 100.0);
         assert_eq!(points.last().unwrap().seconds, report(1, 99_999, None).seconds);
     }
 
@@ -102,7 +102,7 @@ mod tests {
         convergence.add(&report(1, 20, Some(2.0)));
         convergence.add(&report(1, 20, Some(2.5)));
         assert_eq!(convergence.points.len(), 2, "the same moment seen twice");
-        assert_eq!(convergence.points[1].noise_codes, 2.5);
+        assert_eq!(convergence.points[1].noise_levels, 2.5);
         convergence.add(&report(1, 5, Some(4.0)));
         assert_eq!(convergence.points.len(), 1, "restarted");
         convergence.add(&report(2, 50, None));

@@ -1,7 +1,7 @@
 //! Text editor for one line, as in fields and prompts of the dashboard.
 
-use zerkalo_terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
+use zerkalo_terminal::event::{Code, Key};
 
 /// Largest length of the edited text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;

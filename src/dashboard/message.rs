@@ -1,5 +1,8 @@
 //! Messages that `update` receives, and effects that it returns.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage};
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{Snapshot, View, WatchReport};
@@ -7,9 +10,6 @@ use zerkalo_scene::{SaveError, Scene, SceneErrors};
 use zerkalo_terminal::event::{Key, Mouse};
 use zerkalo_terminal::flow::LinkStatus;
 use zerkalo_terminal::image::ViewerImage;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Message to `update`: an event that changes the model.
 #[derive(Debug)]
@@ -83,7 +83,7 @@ pub struct Exported {
     pub spp: f64,
     /// Estimated RMSE of the image after the display transform, in 8-bit levels; `None` without an
     /// estimate.
-    pub noise_codes: Option<f64>,
+    pub noise_levels: Option<f64>,
     /// Argument of scp that copies the image file, such as `user@host:path`.
     pub scp: String,
 }

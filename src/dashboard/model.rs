@@ -7,18 +7,18 @@ use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LinearImage, PixelProbe};
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{Snapshot, WatchReport};
 use zerkalo_scene::edit::Target;
+use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{History, Scene, SceneErrors};
 pub use zerkalo_terminal::cells::Colors;
 use zerkalo_terminal::event::Button;
 use zerkalo_terminal::flow::LinkStatus;
-use zerkalo_scene::value::sanitized;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Mode of the picture's panel, which determines the effect of arrow keys and drags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -34,7 +34,7 @@ pub enum Cost {
 /// Returns the render time to reach the noise target `QUALITIES[at]`. `report` is the latest report
 /// of the render, and `convergence` the history of the picture's noise.
 pub fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
-    let reached = report.noise.is_some_and(|noise| noise.rmse_codes <= QUALITIES[at]);
+    let reached = report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]);
     match report.quality_seconds[at] {
         _ if reached => Cost::Reached(convergence.seconds_at(QUALITIES[at])),
         Some((from, to)) => Cost::Left(from, to),

@@ -4,12 +4,12 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::model::FieldList;
 use crate::dashboard::update::UpdateContext;
+use std::path::PathBuf;
+use std::sync::Arc;
 use zerkalo_render::session::QUALITIES;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::image::ViewerImage;
-use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Overlay of the dashboard, which covers panels and receives the keys.
 #[derive(Clone, Debug)]

@@ -4,9 +4,9 @@ use crate::dashboard::layout::BORDER;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
-use zerkalo_render::session::QUALITIES;
 use ratatui::layout::Rect;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+use zerkalo_render::session::QUALITIES;
 
 /// Areas of an overlay. Areas that an overlay does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use zerkalo_render::schedule::Spp;
 use zerkalo_render::session::{QUALITIES, Report, State};
 
 /// Creates a report of the renderer after `spp` samples in each of ten thousand pixels.
-/// `generation` is the number of the scene's version, and `noise_codes` the estimated noise in
+/// `generation` is the number of the scene's version, and `noise_levels` the estimated noise in
 /// 8-bit levels.
-pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
+pub fn report(generation: u64, spp: u64, noise_levels: Option<f64>) -> Report {
     Report {
         generation,
         state: State::Tracing,
@@ -17,12 +17,12 @@ pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
         seconds: spp as f64 * 1e-3,
         compile_seconds: 1e-4,
         first_picture_seconds: Some(0.02),
-        noise: noise_codes.map(|codes| Noise {
-            rmse_linear: codes / 255.0,
-            rmse_codes: codes,
-            p95_codes: 2.0 * codes,
-            worst_codes: 3.0 * codes,
-            effective_pixels: Mse { linear: 1e4, codes: 1e4 },
+        noise: noise_levels.map(|levels| Noise {
+            rmse_linear: levels / 255.0,
+            rmse_levels: levels,
+            p95_levels: 2.0 * levels,
+            worst_levels: 3.0 * levels,
+            effective_pixels: Mse { linear: 1e4, levels: 1e4 },
         }),
         eta_seconds: None,
         quality_seconds: [None; QUALITIES.len()],

@@ -4,8 +4,8 @@
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
 use crate::measure::reference_image::{Errors, Reference};
-use zerkalo_render::SyncRender;
 use std::io;
+use zerkalo_render::SyncRender;
 
 /// Point of an error curve: the error of a render after some samples, against a reference picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Point {
     pub seconds: Vec<f64>,
     /// Error that the render estimates without a reference, from the difference between the two
     /// halves of its samples, in 8-bit levels. `None` before the first estimate.
-    pub estimated_codes: Option<f64>,
+    pub estimated_levels: Option<f64>,
     /// Errors of the picture at this point against the reference picture.
     pub errors: Errors,
 }
@@ -30,10 +30,10 @@ pub struct Point {
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Error at which the curve ends, in 8-bit levels.
-    pub codes: f64,
+    pub levels: f64,
     /// Seconds of tracing after which the curve ends in any case.
     pub seconds: f64,
-    /// `true` if `codes` is compared with the estimated error instead of the true one. This is for
+    /// `true` if `levels` is compared with the estimated error instead of the true one. This is for
     /// renders with biased settings, whose true error does not converge to 0.
     pub use_estimate: bool,
 }
@@ -74,7 +74,7 @@ pub fn follow(
     let mut last_estimate = f64::INFINITY;
     for step in 1.. {
         let done = render.step().is_some();
-        let estimate = render.noise_codes();
+        let estimate = render.noise_levels();
         let timed_out = render.seconds >= end.seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
         // Further samples do not change a picture without noise.
@@ -88,12 +88,13 @@ pub fn follow(
                     samples: render.schedule.samples(),
                     spp: render.schedule.spp().mean,
                     seconds: vec![render.seconds],
-                    estimated_codes: estimate,
+                    estimated_levels: estimate,
                     errors,
                 });
             }
-            let reached = if end.use_estimate { estimate } else { Some(errors.rmse_codes) };
-            if reached.is_some_and(|codes| codes <= end.codes) || done || timed_out || noiseless {
+            let reached = if end.use_estimate { estimate } else { Some(errors.rmse_levels) };
+            if reached.is_some_and(|levels| levels <= end.levels) || done || timed_out || noiseless
+            {
                 break;
             }
         }

@@ -1,15 +1,15 @@
 //! Experiments: settings that trade speed for accuracy are varied one at a time.
 
-use zerkalo_render::film::Display;
-use zerkalo_scene::material::Lobe;
-use zerkalo_render::schedule::{Settings, Stop};
-use zerkalo_render::{Options, SyncRender};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_scene::{Acceleration, RayTypes, Scene};
-use zerkalo_world::{self as world, AnyWorld, Precision};
 use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::film::Display;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_scene::material::Lobe;
+use zerkalo_scene::{Acceleration, RayTypes, Scene};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 /// Setting of the renderer that an experiment varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -14,9 +14,6 @@ pub mod plot;
 mod reference_image;
 mod result;
 mod run;
-#[cfg(test)]
-#[path = "../../crates/render/src/film/test_random.rs"]
-mod test_random;
 
 pub use convergence_order::Slope;
 pub use error_curve::Point;

@@ -112,7 +112,7 @@ fn grid(panels: usize) -> (i32, i32) {
 /// numbers are positive.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
     let coordinates =
-        |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
+        |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_levels);
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
@@ -207,7 +207,7 @@ where
     let lines: Vec<Line> = all.zip(colors).map(line).collect();
     let numbers = || lines.iter().flat_map(|line| line.points.iter().copied());
     let seconds = Axis::new(numbers().map(|p| p.0), (x0, x1));
-    let codes = Axis::new(numbers().map(|p| p.1), (y0, y1));
+    let levels = Axis::new(numbers().map(|p| p.1), (y0, y1));
 
     let heading = text(15, INK, HPos::Left, VPos::Top);
     root.draw_text(experiment.title(), &heading, (x0 - 34, corner.1 + 8))?;
@@ -218,16 +218,16 @@ where
         root.draw(&path((x, y0), (x, y1), &GRID))?;
         root.draw_text(&label, &text(13, INK, HPos::Center, VPos::Top), (x, y0 + 6))?;
     }
-    for (tick, label) in codes.ticks() {
-        let y = codes.at(tick);
+    for (tick, label) in levels.ticks() {
+        let y = levels.at(tick);
         root.draw(&path((x0, y), (x1, y), &GRID))?;
         root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
     }
     // Curves fall from the upper left, so there is room below them for the labels of targets at the
     // left edge.
     let small = text(12, TARGET, HPos::Left, VPos::Bottom);
-    for target in measurement.targets.iter().filter(|t| codes.numbers.contains(t)) {
-        let y = codes.at(*target);
+    for target in measurement.targets.iter().filter(|t| levels.numbers.contains(t)) {
+        let y = levels.at(*target);
         for x in (x0..x1).step_by(8) {
             root.draw(&path((x, y), ((x + 4).min(x1), y), &TARGET))?;
         }
@@ -242,7 +242,7 @@ where
     root.draw_text("RMSE as displayed, 8-bit levels", &axis, (x0 - 34, y1 - 26))?;
     for Line { color, points, .. } in &lines {
         let vertices: Vec<(i32, i32)> =
-            points.iter().map(|(s, e)| (seconds.at(*s), codes.at(*e))).collect();
+            points.iter().map(|(s, e)| (seconds.at(*s), levels.at(*e))).collect();
         let width = if *color == DEFAULT { 4 } else { 2 };
         root.draw(&PathElement::new(vertices.clone(), color.stroke_width(width)))?;
         for point in vertices {

@@ -11,7 +11,7 @@ const RELATIVE_FLOOR: f64 = 0.01;
 pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
-    codes: Vec<[f64; 3]>,
+    levels: Vec<[f64; 3]>,
     /// Half the difference between the reference's two replicates (halves of its samples) in each
     /// pixel, in 8-bit levels. Its root mean square is an estimate of the error of the reference.
     /// Empty if the reference counts as exact.
@@ -27,7 +27,7 @@ pub struct Reference {
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
-    codes: f64,
+    levels: f64,
     relative: f64,
 }
 
@@ -38,13 +38,13 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// Root mean square error over the pixels and channels of the displayed picture, in unrounded
     /// 8-bit levels.
-    pub rmse_codes: f64,
+    pub rmse_levels: f64,
     /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels,
     /// with x the value of a pixel in the picture and r its value in the reference.
     pub rel_mse: f64,
-    /// Relative uncertainty of `rmse_codes`, from 0 to 1, because of the error of the reference. It
-    /// is the standard deviation of `rmse_codes` over different references as noisy as this one,
-    /// divided by `rmse_codes`.
+    /// Relative uncertainty of `rmse_levels`, from 0 to 1, because of the error of the reference. It
+    /// is the standard deviation of `rmse_levels` over different references as noisy as this one,
+    /// divided by `rmse_levels`.
     pub spread: f64,
 }
 
@@ -57,18 +57,18 @@ pub struct Bias {
     /// Root mean square of the differences between the pixels of the picture and those of the
     /// reference, in 8-bit levels. The mean square that the noise of both pictures causes is
     /// subtracted before the root is taken.
-    pub codes: f64,
-    /// Smallest value of [`Self::codes`] that is significant, in 8-bit levels: its square is two
+    pub levels: f64,
+    /// Smallest value of [`Self::levels`] that is significant, in 8-bit levels: its square is two
     /// standard errors of the mean squared difference.
-    pub least_codes: f64,
+    pub least_levels: f64,
 }
 
 impl Bias {
     /// Returns `true` if the picture differs from the reference by more than noise can explain: in
     /// the mean brightness by more than four standard errors, or in the pixels by more than
-    /// [`Self::least_codes`].
+    /// [`Self::least_levels`].
     pub fn is_seen(&self) -> bool {
-        self.codes > self.least_codes || self.z.abs() > 4.0
+        self.levels > self.least_levels || self.z.abs() > 4.0
     }
 }
 
@@ -81,21 +81,22 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
     let mut mean_variance = 0.0;
     for (a, b) in a.iter().zip(b) {
         let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-        let [code_a, code_b, code] = [*a, *b, mean].map(|x| display.codes(x));
+        let [level_a, level_b, level] = [*a, *b, mean].map(|x| display.levels(x));
         let mut half_sum = 0.0;
         for c in 0..3 {
             let half = 0.5 * (a[c] - b[c]);
             half_sum += half;
             squares.linear += half * half;
             squares.relative += half * half / (mean[c] * mean[c] + RELATIVE_FLOOR);
-            squares.codes += 0.5 * ((code_a[c] - code[c]).powi(2) + (code_b[c] - code[c]).powi(2));
+            squares.levels +=
+                0.5 * ((level_a[c] - level[c]).powi(2) + (level_b[c] - level[c]).powi(2));
         }
         mean_variance += half_sum * half_sum;
     }
     let values = (3 * a.len()) as f64;
     let own = Squares {
         linear: squares.linear / values,
-        codes: squares.codes / values,
+        levels: squares.levels / values,
         relative: squares.relative / values,
     };
     (own, mean_variance / (values * values))
@@ -151,14 +152,14 @@ impl Reference {
         mean_variance: f64,
         display: Display,
     ) -> Self {
-        let codes = pixels.iter().map(|x| display.codes(*x)).collect();
-        Self { size, pixels, codes, halves: Vec::new(), own, mean_variance, display }
+        let levels = pixels.iter().map(|x| display.levels(*x)).collect();
+        Self { size, pixels, levels, halves: Vec::new(), own, mean_variance, display }
     }
 
     /// Returns the noise of the reference picture in 8-bit levels: its estimated root mean square
     /// error against the exact picture, over all pixels and channels.
-    pub fn noise_codes(&self) -> f64 {
-        self.own.codes.sqrt()
+    pub fn noise_levels(&self) -> f64 {
+        self.own.levels.sqrt()
     }
 
     /// Returns the noise of the reference picture in linear radiance: its estimated root mean square
@@ -181,12 +182,13 @@ impl Reference {
         for y in 0..self.size[1] {
             fill(y, &mut row);
             for (x, i) in row.iter().zip(y * self.size[0]..) {
-                let (r, code_r, code_x) = (self.pixels[i], self.codes[i], self.display.codes(*x));
-                let difference: [f64; 3] = std::array::from_fn(|c| code_x[c] - code_r[c]);
+                let (r, level_r, level_x) =
+                    (self.pixels[i], self.levels[i], self.display.levels(*x));
+                let difference: [f64; 3] = std::array::from_fn(|c| level_x[c] - level_r[c]);
                 for c in 0..3 {
                     let d = x[c] - r[c];
                     sum.linear += d * d;
-                    sum.codes += difference[c] * difference[c];
+                    sum.levels += difference[c] * difference[c];
                     sum.relative += d * d / (r[c] * r[c] + RELATIVE_FLOOR);
                 }
                 crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
@@ -194,16 +196,16 @@ impl Reference {
         }
         let values = (3 * self.pixels.len()) as f64;
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
-        let codes = remaining(sum.codes, self.own.codes);
+        let levels = remaining(sum.levels, self.own.levels);
         // The standard error of the sum of squares is twice `crossed.sqrt()`. The relative error of
         // the RMSE, the root of the mean square, is half the relative error of the sum. The two
         // factors cancel.
         let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
-            rmse_codes: codes.sqrt(),
+            rmse_levels: levels.sqrt(),
             rel_mse: remaining(sum.relative, self.own.relative),
-            spread: if spread < codes { spread / codes } else { f64::from(spread > 0.0) },
+            spread: if spread < levels { spread / levels } else { f64::from(spread > 0.0) },
         }
     }
 
@@ -216,8 +218,8 @@ impl Reference {
         for (i, (a, b)) in a.iter().zip(&b).enumerate() {
             let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
             sum += (0..3).map(|c| mean[c] - self.pixels[i][c]).sum::<f64>();
-            let code = self.display.codes(mean);
-            let difference = std::array::from_fn(|c| code[c] - self.codes[i][c]);
+            let level = self.display.levels(mean);
+            let difference = std::array::from_fn(|c| level[c] - self.levels[i][c]);
             squares += dot(&difference, &difference);
             crossed += dot(&difference, &half(a, b, &self.display)).powi(2);
             crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
@@ -228,8 +230,8 @@ impl Reference {
         Bias {
             // If both pictures are without noise, `z` is 0 or infinite.
             z: if mean == 0.0 { 0.0 } else { mean / deviation },
-            codes: (squares / values - own.codes - self.own.codes).max(0.0).sqrt(),
-            least_codes: (2.0 * 2.0 * crossed.sqrt() / values).sqrt(),
+            levels: (squares / values - own.levels - self.own.levels).max(0.0).sqrt(),
+            least_levels: (2.0 * 2.0 * crossed.sqrt() / values).sqrt(),
         }
     }
 }
@@ -241,14 +243,14 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 /// Returns half the difference between two colours as displayed, in 8-bit levels. `a` and `b` are
 /// the linear colours of the same pixel in two independent pictures.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
-    let [a, b] = [*a, *b].map(|x| display.codes(x));
+    let [a, b] = [*a, *b].map(|x| display.levels(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::test_random::Rng;
+    use zerkalo_render::film::testing::Rng;
 
     /// Returns random pixels with mean 0.5 and two kinds of noise: grey noise with the standard
     /// deviation `s`, and independent noise in each channel with a third of this standard
@@ -272,7 +274,7 @@ mod tests {
         assert!((reference.noise_linear() / expected - 1.0).abs() < 0.02);
         // The slope of the sRGB curve at 0.5 is 1.055 / 2.4 x 0.5^(1/2.4 - 1).
         let slope = 255.0 * 1.055 / 2.4 * 0.5f64.powf(1.0 / 2.4 - 1.0);
-        assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
+        assert!((reference.noise_levels() / (slope * expected) - 1.0).abs() < 0.02);
     }
 
     /// Checks that the predicted uncertainty of a picture's error agrees with the standard
@@ -294,8 +296,8 @@ mod tests {
                 })
                 .collect();
             let n = errors.len() as f64;
-            let mean = errors.iter().map(|e| e.rmse_codes).sum::<f64>() / n;
-            let variance = errors.iter().map(|e| (e.rmse_codes - mean).powi(2)).sum::<f64>() / n;
+            let mean = errors.iter().map(|e| e.rmse_levels).sum::<f64>() / n;
+            let variance = errors.iter().map(|e| (e.rmse_levels - mean).powi(2)).sum::<f64>() / n;
             let (observed, predicted) =
                 (variance.sqrt() / mean, errors.iter().map(|e| e.spread).sum::<f64>() / n);
             assert!(
@@ -315,11 +317,11 @@ mod tests {
         };
         let truth = Reference::of_pixels([40, 30], pixels.clone(), &Display::default());
         let errors = truth.errors_of(&mut |y, row| same(row, y));
-        assert_eq!((errors.rmse_codes, errors.spread), (0.0, 0.0));
+        assert_eq!((errors.rmse_levels, errors.spread), (0.0, 0.0));
         let off = truth.errors_of(&mut |y, row| {
             same(row, y);
             row.iter_mut().for_each(|p| p[1] += 0.02);
         });
-        assert!(off.rmse_codes > 1.0 && off.spread == 0.0, "{off:?}");
+        assert!(off.rmse_levels > 1.0 && off.spread == 0.0, "{off:?}");
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeToTarget {
     /// Noise target: RMSE of the displayed picture in 8-bit levels.
-    pub codes: f64,
+    pub levels: f64,
     /// Seconds of tracing until the noise target: the median over the repetitions of the render.
     pub seconds: f64,
     /// Relative spread of the seconds over the repetitions of the render, see [`spread`].
@@ -28,7 +28,7 @@ pub struct TimeToTarget {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Expected {
     /// Noise target that was not reached, in 8-bit levels.
-    pub codes: f64,
+    pub levels: f64,
     /// Lower estimate of the time to the target in seconds, extrapolated from the convergence so
     /// far.
     pub seconds_low: f64,
@@ -62,7 +62,7 @@ pub struct Measurement {
     /// Samples per pixel of the reference picture. 0 if it was read from a file.
     pub reference_spp: f64,
     /// Error of the reference picture itself, in 8-bit levels.
-    pub reference_codes: f64,
+    pub reference_levels: f64,
     /// Error of the reference picture itself, in linear radiance.
     pub reference_linear: f64,
     /// Seconds of tracing that the reference picture took.
@@ -171,37 +171,41 @@ impl Measured {
         self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
-    /// Returns the time at which the true error fell to `codes` 8-bit levels. It is interpolated
+    /// Returns the time at which the true error fell to `levels` 8-bit levels. It is interpolated
     /// between points of the error curve in log-log coordinates. Returns `None` if the error stayed
     /// larger. Points with an uncertain error are ignored, see `MAX_SPREAD`.
-    pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
-        self.interpolated_time(codes, |p| {
+    pub fn time_to(&self, levels: f64) -> Option<TimeToTarget> {
+        self.interpolated_time(levels, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
-            if certain { p.errors.rmse_codes } else { f64::INFINITY }
+            if certain { p.errors.rmse_levels } else { f64::INFINITY }
         })
     }
 
-    /// Returns the time at which the error fell to `codes` 8-bit levels. The error is the render's
+    /// Returns the time at which the error fell to `levels` 8-bit levels. The error is the render's
     /// own estimate for biased variants, whose true error does not converge to 0, and the true
     /// error for unbiased ones. Returns `None` if the error stayed larger.
-    pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
+    pub fn true_time_to(&self, levels: f64) -> Option<TimeToTarget> {
         match self.bias {
             Some(_) => {
-                self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
+                self.interpolated_time(levels, |p| p.estimated_levels.unwrap_or(f64::INFINITY))
             }
-            None => self.time_to(codes),
+            None => self.time_to(levels),
         }
     }
 
-    fn interpolated_time(&self, codes: f64, error: impl Fn(&Point) -> f64) -> Option<TimeToTarget> {
-        let after = self.points.iter().position(|p| error(p) <= codes)?;
+    fn interpolated_time(
+        &self,
+        levels: f64,
+        error: impl Fn(&Point) -> f64,
+    ) -> Option<TimeToTarget> {
+        let after = self.points.iter().position(|p| error(p) <= levels)?;
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
             // The interpolation needs the logarithms of both errors; errors of 0 and infinity have
             // none.
             Some(from) if error(to) > 0.0 && error(from).is_finite() => {
-                ((error(from) / codes).ln() / (error(from) / error(to)).ln(), from)
+                ((error(from) / levels).ln() / (error(from) / error(to)).ln(), from)
             }
             _ => (1.0, to),
         };
@@ -210,7 +214,7 @@ impl Measured {
         let seconds: Vec<f64> =
             seconds_from.iter().zip(&seconds_to).map(|(a, b)| between(*a, *b)).collect();
         Some(TimeToTarget {
-            codes,
+            levels,
             seconds: median(&seconds),
             spread: spread(&seconds),
             spp: between(from.spp, to.spp),
@@ -255,8 +259,8 @@ impl Measurement {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
             let targets = self.targets.iter().filter(|_| i == 0).copied();
-            for codes in targets.chain([self.compared_at]) {
-                let Some(time_to) = measured.true_time_to(codes) else { continue };
+            for levels in targets.chain([self.compared_at]) {
+                let Some(time_to) = measured.true_time_to(levels) else { continue };
                 all.spread = all.spread.max(time_to.spread);
                 all.repetitions = all.repetitions.min(measured.counted().len());
             }
@@ -281,18 +285,18 @@ impl Measurement {
 mod tests {
     use super::*;
     use crate::measure::reference_image::Errors;
-    use crate::measure::test_random::Rng;
+    use zerkalo_render::film::testing::Rng;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
-        let point = |(step, (spp, codes)): (usize, &(f64, f64))| Point {
+        let point = |(step, (spp, levels)): (usize, &(f64, f64))| Point {
             step: step + 1,
             samples: *spp as u64,
             spp: *spp,
             seconds: vec![*spp * 1e-3, *spp * 3e-3, *spp * 2e-3],
-            estimated_codes: Some(2.0 * codes),
+            estimated_levels: Some(2.0 * levels),
             errors: Errors {
-                rmse_linear: codes / 255.0,
-                rmse_codes: *codes,
+                rmse_linear: levels / 255.0,
+                rmse_levels: *levels,
                 rel_mse: 0.0,
                 spread: 0.0,
             },
@@ -319,7 +323,7 @@ mod tests {
         assert!(!target.at_most && (target.spread - 1.0).abs() < 1e-12);
         assert!(curve.time_to(3.0).unwrap().at_most);
         assert_eq!(curve.time_to(0.4), None);
-        let bias = Some(Bias { z: 0.0, codes: 0.0, least_codes: 0.0 });
+        let bias = Some(Bias { z: 0.0, levels: 0.0, least_levels: 0.0 });
         let biased = Measured { bias, ..curve.clone() };
         assert!((biased.true_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
         assert!((curve.slope().unwrap().value + 0.5).abs() < 1e-12);
@@ -373,7 +377,7 @@ mod tests {
         let mut measurement = Measurement {
             size: [1, 1],
             reference_spp: 0.0,
-            reference_codes: 0.0,
+            reference_levels: 0.0,
             reference_linear: 0.0,
             reference_seconds: 0.0,
             compared_at: 0.5,

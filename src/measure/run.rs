@@ -5,11 +5,11 @@ use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
-use zerkalo_render::SyncRender;
-use zerkalo_scene::Scene;
 use std::io;
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_render::SyncRender;
+use zerkalo_scene::Scene;
 
 /// Progress of a measurement, which consists of timed renders.
 pub struct Progress<'a> {
@@ -85,8 +85,8 @@ pub fn measure(
             break;
         }
         keep_going &= report(Progress { step: &variant.name, done: 1 + i, total });
-        let codes = if i == 0 { least } else { compared_at };
-        let end = End { codes, seconds: longest, use_estimate: !variant.experiment.unbiased() };
+        let levels = if i == 0 { least } else { compared_at };
+        let end = End { levels, seconds: longest, use_estimate: !variant.experiment.unbiased() };
         let (points, stolen, render) = follow(variant, reference, end)?;
         let bias = (!variant.experiment.unbiased())
             .then(|| reference.bias(&render.state.film, &render.state.mix));
@@ -99,8 +99,8 @@ pub fn measure(
             bias,
         };
         if i == 0 {
-            let missed = plan.targets.iter().filter(|codes| result.time_to(**codes).is_none());
-            expected = missed.filter_map(|codes| extrapolate(&render, *codes)).collect();
+            let missed = plan.targets.iter().filter(|levels| result.time_to(**levels).is_none());
+            expected = missed.filter_map(|levels| extrapolate(&render, *levels)).collect();
             let seconds_left = plan.seconds - started.elapsed().as_secs_f64();
             let runs = plan.repetitions.max(1) * (variants.len() - 1);
             let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds;
@@ -139,7 +139,7 @@ pub fn measure(
     Ok(Measurement {
         size: scene.film.size,
         reference_spp: rendered.spp,
-        reference_codes: reference.noise_codes(),
+        reference_levels: reference.noise_levels(),
         reference_linear: reference.noise_linear(),
         reference_seconds: rendered.seconds,
         compared_at,
@@ -150,11 +150,11 @@ pub fn measure(
     })
 }
 
-/// Returns the extrapolated times at which the noise of `render` falls to `codes` 8-bit levels: a
+/// Returns the extrapolated times at which the noise of `render` falls to `levels` 8-bit levels: a
 /// lower and an upper estimate. Returns `None` if they cannot be extrapolated.
-fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
-    let (seconds_low, seconds_high) = render.seconds_to_noise(codes)?;
-    Some(Expected { codes, seconds_low, seconds_high })
+fn extrapolate(render: &SyncRender, levels: f64) -> Option<Expected> {
+    let (seconds_low, seconds_high) = render.seconds_to_noise(levels)?;
+    Some(Expected { levels, seconds_low, seconds_high })
 }
 
 /// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the powers of
@@ -163,21 +163,21 @@ fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
 /// that they reached; otherwise the error at the end of their error curve.
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
-    levels.retain(|codes| *codes >= COMPARED_AT);
+    levels.retain(|level| *level >= COMPARED_AT);
     levels.sort_by(f64::total_cmp);
-    let reached: Vec<_> = levels.iter().filter_map(|codes| default.time_to(*codes)).collect();
+    let reached: Vec<_> = levels.iter().filter_map(|level| default.time_to(*level)).collect();
     let in_time = reached.iter().find(|c| c.seconds <= seconds && !c.at_most);
     let any = || reached.iter().rev().find(|c| !c.at_most).or(reached.first());
-    let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_codes);
-    in_time.or_else(any).map_or_else(end, |c| c.codes)
+    let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_levels);
+    in_time.or_else(any).map_or_else(end, |c| c.levels)
 }
 
-/// Returns `true` if the times at which the repetitions reached the noise `codes` have a relative
+/// Returns `true` if the times at which the repetitions reached the noise `levels` have a relative
 /// spread of at most [`STEADY`]. If the noise was not reached, the times until the last point of
 /// the error curve are compared instead.
-fn is_steady(measured: &Measured, codes: f64) -> bool {
+fn is_steady(measured: &Measured, levels: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
-    measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
+    measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY
 }
 
 /// Reference picture with the cost of rendering it.
@@ -188,12 +188,12 @@ struct RenderedReference {
 }
 
 /// Renders a reference picture, with another random seed than the measured pictures, until its
-/// noise is at most `codes` 8-bit levels or `seconds` have passed.
-fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<RenderedReference> {
+/// noise is at most `levels` 8-bit levels or `seconds` have passed.
+fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<RenderedReference> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut render = other.start()?;
-    while render.seconds < seconds && render.noise_codes().is_none_or(|noise| noise > codes) {
+    while render.seconds < seconds && render.noise_levels().is_none_or(|noise| noise > levels) {
         if render.step().is_some() {
             break;
         }
@@ -215,13 +215,13 @@ mod tests {
     /// Returns the results of a render. `points` are the points of its error curve, each as
     /// (seconds, error in 8-bit levels).
     fn results(points: &[(f64, f64)]) -> Measured {
-        let point = |(seconds, codes): &(f64, f64)| Point {
+        let point = |(seconds, levels): &(f64, f64)| Point {
             step: 1,
             samples: 1,
             spp: *seconds,
             seconds: vec![*seconds; 3],
-            estimated_codes: Some(*codes),
-            errors: Errors { rmse_linear: 0.0, rmse_codes: *codes, rel_mse: 0.0, spread: 0.0 },
+            estimated_levels: Some(*levels),
+            errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, rel_mse: 0.0, spread: 0.0 },
         };
         Measured {
             experiment: Experiment::Default,

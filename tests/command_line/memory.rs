@@ -90,7 +90,7 @@ fn lights_are_merged_first() {
         pictures.push(fs::read(desk.path(&name)).unwrap());
     }
     assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2], "regions differ");
-    let read = |name: &str| zerkalo_render::film::read_png(&desk.path(name)).unwrap().1;
+    let read = |name: &str| zerkalo_render::image_file::read_png(&desk.path(name)).unwrap().1;
     let pairs = || read("whole.png").into_iter().zip(read(&format!("{}.png", least + 1)));
     let farthest = pairs().flat_map(|(a, b)| [0, 1, 2].map(|c| a[c].abs_diff(b[c]))).max();
     assert!(farthest <= Some(1), "{farthest:?} levels");
@@ -109,7 +109,7 @@ fn adaptive_regions_reach_the_noise_target() {
     let stats: serde_json::Value =
         serde_json::from_slice(&fs::read(desk.path("stats.json")).unwrap()).unwrap();
     assert_eq!(stats["stopped_by"], "noise");
-    assert!(stats["noise_codes"].as_f64().unwrap() <= 2.0, "{stats}");
+    assert!(stats["noise_levels"].as_f64().unwrap() <= 2.0, "{stats}");
     assert!(stats["spp_max"].as_u64() > stats["spp_min"].as_u64(), "{stats}");
     let info = desk.run(&["info", "a.png"]);
     assert!(info.out.contains("adaptive") && !info.out.contains("  \n"), "{}", info.out);

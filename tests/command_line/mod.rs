@@ -219,7 +219,7 @@ fn stats_file_has_every_key() {
         "seconds",
         "samples_per_second",
         "first_picture_seconds",
-        "noise_codes",
+        "noise_levels",
         "rmse_linear",
         "bad_samples",
         "saturated_samples",
@@ -237,7 +237,7 @@ fn stats_file_has_every_key() {
     assert_eq!(stats["stopped_by"], "spp");
     assert_eq!(stats["bad_samples"], 0);
     assert_eq!(stats["biased"], serde_json::json!([]));
-    assert!(stats["noise_codes"].as_f64().unwrap() > 0.0);
+    assert!(stats["noise_levels"].as_f64().unwrap() > 0.0);
     assert!(stats["rmse_linear"].as_f64().unwrap() > 0.0);
     let number = |key: &str| stats[key].as_f64().unwrap();
     let rate = number("samples") / number("seconds");
@@ -265,7 +265,7 @@ fn each_stop_criterion_ends_the_render() {
     let desk = Desk::new();
     let noise = desk.stats(&["--noise", "2"]);
     assert_eq!(noise["stopped_by"], "noise");
-    assert!(noise["noise_codes"].as_f64().unwrap() <= 2.0);
+    assert!(noise["noise_levels"].as_f64().unwrap() <= 2.0);
     let rmse = desk.stats(&["--rmse", "0.01"]);
     assert_eq!(rmse["stopped_by"], "rmse");
     assert!(rmse["rmse_linear"].as_f64().unwrap() <= 0.01);
@@ -274,7 +274,7 @@ fn each_stop_criterion_ends_the_render() {
     assert!(time["seconds"].as_f64().unwrap() >= 0.2);
     let default = desk.stats(&[]);
     assert_eq!(default["stopped_by"], "noise");
-    assert!(default["noise_codes"].as_f64().unwrap() <= 0.5);
+    assert!(default["noise_levels"].as_f64().unwrap() <= 0.5);
     let capped = SCENE.to_string() + "\n[film]\nrays_per_pixel = 40\n";
     fs::write(desk.path("scene.toml"), capped).unwrap();
     let capped = desk.stats(&["--noise", "0.01"]);

@@ -153,11 +153,11 @@ fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
 /// True and estimated errors of one render.
 struct Outcome {
     /// True RMSE of the displayed picture, divided by the estimated one.
-    codes_ratio: f64,
+    levels_ratio: f64,
     /// True RMSE of the picture in linear radiance, divided by the estimated one.
     linear_ratio: f64,
     /// True RMSE of the displayed picture, in 8-bit levels.
-    codes: f64,
+    levels: f64,
     /// Estimated and true mean squared error of each tile, in squared 8-bit levels.
     tiles: Vec<(f64, f64)>,
     /// Mean signed error of the picture in linear radiance, for each channel.
@@ -175,24 +175,24 @@ fn outcome(rendering: &RenderState, truth: &[[f64; 3]]) -> Outcome {
     let (mut linear, mut mean_error) = (0.0, [0.0; 3]);
     for (i, (got, truth)) in got.iter().zip(truth).enumerate() {
         let tile = &mut tiles[i / width / TILE * film.tile_columns() + i % width / TILE];
-        let (got_codes, true_codes) = (display.codes(*got), display.codes(*truth));
+        let (got_levels, true_levels) = (display.levels(*got), display.levels(*truth));
         for c in 0..3 {
             linear += (got[c] - truth[c]).powi(2);
             mean_error[c] += (got[c] - truth[c]) / (values / 3) as f64;
-            tile.1 += (got_codes[c] - true_codes[c]).powi(2);
+            tile.1 += (got_levels[c] - true_levels[c]).powi(2);
             tile.2 += 1;
         }
     }
-    let codes: f64 = tiles.iter().map(|t| t.1).sum();
+    let levels: f64 = tiles.iter().map(|t| t.1).sum();
     for (index, tile) in tiles.iter_mut().enumerate() {
         let estimate = estimator.tile(film.tile(index).unwrap()).unwrap();
-        (tile.0, tile.1) = (estimate.reported.codes, tile.1 / tile.2 as f64);
+        (tile.0, tile.1) = (estimate.reported.levels, tile.1 / tile.2 as f64);
     }
-    let codes = (codes / values as f64).sqrt();
+    let levels = (levels / values as f64).sqrt();
     Outcome {
-        codes_ratio: codes / noise.rmse_codes,
+        levels_ratio: levels / noise.rmse_levels,
         linear_ratio: (linear / values as f64).sqrt() / noise.rmse_linear,
-        codes,
+        levels,
         tiles: tiles.into_iter().map(|(estimate, truth, _)| (estimate, truth)).collect(),
         mean_error,
     }
@@ -230,7 +230,7 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     let case = format!("{filter:?}, {spp} spp, adaptive {adaptive}");
 
     for (name, ratio) in [
-        ("codes", mean(outcomes.iter().map(|o| o.codes_ratio))),
+        ("levels", mean(outcomes.iter().map(|o| o.levels_ratio))),
         ("linear", mean(outcomes.iter().map(|o| o.linear_ratio))),
     ] {
         assert!((0.9..=1.1).contains(&ratio), "{case}: true/estimated {name} {ratio}");
@@ -261,7 +261,7 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
             "{case}: bias {bias:e} of sigma {sigma:e} in channel {c}"
         );
     }
-    mean(outcomes.iter().map(|o| o.codes_ratio))
+    mean(outcomes.iter().map(|o| o.levels_ratio))
 }
 
 /// Compares estimated with true errors for both pixel filters and for 32, 128 and 512 samples per
@@ -290,7 +290,7 @@ fn extreme_30_noise_target_is_reached() {
     for (filter, target) in [(Filter::Box, 2.0), (Filter::Point, 0.5)] {
         let stop = noise_stop(target);
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
-        let achieved = mean(outcomes.iter().map(|o| o.codes * o.codes)).sqrt();
+        let achieved = mean(outcomes.iter().map(|o| o.levels * o.levels)).sqrt();
         assert!(achieved <= 1.1 * target, "{filter:?}: target {target}, achieved {achieved}");
         report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
     }
@@ -305,16 +305,16 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [240, 180]);
     let display = Display::default();
     let pool = pool(2);
-    let codes = |rendering: &RenderState| -> Vec<f64> {
-        picture(rendering, Replicates::Both).iter().flat_map(|rgb| display.codes(*rgb)).collect()
+    let levels = |rendering: &RenderState| -> Vec<f64> {
+        picture(rendering, Replicates::Both).iter().flat_map(|rgb| display.levels(*rgb)).collect()
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
     let reference_spp = 1408;
     let stop = spp_stop(reference_spp);
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
-    let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_codes;
+    let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_levels;
     assert!(own < 0.1, "the reference has an error of {own} levels itself");
-    let reference = codes(&reference);
+    let reference = levels(&reference);
 
     for seed in 0..5 {
         let mut rendering = begin(&scene, seed, Precision::Auto);
@@ -322,7 +322,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
         let spp = rendering.film.samples() / (240 * 180);
         assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
-        let got = codes(&rendering);
+        let got = levels(&rendering);
         let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();
         let achieved = (sum / got.len() as f64 - own * own).max(0.0).sqrt();
         println!("seed {seed}: {achieved:.3} levels at {spp} samples per pixel");

@@ -132,7 +132,7 @@ fn survey_of_rays() {
         let seeds = variable("ZERKALO_SEEDS", 4) * if kind == "one ball" { 48 } else { 1 };
         let seeds: Vec<u64> = (0..seeds).map(|i| number + 1 + 1000 * i).collect();
         let target = target_of(number);
-        let stop = Stop { noise_codes: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
+        let stop = Stop { noise_levels: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
         let pictures: Vec<_> = seeds
             .iter()
             .map(|seed| {
@@ -145,7 +145,7 @@ fn survey_of_rays() {
         let spp = pictures.iter().map(|(_, s)| s.spp().mean).sum::<f64>() / seeds.len() as f64;
         let pixels: f64 = pictures
             .iter()
-            .map(|(_, s)| s.noise().expect("an estimate").effective_pixels.codes)
+            .map(|(_, s)| s.noise().expect("an estimate").effective_pixels.levels)
             .sum();
         let count = (REFERENCE_FACTOR * spp as u32 / 2).clamp(256, 4096);
         let reference = Reference::new(&sample, count);

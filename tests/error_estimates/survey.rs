@@ -17,16 +17,16 @@ pub const LIMIT_SPP: u32 = 1024;
 /// a scene. The ratio of true to reported error is then known to 1 / sqrt(1600), that is 2.5 %.
 const ENOUGH: f64 = 1600.0;
 
-fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
+fn levels(radiance: &[[f64; 3]]) -> Vec<f64> {
     let display = Display::default();
-    radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
+    radiance.iter().flat_map(|rgb| display.levels(*rgb)).collect()
 }
 
 /// Reference for the true error of a picture: displayed values of every pixel, from a closed form
 /// or from a uniform picture of another seed. `own` is the estimated RMSE of the uniform picture in
 /// 8-bit levels, or 0 for a closed form.
 pub struct Reference {
-    codes: Vec<f64>,
+    levels: Vec<f64>,
     pub own: f64,
 }
 
@@ -37,18 +37,18 @@ impl Reference {
         if let Some(balls) = &sample.balls {
             let radiance = balls.pixels(sample.scene.film.size.map(|n| n as usize));
             let gray: Vec<[f64; 3]> = radiance.into_iter().map(|value| [value; 3]).collect();
-            return Self { codes: codes(&gray), own: 0.0 };
+            return Self { levels: levels(&gray), own: 0.0 };
         }
         let rendering = rendered(&sample.scene, 987_654, Precision::Auto, count);
-        let own = rendering.film.noise(&rendering.mix, &Display::default()).unwrap().rmse_codes;
-        Self { codes: codes(&picture(&rendering, Replicates::Both)), own }
+        let own = rendering.film.noise(&rendering.mix, &Display::default()).unwrap().rmse_levels;
+        Self { levels: levels(&picture(&rendering, Replicates::Both)), own }
     }
 
     /// Returns the mean squared difference between a picture and the reference, minus the mean
     /// squared error of the reference, in squared 8-bit levels. By chance it may be below 0.
     pub fn square(&self, rendering: &RenderState) -> f64 {
-        let got = codes(&picture(rendering, Replicates::Both));
-        let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
+        let got = levels(&picture(rendering, Replicates::Both));
+        let sum: f64 = got.iter().zip(&self.levels).map(|(g, r)| (g - r).powi(2)).sum();
         sum / got.len() as f64 - self.own * self.own
     }
 }
@@ -106,7 +106,7 @@ fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) 
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
     let target = target_of(number);
-    let stop = Stop { noise_codes: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
     let (mut truths, mut reports, mut rays, mut pixels) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
     let mut used = Vec::new();
     while used.is_empty() || (used.len() as u64) < seeds && pixels < ENOUGH {
@@ -114,9 +114,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) 
         let (rendering, schedule, _) = run(&sample, seed, true, stop, |_, _| false);
         let noise = schedule.noise().expect("an estimate");
         truths.push(reference.square(&rendering));
-        reports.push(noise.rmse_codes.powi(2));
+        reports.push(noise.rmse_levels.powi(2));
         rays.push(schedule.rays() as f64);
-        pixels += noise.effective_pixels.codes;
+        pixels += noise.effective_pixels.levels;
         used.push(seed);
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -226,7 +226,7 @@ fn single_ball_ends_with_few_samples() {
     let scene = parsed(text);
     let sample = Sample { name: "single ball".into(), scene, balls: None };
     for seed in 0..6 {
-        let stop = Stop { noise_codes: Some(0.2), spp: Some(4 * LIMIT_SPP), ..Stop::default() };
+        let stop = Stop { noise_levels: Some(0.2), spp: Some(4 * LIMIT_SPP), ..Stop::default() };
         let (_, uniform, reason) = run(&sample, seed, false, stop, |_, _| false);
         assert_eq!(reason, Some(StoppedBy::Noise));
         let (_, adaptive, reason) = run(&sample, seed, true, stop, |_, _| false);

@@ -17,7 +17,7 @@ pub fn torus(ring: f64, tube: f64) -> Form {
 
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
     let tree = join((0..parts.len()).map(Tree::Part).collect());
-    Form::Csg(CsgSolid { parts, tree })
+    CsgSolid::new(parts, tree).unwrap().into()
 }
 
 pub fn union(parts: Vec<Form>) -> Form {
@@ -179,7 +179,7 @@ fn check_parity(rays: usize) {
         let mut numbers = Numbers::new(800 + seed);
         let mut parts = Vec::new();
         let tree = random_tree(&mut numbers, 1 + (seed as usize) % 8, &mut parts);
-        let form = Form::Csg(CsgSolid { parts: parts.clone(), tree: tree.clone() });
+        let form: Form = CsgSolid::new(parts.clone(), tree.clone()).unwrap().into();
         if form.bounds().is_none() {
             continue;
         }
@@ -288,7 +288,7 @@ fn extreme_09_csg_algebra() {
         let all = block([0.0; 3], [20.0; 3]);
         let not_b = Tree::Difference(vec![Tree::Part(1), Tree::Part(2)]);
         let tree = Tree::Intersection(vec![Tree::Part(0), not_b]);
-        let and_not = Form::Csg(CsgSolid { parts: vec![a(), all, b()], tree });
+        let and_not: Form = CsgSolid::new(vec![a(), all, b()], tree).unwrap().into();
         same_surfaces(&named("A - B = A and not B"), &difference(vec![a(), b()]), &and_not, &lines);
         let single = [
             differing(&union(vec![a(), a()]), &a(), &lines),
@@ -305,7 +305,7 @@ fn extreme_09_csg_algebra() {
             Tree::Difference(vec![Tree::Part(0), Tree::Part(1)]),
             Tree::Part(2),
         ]);
-        let steps = Form::Csg(CsgSolid { parts: vec![a(), b(), c.clone()], tree });
+        let steps: Form = CsgSolid::new(vec![a(), b(), c.clone()], tree).unwrap().into();
         let at_once = difference(vec![a(), b(), c]);
         same_surfaces(&named("(A - B) - C"), &steps, &at_once, &lines);
     }

@@ -40,7 +40,7 @@ impl Pair {
         let [single, double] = self.pictures.each_mut().map(|rendering| -> Vec<f64> {
             uniform(rendering, self.samples, samples - self.samples, &pool);
             assert_eq!(rendering.film.bad_samples().count, 0);
-            picture(rendering, Replicates::Both).iter().flat_map(|p| display.codes(*p)).collect()
+            picture(rendering, Replicates::Both).iter().flat_map(|p| display.levels(*p)).collect()
         });
         self.samples = samples;
         let sum: f64 = single.iter().zip(&double).map(|(a, b)| (a - b).powi(2)).sum();

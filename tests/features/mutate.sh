@@ -38,14 +38,14 @@ for name in $(ls "$mutations"); do
         }' "$file" > mutated
     cp mutated "$file"
 done
-for crate in crates/scene crates/world crates/render src; do
+for crate in crates/*/src src; do
     { echo '#![allow(unused_parens)]'; cat $crate/lib.rs; } > mutated
     cp mutated $crate/lib.rs
 done
-echo 'pub use zerkalo_scene::mutant;' >> crates/world/lib.rs
-echo 'pub use zerkalo_world::mutant;' >> crates/render/lib.rs
-echo 'pub use zerkalo_render::mutant;' >> src/lib.rs
-cat >> crates/scene/lib.rs <<'RUST'
+for crate in crates/scene/src crates/world/src crates/render/src src; do
+    echo 'pub use zerkalo_kernel::mutant;' >> $crate/lib.rs
+done
+cat >> crates/kernel/src/lib.rs <<'RUST'
 
 /// Returns `true` if the mutation `name` is enabled.
 pub fn mutant(name: &str) -> bool {

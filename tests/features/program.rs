@@ -36,7 +36,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
     let stop = noise_stop(levels);
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut render = SyncRender::new(&scene, &options(), settings, 2).map_err(|e| e.to_string())?;
     let reason = loop {
         if let Some(reason) = render.step() {
@@ -46,7 +46,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let glossy = tiles(&render.state.film, &scene).into_iter().filter(|(_, g)| *g);
     let samples: Vec<u32> = glossy.map(|(samples, _)| samples).collect();
     let most = samples.iter().copied().max().unwrap_or(0);
-    let noise = render.noise_codes().unwrap_or(f64::INFINITY);
+    let noise = render.noise_levels().unwrap_or(f64::INFINITY);
     if cap > 0 {
         ensure(reason == StoppedBy::RaysPerPixel, || format!("ended by {}", reason.name()))?;
         // Reflecting tiles with little noise may have fewer samples than `cap`.
@@ -132,7 +132,7 @@ fn a14_threads() {
 /// Width and height in pixels of the pictures after edits.
 const SMALL: [u32; 2] = [40, 30];
 /// Stop criterion of the pictures after edits.
-const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, seconds: None };
+const SPP: Stop = Stop { spp: Some(8), noise_levels: None, rmse_linear: None, seconds: None };
 
 /// Client of a session, which renders scenes on its own thread while they are edited.
 struct Desk {
@@ -366,7 +366,7 @@ fn a19_checkpoints() {
     let scene = Arc::new(sized(shipped("mirror-room.toml"), [96, 72]));
     let stop = noise_stop(0.7);
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let start = || Session::new(2, options(), settings).unwrap();
     let mut first = start();
     let generation = first.set_scene(Arc::clone(&scene));

@@ -38,11 +38,11 @@ fn plan(film: &Film, shards: u32) -> Plan {
             precision: film.header().precision.clone(),
             display: Display::default(),
             rays_per_pixel: 0,
-            noise_codes: 1.0,
+            noise_levels: 1.0,
             shards,
             base_plan: None,
         },
-        predicted_codes: 1.0,
+        predicted_levels: 1.0,
         slopes: [0.7; 2],
         tiles: (0..film.tile_count()).map(tile).collect(),
     }

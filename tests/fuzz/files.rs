@@ -272,11 +272,11 @@ pub fn plan() -> Vec<Vec<u8>> {
             precision: "single".into(),
             display: Display::default(),
             rays_per_pixel: 0,
-            noise_codes: 0.25,
+            noise_levels: 0.25,
             shards,
             base_plan,
         },
-        predicted_codes: 0.25,
+        predicted_levels: 0.25,
         slopes: [0.7, 0.5],
         tiles: [
             (4, 16, false),

@@ -249,7 +249,7 @@ fn checkpoints() -> Vec<Vec<u8>> {
 fn session(spp: u32) -> Session {
     let options = render_options(sobol(0));
     let stop = spp_stop(spp);
-    let criterion = Criterion::Codes;
+    let criterion = Criterion::Levels;
     let settings = Settings { adaptive: true, criterion, rays_per_pixel: 0, stop };
     Session::new(1, options, settings).unwrap()
 }

@@ -11,8 +11,6 @@ mod samples;
 mod shape_examples;
 mod statistics;
 mod tables;
-#[path = "../support/test_film.rs"]
-mod test_film;
 mod verdict;
 
 pub use numbers::*;
@@ -24,7 +22,6 @@ pub use samples::*;
 pub use shape_examples::*;
 pub use statistics::*;
 pub use tables::*;
-pub use test_film::*;
 pub use verdict::*;
 
 pub use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
@@ -47,6 +44,7 @@ pub use zerkalo_kernel::primitive::{
 pub use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 pub use zerkalo_render::export::Provenance;
 pub use zerkalo_render::film::file::FilmReader;
+pub use zerkalo_render::film::testing::TestFilm;
 pub use zerkalo_render::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile, Tone};
 pub use zerkalo_render::plan::{Plan, PlanSettings};
 pub use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};

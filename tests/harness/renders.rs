@@ -63,7 +63,7 @@ pub fn spp_stop(spp: u32) -> Stop {
 
 /// Returns the stop criterion of a noise of at most `levels` 8-bit levels.
 pub fn noise_stop(levels: f64) -> Stop {
-    Stop { noise_codes: Some(levels), ..Stop::default() }
+    Stop { noise_levels: Some(levels), ..Stop::default() }
 }
 
 static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
@@ -178,7 +178,7 @@ pub fn follow(rendering: &mut RenderState, settings: Settings, pool: &ThreadPool
 
 /// Returns the settings of a schedule that minimises the error in 8-bit levels.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
-    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
+    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel, stop }
 }
 
 /// Returns the radiance of every pixel, row by row.

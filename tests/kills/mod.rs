@@ -15,7 +15,7 @@ use crate::harness::*;
 use pty::{Pty, find, screen};
 use states::{KEYS, SAVE, SCENE, states};
 use std::sync::atomic::AtomicUsize;
-use zerkalo_render::film::read_exr;
+use zerkalo_render::image_file::read_exr;
 use zerkalo_scene::Recovery;
 use zerkalo_terminal::{ENTER, LEAVE};
 

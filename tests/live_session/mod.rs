@@ -161,14 +161,14 @@ fn noisy_light_change_resumes_finished_session() {
     })
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
-    assert!(report.noise.unwrap().rmse_codes <= 0.15);
+    assert!(report.noise.unwrap().rmse_levels <= 0.15);
     // The reported estimate equals the one that the current film gives if it is computed anew.
     let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
     // With the original lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
-    assert!(back.noise.unwrap().rmse_codes < 0.15);
+    assert!(back.noise.unwrap().rmse_levels < 0.15);
 }
 
 #[test]
@@ -262,9 +262,9 @@ fn submitted_tasks_always_run_without_waiting() {
     let probe = end.probe.unwrap();
     assert_eq!((probe.pixel, probe.radiance), ([50, 40], pixel));
     assert_eq!(u64::from(probe.samples[0] + probe.samples[1]), u64::from(end.tiles.spp[0]));
-    assert!(probe.difference.is_some() && probe.tile_rmse_codes.is_some());
+    assert!(probe.difference.is_some() && probe.tile_rmse_levels.is_some());
     assert_eq!((end.tiles.columns, end.tiles.rows), (7, 5));
-    assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
+    assert_eq!((end.tiles.noise_levels.len(), end.tiles.spp.len()), (35, 35));
 }
 
 /// Returns the scene of a wall. The colour of the wall and its distance from the eye identify

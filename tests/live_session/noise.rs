@@ -5,17 +5,17 @@ use crate::harness::*;
 
 /// Returns the picture of a session in 8-bit levels, not rounded, and the estimated noise of this
 /// picture.
-fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
+fn levels(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
         let mut row = Vec::new();
         for y in 0..r.film.height() {
             r.film.row(y, Replicates::Both, &r.mix, &mut row);
-            all.extend(row.iter().map(|x| Display::default().codes(*x)));
+            all.extend(row.iter().map(|x| Display::default().levels(*x)));
         }
         all
     };
-    let noise = |r: &RenderState| r.film.noise(&r.mix, &Display::default()).unwrap().rmse_codes;
+    let noise = |r: &RenderState| r.film.noise(&r.mix, &Display::default()).unwrap().rmse_levels;
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 
@@ -31,7 +31,7 @@ fn noise_estimate_after_light_change_is_accurate() {
     bright.ambient.color = Color([0.2, 0.1, 0.0]);
     let mut other = new_session(2, 1000, spp_stop(16384), false);
     finish(&mut other, &bright);
-    let (reference, own) = codes(&other);
+    let (reference, own) = levels(&other);
     let error = |picture: &[[f64; 3]]| {
         let square =
             |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
@@ -44,11 +44,11 @@ fn noise_estimate_after_light_change_is_accurate() {
         finish(&mut session, &scene());
         let report = finish(&mut session, &bright).report;
         assert_eq!(report.spp.mean.round(), 256.0);
-        let (picture, told) = codes(&session);
+        let (picture, told) = levels(&session);
         mixed.push(error(&picture) / told);
         let mut anew = new_session(2, seed, spp_stop(256), true);
         finish(&mut anew, &bright);
-        let (picture, told) = codes(&anew);
+        let (picture, told) = levels(&anew);
         fresh.push(error(&picture) / told);
     }
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;

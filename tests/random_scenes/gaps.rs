@@ -3,7 +3,7 @@
 use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, many};
 use crate::random_scenes::layouts::Layout;
-use crate::random_scenes::precisions::{codes, paired};
+use crate::random_scenes::precisions::{levels, paired};
 use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::words::log;
 
@@ -121,7 +121,7 @@ pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     if variants.iter().any(|variant| !variant.faults().is_empty()) {
         return false;
     }
-    let [smaller, larger] = variants.map(|scene| codes(&scene, Precision::Double, SAMPLES));
+    let [smaller, larger] = variants.map(|scene| levels(&scene, Precision::Double, SAMPLES));
     let verdict = paired(scene.film.size, ["smaller", "larger"], [&smaller, &larger], FLOOR);
     matches!(verdict, Verdict::Different(_))
 }
@@ -155,7 +155,7 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
     let variants: Option<Vec<Scene>> =
         asides.iter().map(|aside| with_gaps(&scene, &mut numbers, *aside)).collect();
     let Some(variants) = variants else { return Verdict::Skipped("sizes too different") };
-    let render = |scene: &Scene| codes(scene, Precision::Double, SAMPLES);
+    let render = |scene: &Scene| levels(scene, Precision::Double, SAMPLES);
     let gap_picture = render(&variants[0]);
     let against_gap = |other: &Scene| {
         paired(size, ["touching", "with gaps"], [&render(other), &gap_picture], FLOOR)

@@ -14,14 +14,14 @@ const SAMPLES: u32 = 4;
 const FLOOR: f64 = 0.5;
 
 /// Returns the displayed values of every pixel, in 8-bit levels: one picture for each seed.
-pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64; 3]>> {
+pub fn levels(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64; 3]>> {
     let display = Display::default();
     (0..SEEDS)
         .map(|seed| {
             let rendering = rendered(scene, seed, precision, samples);
             picture(&rendering, Replicates::Both)
                 .into_iter()
-                .map(|rgb| display.codes(rgb))
+                .map(|rgb| display.levels(rgb))
                 .collect()
         })
         .collect()
@@ -70,7 +70,7 @@ fn single_is_double(scene: &Scene) -> Verdict {
         return Verdict::Skipped("auto selects double precision");
     }
     let [single, double] =
-        [Precision::Single, Precision::Double].map(|p| codes(&scene, p, SAMPLES));
+        [Precision::Single, Precision::Double].map(|p| levels(&scene, p, SAMPLES));
     let verdict = paired(scene.film.size, ["single", "double"], [&single, &double], FLOOR);
     // Rounding decides which of two coincident opaque surfaces is visible. In seed 36 the cap of a
     // cylinder lies in a plane.

@@ -86,8 +86,8 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, max_rays: u64) -> 
         picture: picture(&rendering, Replicates::Both),
         counts: counts(&rendering),
         rays: schedule.rays() as f64,
-        reported: noise.map_or(0.0, |n| n.rmse_codes.powi(2)),
-        effective_pixels: noise.map_or(0.0, |n| n.effective_pixels.codes),
+        reported: noise.map_or(0.0, |n| n.rmse_levels.powi(2)),
+        effective_pixels: noise.map_or(0.0, |n| n.effective_pixels.levels),
         ended,
     }
 }
@@ -97,19 +97,19 @@ struct Reference {
     pictures: Vec<Vec<[f64; 3]>>,
     /// Number of samples per pixel of each picture of the reference.
     samples: u32,
-    codes: Vec<[f64; 3]>,
+    levels: Vec<[f64; 3]>,
     /// Displayed mean of the first half of the pictures, and that of the second half.
-    half_codes: [Vec<[f64; 3]>; 2],
+    half_levels: [Vec<[f64; 3]>; 2],
     /// Mean squared error of the reference, in squared 8-bit levels.
     error: f64,
 }
 
 /// Returns the mean of `pictures` as displayed, in 8-bit levels.
-fn mean_codes(pictures: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
+fn mean_levels(pictures: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
     let mean = |i: usize| {
         [0, 1, 2].map(|c| pictures.iter().map(|p| p[i][c]).sum::<f64>() / pictures.len() as f64)
     };
-    (0..pictures[0].len()).map(|i| Display::default().codes(mean(i))).collect()
+    (0..pictures[0].len()).map(|i| Display::default().levels(mean(i))).collect()
 }
 
 /// Returns the mean squared difference between a picture as displayed and the values `wanted`, in
@@ -117,8 +117,8 @@ fn mean_codes(pictures: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
 fn square(picture: &[[f64; 3]], wanted: &[[f64; 3]]) -> f64 {
     let display = Display::default();
     let squares = picture.iter().zip(wanted).flat_map(|(p, wanted)| {
-        let codes = display.codes(*p);
-        [0, 1, 2].map(|c| (codes[c] - wanted[c]).powi(2))
+        let levels = display.levels(*p);
+        [0, 1, 2].map(|c| (levels[c] - wanted[c]).powi(2))
     });
     squares.sum::<f64>() / (3 * picture.len()) as f64
 }
@@ -135,21 +135,21 @@ impl Reference {
         let display = Display::default();
         let pixels = pictures[0].len();
         let variance = |i: usize, c: usize| {
-            let levels: Vec<_> = pictures.iter().map(|p| display.codes(p[i])[c]).collect();
+            let levels: Vec<_> = pictures.iter().map(|p| display.levels(p[i])[c]).collect();
             mean_and_error(&levels).1.powi(2)
         };
         let error = (0..pixels).flat_map(|i| [0, 1, 2].map(|c| variance(i, c))).sum::<f64>()
             / (3 * pixels) as f64;
         let (first, second) = pictures.split_at(pictures.len() / 2);
-        let half_codes = [first, second].map(mean_codes);
-        let codes = mean_codes(&pictures);
-        Self { pictures, samples, codes, half_codes, error }
+        let half_levels = [first, second].map(mean_levels);
+        let levels = mean_levels(&pictures);
+        Self { pictures, samples, levels, half_levels, error }
     }
 
     /// Returns the mean squared difference between a picture and this reference, minus the error of
     /// the reference, in squared 8-bit levels.
     fn error_of(&self, picture: &[[f64; 3]]) -> f64 {
-        square(picture, &self.codes) - self.error
+        square(picture, &self.levels) - self.error
     }
 
     /// Returns `true` if the reference is good enough to measure the error of the pictures `shots`.
@@ -164,7 +164,7 @@ impl Reference {
             |half: &Vec<[f64; 3]>| mean(&|s| square(&s.picture, half)) - 2.0 * self.error;
         let allowed = MAX_REFERENCE_ERROR * truth.max(0.0) + 1e-9;
         self.error <= allowed
-            && self.half_codes.iter().all(|half| (from_half(half) - truth).abs() <= allowed)
+            && self.half_levels.iter().all(|half| (from_half(half) - truth).abs() <= allowed)
     }
 
     /// Returns a text with the largest difference of block means between pictures and reference, if

@@ -20,7 +20,7 @@ struct Outcome {
 
 fn render(scene: &Scene, threads: usize) -> Outcome {
     let mut rendering = begin(scene, 3, Precision::Auto);
-    let stop = Stop { spp: Some(SAMPLES), noise_codes: Some(0.5), ..Stop::default() };
+    let stop = Stop { spp: Some(SAMPLES), noise_levels: Some(0.5), ..Stop::default() };
     let mut schedule = rendering.schedule(settings(true, scene.film.rays_per_pixel, stop));
     let (pool, mut waves) = (pool(threads), 0);
     loop {

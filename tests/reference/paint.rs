@@ -23,7 +23,7 @@ pub struct Pixels {
     /// Number of columns and of rows.
     pub size: DVec2,
     /// Encoded colour values of the pixels as in the file, from 0 to 1.
-    codes: Vec<DVec3>,
+    levels: Vec<DVec3>,
 }
 
 impl Pixels {
@@ -39,9 +39,9 @@ impl Pixels {
         };
         let samples = image.color.samples();
         let rows = image.levels.chunks(image.width as usize * samples).rev();
-        let codes = rows.flat_map(|row| row.chunks(samples)).map(color).collect();
+        let levels = rows.flat_map(|row| row.chunks(samples)).map(color).collect();
         let size = DVec2::new(f64::from(image.width), f64::from(image.height));
-        Ok(Self { size, codes })
+        Ok(Self { size, levels })
     }
 
     /// Returns the pixel at a column and a row, which may be beyond the edges of the image.
@@ -50,7 +50,7 @@ impl Pixels {
             Wrap::Repeat => position.rem_euclid(self.size),
             Wrap::Clamp => position.clamp(DVec2::ZERO, self.size - 1.0),
         };
-        self.codes[(inside.y * self.size.x + inside.x) as usize]
+        self.levels[(inside.y * self.size.x + inside.x) as usize]
     }
 
     /// Returns `value` of the four pixels around a point, interpolated bilinearly.

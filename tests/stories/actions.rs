@@ -365,11 +365,11 @@ fn picture_stories() -> Vec<Story> {
         story("stop at …", c(), "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
             d.model.stop.spp == Some(100)
                 && d.model.stop.seconds == Some(5.0)
-                && d.model.stop.noise_codes.is_none()
+                && d.model.stop.noise_levels.is_none()
         }),
         story("noise targets and their times", c(), "N Down Enter", |_, d| {
             // The noise target changes from 0.5 to the next finer one in the list.
-            d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
+            d.model.stop.noise_levels == Some(0.25) && d.model.overlay.is_none()
         }),
         story("more threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
         story("fewer threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),

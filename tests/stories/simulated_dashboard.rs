@@ -161,7 +161,7 @@ impl Desk {
                 path: format!("room-1.{}", format.extension()).into(),
                 size: [64, 48],
                 spp: 16.0,
-                noise_codes: Some(2.5),
+                noise_levels: Some(2.5),
                 scp: "me@here:room-1.png".into(),
             })),
             Effect::Checkpoint(_) => Message::CheckpointWritten(Ok("room-1.zk".into())),

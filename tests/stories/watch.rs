@@ -26,7 +26,7 @@ fn report(shards: Vec<WatchedShards>) -> WatchReport {
         complete: Some([1, shards.len()]),
         shards,
         progress: Some(0.5),
-        target_codes: Some(0.25),
+        target_levels: Some(0.25),
         size: Some([320, 200]),
         display: Display { exposure_ev: 1.0, ..Display::default() },
         source: "rooms/blue.toml".to_string(),
@@ -121,7 +121,7 @@ fn report_sets_size_name_display_and_target() {
     assert_eq!(desk.scene().film.size, [320, 200]);
     assert_eq!(desk.model.file.name, "blue.toml");
     assert_eq!(desk.model.display.exposure_ev, 1.0);
-    assert_eq!(desk.model.stop.noise_codes, Some(0.25));
+    assert_eq!(desk.model.stop.noise_levels, Some(0.25));
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Export of pictures as files, with metadata about their origin. The metadata hold no dates,
 //! durations or numbers of threads, so that equal pictures have equal metadata.
 
+use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Display, ImageData, ImageOutput, WholeFilm};
+use crate::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
@@ -124,7 +125,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let noise = match report.noise {
         Some(n) => format!(
             "{:.4} 8-bit levels, {:.4} in 95% of the tiles, linear RMSE {:.6e}",
-            n.rmse_codes, n.p95_codes, n.rmse_linear
+            n.rmse_levels, n.p95_levels, n.rmse_linear
         ),
         None => "unknown".to_string(),
     };

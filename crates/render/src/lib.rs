@@ -2,6 +2,7 @@
 //! runs both in the background.
 
 pub mod film;
+pub mod image_file;
 
 mod checkpoint;
 pub mod export;

@@ -309,7 +309,7 @@ fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::film::Header;
-    use crate::film::test_film::TestFilm;
+    use crate::film::testing::TestFilm;
     use zerkalo_kernel::lanes::{Float, Single, Vec3};
     use zerkalo_kernel::sampling::SamplerKind;
 

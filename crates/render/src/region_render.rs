@@ -8,7 +8,8 @@
 //! within each region.
 
 use crate::export::{Provenance, metadata};
-use crate::film::{Bands, Depth, Display, Film, ImageData, ImageOutput, Noise, TileNoise};
+use crate::film::{Display, Film, Noise, TileNoise};
+use crate::image_file::{Bands, Depth, ImageData, ImageOutput};
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
 use crate::{Options, RenderState, threads};

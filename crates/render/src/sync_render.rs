@@ -64,14 +64,14 @@ impl SyncRender {
 
     /// Returns the estimated RMSE of the displayed picture, in 8-bit levels. Returns `None` before
     /// the first estimate.
-    pub fn noise_codes(&self) -> Option<f64> {
-        self.schedule.noise().map(|noise| noise.rmse_codes)
+    pub fn noise_levels(&self) -> Option<f64> {
+        self.schedule.noise().map(|noise| noise.rmse_levels)
     }
 
     /// Returns a lower and an upper estimate of the total seconds of tracing until the RMSE of the
-    /// displayed picture falls to `codes` 8-bit levels. Returns `None` before the first estimate.
-    pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
-        let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
+    /// displayed picture falls to `levels` 8-bit levels. Returns `None` before the first estimate.
+    pub fn seconds_to_noise(&self, levels: f64) -> Option<(f64, f64)> {
+        let (low, high) = self.schedule.seconds_to_noise(levels, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))
     }
 }

@@ -5,6 +5,9 @@
 //! without such an edit. A render session (the rendering thread) therefore validates the scene that
 //! it is given.
 
+#[cfg(not(unix))]
+compile_error!("zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX file locks.");
+
 pub mod asset;
 pub mod camera;
 pub mod disk;

@@ -1,4 +1,4 @@
-//! Memory that this process can still allocate.
+//! Memory that this process uses and can still allocate.
 
 use std::fs;
 use std::path::Path;
@@ -6,14 +6,13 @@ use std::path::Path;
 /// Memory that this process can still allocate, by the tightest limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Available {
-    /// Number of bytes that the process can still allocate.
+    /// Number of bytes.
     pub bytes: u64,
     /// Name of the tightest limit, as a noun phrase for messages.
     pub limit: &'static str,
 }
 
-/// Returns the memory that this process can still allocate, by the tightest known limit: address
-/// space, control groups or the machine. Returns `None` if no limit is known.
+/// Returns the memory that this process can still allocate. Returns `None` if no limit is known.
 pub fn available_memory() -> Option<Available> {
     tightest([free_address_space(), free_in_own_control_groups(), free_in_machine()])
 }
@@ -37,9 +36,8 @@ fn tightest(free: [Option<u64>; 3]) -> Option<Available> {
 const RESERVE: u64 = 32 << 20;
 
 /// Compares `needed` bytes plus a reserve of 32 MiB with the available memory. Returns `None` if
-/// they are available, or if no memory limit is known. Otherwise returns a phrase with the needed
-/// and the available memory, such as `needs 210 MB of memory, and 88 MB are available (the free
-/// memory of this machine)`.
+/// they are available, or if no limit is known. Otherwise returns a phrase such as `needs 210 MB of
+/// memory, and 88 MB are available (the free memory of this machine)`.
 pub fn missing_memory(needed: u64) -> Option<String> {
     let Available { bytes, limit } = available_memory()?;
     let needed = needed.saturating_add(RESERVE);
@@ -48,20 +46,19 @@ pub fn missing_memory(needed: u64) -> Option<String> {
         .then(|| format!("needs {sum} of memory, and {available} are available ({limit})"))
 }
 
-/// Physical memory (resident set) of this process.
+/// Physical memory (resident set) of this process \[bytes\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResidentMemory {
-    /// Number of bytes that the process occupies at present.
+    /// Present size.
     pub now: u64,
-    /// Largest number of bytes that the process has occupied so far.
+    /// Largest size so far.
     pub peak: u64,
 }
 
-/// Returns the physical memory of this process. Returns `None` on systems without Linux's
-/// `/proc/self/status`.
+/// Returns the physical memory of this process; `None` on systems other than Linux.
 pub fn resident_memory() -> Option<ResidentMemory> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
-    let bytes = |name| Some(1024 * value_of(&status, name)?);
+    let bytes = |name| Some(1024 * number_after(&status, name)?);
     Some(ResidentMemory { now: bytes("VmRSS:")?, peak: bytes("VmHWM:")? })
 }
 
@@ -73,34 +70,20 @@ pub fn megabytes(bytes: u64) -> String {
     }
 }
 
-/// Returns `true` if a resource limit (`ulimit -v`) limits the address space of this process.
-pub fn address_space_is_limited() -> bool {
-    free_address_space().is_some()
-}
-
-/// Returns the number of bytes of address space that this process may still allocate under its
-/// resource limit. Returns `None` without a limit.
-#[cfg(target_os = "linux")]
+/// Returns the number of bytes of address space that this process may still allocate; `None`
+/// without a limit, and on systems other than Linux.
 fn free_address_space() -> Option<u64> {
-    use rustix::process::{Resource, getrlimit};
-    let limit = getrlimit(Resource::As).current?;
+    let limits = fs::read_to_string("/proc/self/limits").ok()?;
+    let limit = number_after(&limits, "Max address space")?;
     let status = fs::read_to_string("/proc/self/status").ok()?;
-    Some(limit.saturating_sub(1024 * value_of(&status, "VmSize:")?))
-}
-
-/// Returns `None`: on this system the limit of the address space is unknown.
-#[cfg(not(target_os = "linux"))]
-fn free_address_space() -> Option<u64> {
-    None
+    Some(limit.saturating_sub(1024 * number_after(&status, "VmSize:")?))
 }
 
 /// File names of one version of Linux control groups.
 struct ControlGroupFiles {
-    /// Mount point of the control groups' memory controller.
+    /// Mount point of the memory controller.
     root: &'static str,
-    /// Name of the file with the control group's memory limit \[bytes\].
     limit: &'static str,
-    /// Name of the file with the memory that the control group uses \[bytes\].
     in_use: &'static str,
     /// Entry of `memory.stat` for file pages that the kernel can reclaim.
     reclaimable: &'static str,
@@ -120,17 +103,15 @@ const VERSION_2: ControlGroupFiles = ControlGroupFiles {
     reclaimable: "inactive_file",
 };
 
-/// Returns the number of bytes that the control groups of this process still permit it to allocate.
-/// Returns `None` if they set no limit.
 fn free_in_own_control_groups() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     free_in_control_groups(&groups, |path| fs::read_to_string(path).ok())
 }
 
 /// Returns the number of bytes that the control groups of a process still permit it to allocate:
-/// the minimum over its own group and all groups above it, up to the mount point of the control
-/// groups. `groups` is the text of `/proc/PID/cgroup`; `read` returns the text of a file. File
-/// pages that the kernel can reclaim count as free. Returns `None` if no group has a limit.
+/// the minimum over its own group and all groups above it. `groups` is the text of
+/// `/proc/PID/cgroup`; `read` returns the text of a file. File pages that the kernel can reclaim
+/// count as free. Returns `None` if no group has a limit.
 fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> {
     let own = groups.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':');
@@ -147,7 +128,7 @@ fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) 
         let free_in = |folder: &Path| -> Option<u64> {
             let number = |file: &str| first_number(&read(&folder.join(file))?);
             let statistics = read(&folder.join("memory.stat")).unwrap_or_default();
-            let reclaimable = value_of(&statistics, files.reclaimable).unwrap_or(0);
+            let reclaimable = number_after(&statistics, files.reclaimable).unwrap_or(0);
             let in_use = number(files.in_use)?.saturating_sub(reclaimable);
             Some(number(files.limit)?.saturating_sub(in_use))
         };
@@ -158,24 +139,22 @@ fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) 
 }
 
 /// Returns the number of bytes of memory and swap that the machine can provide without ending other
-/// programs. Returns `None` if the system does not report it.
+/// programs; `None` if the system does not report it.
 fn free_in_machine() -> Option<u64> {
     let statistics = fs::read_to_string("/proc/meminfo").ok()?;
-    let kilobytes = |name| value_of(&statistics, name);
+    let kilobytes = |name| number_after(&statistics, name);
     Some(1024 * (kilobytes("MemAvailable:")? + kilobytes("SwapFree:").unwrap_or(0)))
 }
 
-/// Returns the number at the beginning of `text`, as in the files of `/proc`; `None` if there is
-/// none.
+/// Returns the number at the beginning of `text`; `None` if there is none.
 fn first_number(text: &str) -> Option<u64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
-/// Returns the number after the word `name` in the first line that begins with this word; `None` if
-/// there is none.
-fn value_of(text: &str, name: &str) -> Option<u64> {
-    let line = text.lines().find(|line| line.split_whitespace().next() == Some(name))?;
-    line.split_whitespace().nth(1)?.parse().ok()
+/// Returns the number after `name` in the line that begins with `name`; `None` if there is none.
+fn number_after<'a>(text: &'a str, name: &str) -> Option<u64> {
+    let rest = |line: &'a str| line.strip_prefix(name).filter(|rest| rest.starts_with([' ', '\t']));
+    first_number(text.lines().find_map(rest)?)
 }
 
 #[cfg(test)]
@@ -200,7 +179,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn available_memory_is_within_memory_of_machine() {
         let statistics = fs::read_to_string("/proc/meminfo").unwrap();
-        let total = |name| 1024 * value_of(&statistics, name).unwrap();
+        let total = |name| 1024 * number_after(&statistics, name).unwrap();
         let available = available_memory().unwrap();
         assert!(available.bytes > 1 << 20, "{available:?}");
         assert!(available.bytes <= total("MemTotal:") + total("SwapTotal:"), "{available:?}");
@@ -229,8 +208,8 @@ mod tests {
     #[test]
     fn statistics_of_the_kernel_are_parsed() {
         let text = "MemTotal:   100 kB\nMemAvailable:  42 kB\nSwapFree: x\n";
-        assert_eq!(value_of(text, "MemAvailable:"), Some(42));
-        assert_eq!((value_of(text, "SwapFree:"), value_of(text, "Mem")), (None, None));
+        assert_eq!(number_after(text, "MemAvailable:"), Some(42));
+        assert_eq!((number_after(text, "SwapFree:"), number_after(text, "Mem")), (None, None));
         assert_eq!((first_number("max\n"), first_number("77 12\n")), (None, Some(77)));
     }
 

@@ -48,7 +48,7 @@ const SYNCHRONISED: u16 = 2026;
 /// Returns the request of the cursor position. A terminal replies when it has processed all earlier
 /// bytes. If `through` is a multiplexer, the request is wrapped, so that the multiplexer passes it
 /// on. The terminal outside of the multiplexer then replies.
-pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
+pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
         Some(Multiplexer::Tmux) => "\x1bPtmux;\x1b\x1b[6n\x1b\\",

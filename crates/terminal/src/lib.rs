@@ -20,9 +20,9 @@ mod tests;
 
 use crate::event::{Key, Mouse};
 pub use capabilities::{Capabilities, Environment, Multiplexer};
-pub(crate) use capability_query::cursor_request;
+pub use capability_query::cursor_request;
 pub use capability_query::query_capabilities;
-pub(crate) use clipboard::copied;
+pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};

@@ -14,10 +14,10 @@ struct Document<'a> {
     lanes: &'static str,
     threads: usize,
     reference_spp: f64,
-    reference_codes: f64,
+    reference_levels: f64,
     reference_linear: f64,
     reference_seconds: f64,
-    compared_at_codes: f64,
+    compared_at_levels: f64,
     /// Largest relative uncertainty that the noise of the reference picture causes in a measured
     /// error. Points of the error curves with too uncertain an error are left out.
     errors_spread: f64,
@@ -43,9 +43,9 @@ struct Variation<'a> {
     /// Efficiency of the render: 1 / (MSE of the linear picture x seconds).
     efficiency: Option<f64>,
     bias_z: Option<f64>,
-    bias_codes: Option<f64>,
+    bias_levels: Option<f64>,
     /// Smallest bias of the picture that can be distinguished from noise, in 8-bit levels.
-    bias_least_codes: Option<f64>,
+    bias_least_levels: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
 }
@@ -57,9 +57,9 @@ struct Point {
     spp: f64,
     seconds: f64,
     seconds_spread: f64,
-    told_codes: Option<f64>,
-    rmse_codes: f64,
-    rmse_codes_spread: f64,
+    estimated_levels: Option<f64>,
+    rmse_levels: f64,
+    rmse_levels_spread: f64,
     rmse_linear: f64,
     rel_mse: f64,
 }
@@ -79,9 +79,9 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
         spp: p.spp,
         seconds: median(&measured.seconds(p)),
         seconds_spread: spread(&measured.seconds(p)),
-        told_codes: p.estimated_codes,
-        rmse_codes: p.errors.rmse_codes,
-        rmse_codes_spread: p.errors.spread,
+        estimated_levels: p.estimated_levels,
+        rmse_levels: p.errors.rmse_levels,
+        rmse_levels_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
         rel_mse: p.errors.rel_mse,
     })
@@ -101,9 +101,9 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         efficiency: measured.efficiency(),
         // The z-score of a difference without noise is infinite, which JSON cannot represent.
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
-        bias_codes: measured.bias.map(|b| b.codes),
-        bias_least_codes: measured.bias.map(|b| b.least_codes),
-        crossings: targets.iter().filter_map(|codes| measured.time_to(*codes)).collect(),
+        bias_levels: measured.bias.map(|b| b.levels),
+        bias_least_levels: measured.bias.map(|b| b.least_levels),
+        crossings: targets.iter().filter_map(|levels| measured.time_to(*levels)).collect(),
         points: points(measured).collect(),
     }
 }
@@ -120,10 +120,10 @@ pub fn json(report: &MeasureReport) -> Vec<u8> {
         lanes: report.lanes,
         threads: report.threads,
         reference_spp: m.reference_spp,
-        reference_codes: m.reference_codes,
+        reference_levels: m.reference_levels,
         reference_linear: m.reference_linear,
         reference_seconds: m.reference_seconds,
-        compared_at_codes: m.compared_at,
+        compared_at_levels: m.compared_at,
         errors_spread: m.reference_uncertainty(),
         times_spread: steadiness.spread,
         taken_by_others: steadiness.stolen,

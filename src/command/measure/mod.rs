@@ -8,13 +8,14 @@ use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
 use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene_and_warn};
-use zerkalo_scene::disk::{self, check_writable};
-use zerkalo_render::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
-use zerkalo_world::{self as world, AnyWorld};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
+use zerkalo_render::film::Display;
+use zerkalo_render::image_file;
+use zerkalo_scene::disk::{self, check_writable};
+use zerkalo_world::{self as world, AnyWorld};
 
 /// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
@@ -109,7 +110,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
         Drawing::Svg => measure::plot::svg(report.measurement, &title).map(String::into_bytes),
         Drawing::Png => measure::plot::pixels(report.measurement, &title).and_then(|pixels| {
             let (width, height) = measure::plot::size(report.measurement);
-            Ok(film::png_of_rgb([width, height], &pixels)?)
+            Ok(image_file::png_of_rgb([width, height], &pixels)?)
         }),
     };
     let bytes = drawn.map_err(|error| format!("cannot draw: {error}"))?;
@@ -119,7 +120,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
 /// Reads the reference picture at `path`, an EXR file that must have the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
-    let read = film::read_exr(path).map_err(failed)?;
+    let read = image_file::read_exr(path).map_err(failed)?;
     let [width, height] = read.size;
     if read.size != size.map(|n| n as usize) {
         return Err(failed(format!(

@@ -127,7 +127,7 @@ impl fmt::Display for MeasureReport<'_> {
                 "Errors are against a reference of {:.0} samples per pixel, whose own error is {:.3} 8-bit levels ({}); \
                  against another\none they would be the same within {:.1} %.",
                 m.reference_spp,
-                m.reference_codes,
+                m.reference_levels,
                 time(m.reference_seconds),
                 (100.0 * m.reference_uncertainty()).max(0.1)
             )?;
@@ -145,7 +145,7 @@ impl fmt::Display for MeasureReport<'_> {
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
         for target in &m.targets {
-            let expected = m.expected.iter().find(|e| e.codes == *target);
+            let expected = m.expected.iter().find(|e| e.levels == *target);
             match (default.time_to(*target), expected) {
                 (Some(c), _) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
                 (None, Some(e)) => writeln!(
@@ -212,9 +212,9 @@ impl MeasureReport<'_> {
     }
 
     fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
-        let codes = self.measurement.compared_at;
-        let default = self.measurement.measured[0].time_to(codes);
-        let reached_at = measured.true_time_to(codes);
+        let levels = self.measurement.compared_at;
+        let default = self.measurement.measured[0].time_to(levels);
+        let reached_at = measured.true_time_to(levels);
         let followed = || measured.points.last().map_or(0.0, |p| median(&measured.seconds(p)));
         let (time, speed) = match (&reached_at, &default) {
             (Some(target), Some(default)) => {
@@ -231,8 +231,8 @@ impl MeasureReport<'_> {
         let rate = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
         write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
         match measured.bias {
-            Some(b) if b.is_seen() => writeln!(f, "   {:.2} levels (z = {:.0})", b.codes, b.z),
-            Some(b) => writeln!(f, "   not detectable (below {:.2} levels)", b.least_codes),
+            Some(b) if b.is_seen() => writeln!(f, "   {:.2} levels (z = {:.0})", b.levels, b.z),
+            Some(b) => writeln!(f, "   not detectable (below {:.2} levels)", b.least_levels),
             None => writeln!(f),
         }
     }

@@ -2,11 +2,11 @@
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::dashboard::model::first_line;
-use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
-use zerkalo_scene::value::sanitized;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
 
 /// Pause in editing after which unsaved edits are written to the recovery file.
 const DEBOUNCE: Duration = Duration::from_millis(400);

@@ -5,11 +5,11 @@ use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::file_worker::Job;
 use crate::dashboard::run::shared_file::SharedFile;
-use zerkalo_scene::{Scene, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_scene::{Scene, SceneFile};
 
 pub enum AutosaveJob {
     /// Schedule an autosave of this scene. `None` cancels it and removes the recovery file.

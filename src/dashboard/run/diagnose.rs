@@ -1,14 +1,14 @@
 //! Diagnostics of the terminal and its connection, without visible output.
 
 use crate::dashboard::run::signals::{block, watch};
+use rustix::termios::tcgetwinsize;
+use std::io;
+use std::time::{Duration, Instant};
 use zerkalo_terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use zerkalo_terminal::{
     Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, Tty, cell_px,
     cursor_request, query_capabilities, size,
 };
-use rustix::termios::tcgetwinsize;
-use std::io;
-use std::time::{Duration, Instant};
 
 /// Timeout for a reply to a request that the terminal may not support.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -8,16 +8,16 @@ use crate::dashboard::run::file_worker::{Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{export_paths, image_viewer};
-use zerkalo_render::film::LinearImage;
-use zerkalo_render::Options;
-use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Session, Snapshot};
-use zerkalo_scene::SceneFile;
 use crossbeam_channel::{Receiver, Sender};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_render::Options;
+use zerkalo_render::film::LinearImage;
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::session::{Session, Snapshot};
+use zerkalo_scene::SceneFile;
 
 /// Niceness of tracing threads with low priority: the largest value of Linux. Threads of normal
 /// priority get nearly all the time of a processor that they share with such a thread.

@@ -5,20 +5,21 @@ use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::export_paths::{numbered, scp};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use zerkalo_scene::disk::Existing;
-use zerkalo_render::film::{Depth, Film, ImageOutput};
-use zerkalo_render::export::{Provenance, scene_hash};
-use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Report, Session, State};
-use zerkalo_render::{EncodedCheckpoint, Options, RenderState};
-use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::Scene;
 use crossbeam_channel::Sender;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::film::Film;
+use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_render::schedule::Settings;
+use zerkalo_render::session::{Report, Session, State};
+use zerkalo_render::{EncodedCheckpoint, Options, RenderState};
+use zerkalo_scene::Scene;
+use zerkalo_scene::disk::Existing;
 
 /// Interval at which the progress of a render for an exported image is polled.
 const LOOK: Duration = Duration::from_millis(200);
@@ -197,7 +198,7 @@ pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
         path,
         size: [film.width(), film.height()],
         spp: report.spp.mean,
-        noise_codes: report.noise.map(|noise| noise.rmse_codes),
+        noise_levels: report.noise.map(|noise| noise.rmse_levels),
     }
 }
 

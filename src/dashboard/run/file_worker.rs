@@ -7,14 +7,14 @@ use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
 use crate::dashboard::run::worker::Worker;
-use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
@@ -72,10 +72,10 @@ impl Files {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // The stamp of a file is its modification time and length. A readable file gets no stamp
-        // yet, so that the first check compares its contents. An unreadable file gets one, so that
-        // its errors, which have been reported, are not reported again.
-        let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
+        // A readable file gets no stamp yet, so that the first check compares its contents. An
+        // unreadable file gets one, so that its errors, which have been reported, are not reported
+        // again.
+        let seen = path.as_deref().filter(|_| file.is_none()).and_then(FileStamp::of);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
         let shared = SharedFile::new(autosave.recovery.elsewhere());
@@ -193,23 +193,13 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-/// Stamp of a file: its modification time and length. A new stamp shows that the file may have
-/// changed. `None` if the file has no metadata.
-type FileStamp = Option<(SystemTime, u64)>;
-
-fn stamp(path: &Path) -> FileStamp {
-    let metadata = fs::metadata(path).ok()?;
-    Some((metadata.modified().ok()?, metadata.len()))
-}
-
 struct FileWorker {
     /// Path of the scene file; `None` for a scene without file.
     path: Option<PathBuf>,
     /// Scene file as last read or written; `None` if it has never been readable.
     file: Option<SceneFile>,
-    /// Stamp (modification time, length) of the scene file when it was last read, written or
-    /// checked.
-    seen: FileStamp,
+    /// Stamp of the scene file when it was last read, written or checked.
+    seen: Option<FileStamp>,
     /// Folder for the program's state according to the XDG specification; `None` if the user has no
     /// such folder.
     state: Option<PathBuf>,
@@ -257,7 +247,7 @@ impl FileWorker {
     /// check.
     fn changed(&mut self) -> bool {
         let Some(path) = &self.path else { return false };
-        let now = stamp(path);
+        let now = FileStamp::of(path);
         if self.seen == now {
             return false;
         }
@@ -283,7 +273,7 @@ impl FileWorker {
             None => file.save(scene, overwrite)?,
         }
         let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
-        self.seen = stamp(&path);
+        self.seen = FileStamp::of(&path);
         let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
         self.shared.set_elsewhere(recovery.elsewhere());
         self.shared.put(file);
@@ -293,9 +283,9 @@ impl FileWorker {
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // The stamp (modification time and length) is taken before the file is read, so that a
-        // write during the read counts as a change.
-        self.seen = self.path.as_deref().and_then(stamp);
+        // The stamp is taken before the file is read, so that a write during the read counts as a
+        // change.
+        self.seen = self.path.as_deref().and_then(FileStamp::of);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {
                 let file = self.file.insert(file);
@@ -314,6 +304,7 @@ impl FileWorker {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
     use zerkalo_scene::starter;
 
     /// Longest time that a test waits for a message of the file worker. Only a failing test reaches

@@ -6,14 +6,14 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
-use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
-use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
-use zerkalo_terminal::{Capabilities, Tty, copied, cursor_request};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
+use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
+use zerkalo_terminal::{Capabilities, Tty, copied, cursor_request};
 
 /// Sequences that start and end a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];

@@ -1,7 +1,7 @@
 //! Upload of an image for the viewer to the terminal, in parts of limited size.
 
-use zerkalo_terminal::image::ViewerImage;
 use std::sync::Arc;
+use zerkalo_terminal::image::ViewerImage;
 
 /// Largest size of a slice of the image in bytes. It bounds the latency of keys, because no frame
 /// can be sent while a slice is being written.

@@ -6,15 +6,16 @@ use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::shrink::shrunk;
 use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
-use zerkalo_render::film::{Display, png_of_rgb, read_exr, read_png};
-use zerkalo_terminal::cells::Raster;
-use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
-use zerkalo_terminal::{Capabilities, cell_px};
 use crossbeam_channel::Sender;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
+use zerkalo_render::film::Display;
+use zerkalo_render::image_file::{png_of_rgb, read_exr, read_png};
+use zerkalo_terminal::cells::Raster;
+use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
+use zerkalo_terminal::{Capabilities, cell_px};
 
 /// Longest time in which an image may be sent to the terminal. On slow connections the image is
 /// downscaled to keep within this time.

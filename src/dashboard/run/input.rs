@@ -1,12 +1,12 @@
 //! Conversion of terminal events to messages for the model.
 
 use crate::dashboard::message::Message;
-use zerkalo_terminal::event::{Mouse, MouseKind};
-use zerkalo_terminal::{InputReader, TimedEvent};
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;
 use std::time::Instant;
+use zerkalo_terminal::event::{Mouse, MouseKind};
+use zerkalo_terminal::{InputReader, TimedEvent};
 
 /// User input with the time at which it was read.
 #[derive(Debug)]

@@ -3,11 +3,11 @@
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
 use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, stop_process};
-use zerkalo_terminal::{TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_terminal::{TimedEvent, Tty, size};
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);

@@ -1,10 +1,10 @@
 //! Measurement of input latency: the time from reading an input event until the frame that responds
 //! to the event has been written to the terminal.
 
-use zerkalo_scene::disk;
 use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
+use zerkalo_scene::disk;
 
 /// Input event to which no frame has responded yet.
 #[derive(Clone, Copy, Debug)]

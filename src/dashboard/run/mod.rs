@@ -24,15 +24,6 @@ mod writer;
 use crate::dashboard::message::{Effect, Exported, Message};
 use crate::dashboard::model::Model;
 use crate::dashboard::update::update;
-use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::schedule::{Settings, Stop};
-use zerkalo_render::session::{Snapshot, State};
-use zerkalo_render::{Checkpoint, Options};
-use zerkalo_scene::{SceneErrors, SceneFile};
-use zerkalo_terminal::flow::LinkStatus;
-use zerkalo_terminal::{
-    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
-};
 use crossbeam_channel::{Receiver, after, never, select, unbounded};
 use effects::{EffectRunner, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
@@ -45,6 +36,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use watch_runner::WatchRunner;
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_render::{Checkpoint, Options};
+use zerkalo_scene::{SceneErrors, SceneFile};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::{
+    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
+};
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
@@ -512,4 +512,4 @@ const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 /// Default stop criterion: a noise of half an 8-bit level, which is half a quantisation step of an
 /// 8-bit image file.
 pub const DEFAULT_STOP: Stop =
-    Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };
+    Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };

@@ -1,7 +1,7 @@
 //! Contents of the scene file as last read or written, shared between threads.
 
-use zerkalo_scene::{Recovery, SceneFile};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use zerkalo_scene::{Recovery, SceneFile};
 
 /// State of the scene file, shared between threads: its contents as last read or written, and the
 /// writer of its recovery files in the user's state folder. The lock is not held during disk

@@ -1,7 +1,6 @@
 //! Handling of signals that end, stop or continue the program, and of the signal that the terminal
 //! was resized. After a terminating signal the dashboard has a grace period to end by itself.
 
-use zerkalo_terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
 use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
@@ -11,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
+use zerkalo_terminal::Tty;
 
 /// Grace period after a terminating signal. If the dashboard has not ended by then, the thread that
 /// handles signals restores the terminal and ends the program.

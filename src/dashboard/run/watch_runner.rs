@@ -6,15 +6,16 @@ use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
 use crate::dashboard::run::export_paths::numbered;
 use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
-use zerkalo_render::film::file::FilmFileHeader;
-use zerkalo_render::film::{Depth, Film, ImageOutput, LinearImage};
-use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::session::{Report, Snapshot, WatchSession};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+use zerkalo_render::film::file::FilmFileHeader;
+use zerkalo_render::film::{Film, LinearImage};
+use zerkalo_render::image_file::{Depth, ImageOutput};
+use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::session::{Report, Snapshot, WatchSession};
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
@@ -63,7 +64,7 @@ fn write(
     let stem = stem(None, header.source().unwrap_or_default());
     let create = |path: &Path| {
         let output = ImageOutput::from_path(path)?.create_new();
-        header.write_picture(film, Depth::Eight, &output)
+        output.write_film(header, film, Depth::Eight)
     };
     let path = numbered(&stem, format.extension(), create)?;
     Ok(exported(path, film, report))

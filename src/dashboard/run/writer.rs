@@ -1,11 +1,11 @@
 //! Thread that writes frames to the terminal, so that a slow terminal does not block the dashboard.
 
-use zerkalo_terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
+use zerkalo_terminal::Tty;
 
 /// Channels of the thread that writes frames to the terminal, one at a time.
 pub struct Writer {

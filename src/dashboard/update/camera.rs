@@ -1,8 +1,8 @@
 //! Commands that move the camera, by keys and mouse.
 
-use zerkalo_scene::camera::Camera;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use zerkalo_scene::Scene;
+use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::{
     Edit, EditError, Target, bounds, pivot_distance, recall_view, scene_bounds, step_length,
 };

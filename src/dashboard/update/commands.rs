@@ -9,8 +9,8 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
 use crate::dashboard::update::UpdateContext;
-use zerkalo_terminal::event::Key;
 use HintLine as H;
+use zerkalo_terminal::event::Key;
 
 /// State of the dashboard that selects the hints in the hint line, the last row of the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

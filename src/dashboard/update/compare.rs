@@ -4,8 +4,8 @@
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
 use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
-use zerkalo_render::film::{LinearImage, Tone};
 use std::sync::Arc;
+use zerkalo_render::film::{LinearImage, Tone};
 
 /// Change of the displayed picture's exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;

@@ -5,11 +5,11 @@ use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, first_line, short_name};
 use crate::dashboard::overlay::Answer;
 use crate::dashboard::update::UpdateContext;
-use zerkalo_scene::edit::{Target, outline};
-use zerkalo_scene::{SaveError, Scene, SceneErrors};
-use zerkalo_scene::value::sanitized;
 use std::path::PathBuf;
 use std::sync::Arc;
+use zerkalo_scene::edit::{Target, outline};
+use zerkalo_scene::value::sanitized;
+use zerkalo_scene::{SaveError, Scene, SceneErrors};
 
 const KEEP_FILE: (char, &str, Answer) = ('k', "keep the file on disk", Answer::Nothing);
 const KEEP_EDITS: (char, &str, Answer) = ('k', "keep my edits", Answer::Nothing);
@@ -165,10 +165,10 @@ impl UpdateContext<'_> {
 
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
-            Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
+            Ok(Exported { path, size: [width, height], spp, noise_levels, scp }) => {
                 // If the image has the size of the export in the background, this export has ended.
                 self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
-                let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
+                let noise = noise_levels.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
                     "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",
                     path.display()

@@ -4,8 +4,8 @@
 use crate::dashboard::model::FieldList;
 use crate::dashboard::overlay::{Form, Overlay, Pick};
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use zerkalo_scene::edit::{self, Edit, EditError, Word};
 use std::sync::Arc;
+use zerkalo_scene::edit::{self, Edit, EditError, Word};
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {

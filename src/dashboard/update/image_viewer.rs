@@ -4,9 +4,9 @@ use crate::dashboard::message::Effect;
 use crate::dashboard::model::short_name;
 use crate::dashboard::overlay::{Overlay, ViewedImage};
 use crate::dashboard::update::UpdateContext;
-use zerkalo_terminal::image::ViewerImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use zerkalo_terminal::image::ViewerImage;
 
 impl UpdateContext<'_> {
     /// Shows the last exported image.

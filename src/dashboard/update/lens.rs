@@ -1,8 +1,8 @@
 //! Commands on focus and aperture of the camera.
 
-use zerkalo_scene::camera::{Aperture, Camera};
 use crate::dashboard::update::mouse::first_hit;
 use crate::dashboard::update::{Coalesce, UpdateContext};
+use zerkalo_scene::camera::{Aperture, Camera};
 use zerkalo_scene::edit::{self, bounds};
 use zerkalo_scene::value::{number, round_significant};
 

@@ -9,10 +9,10 @@ use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{COMMANDS, Command};
-use zerkalo_render::schedule::Stop;
-use zerkalo_render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
+use zerkalo_render::schedule::Stop;
+use zerkalo_render::session::QUALITIES;
 
 /// Returns `cursor` moved by `steps`, clamped to a list of `len` entries.
 fn moved(cursor: usize, steps: isize, len: usize) -> usize {
@@ -84,9 +84,9 @@ impl UpdateContext<'_> {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
             Some(Overlay::NoiseTargets { cursor }) => {
-                let noise_codes = Some(QUALITIES[*cursor]);
+                let noise_levels = Some(QUALITIES[*cursor]);
                 self.model.overlay = None;
-                self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
+                self.set_stop(Stop { noise_levels, rmse_linear: None, ..self.model.stop });
             }
             Some(Overlay::CommandPalette(palette)) => {
                 if let Some(found) = palette.found.get(palette.cursor) {

@@ -26,15 +26,15 @@ use crate::dashboard::message::{Effect, Message};
 use crate::dashboard::model::{FieldList, Model, Notice, Tone};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{nearest_field, outline, outline_position, scrolled};
-use zerkalo_render::session::{State, View};
-use zerkalo_scene::Scene;
-use zerkalo_scene::edit::{Edit, EditError, Target};
-use zerkalo_scene::value::sanitized;
 use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 use undo_coalescing::Coalesce;
+use zerkalo_render::session::{State, View};
+use zerkalo_scene::Scene;
+use zerkalo_scene::edit::{Edit, EditError, Target};
+use zerkalo_scene::value::sanitized;
 
 /// Updates the model with a message and returns the effects. `now` is the current time since any
 /// fixed origin.

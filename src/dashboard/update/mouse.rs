@@ -6,11 +6,11 @@ use crate::dashboard::model::{Drag, FieldList, Mode};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
+use glam::DVec3;
+use ratatui::layout::Rect;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
-use glam::DVec3;
-use ratatui::layout::Rect;
 
 /// Number of lines that a list scrolls per tick of the mouse wheel.
 pub(super) const WHEEL_LINES: i32 = 3;

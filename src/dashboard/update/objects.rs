@@ -2,8 +2,8 @@
 
 use crate::dashboard::model::Mode;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
-use zerkalo_scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
+use zerkalo_scene::edit::{self, bounds, step_length};
 
 /// Angle in degrees of one step of turning the selection.
 const TURN_DEGREES: f64 = 15.0;

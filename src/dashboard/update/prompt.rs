@@ -5,11 +5,11 @@ use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
 use crate::dashboard::overlay::{Overlay, Prompt};
 use crate::dashboard::update::{Coalesce, UpdateContext};
+use std::path::PathBuf;
+use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_scene::edit::{self, Target};
 use zerkalo_scene::value::{number, truncated};
-use std::path::PathBuf;
-use std::sync::Arc;
 
 impl UpdateContext<'_> {
     /// Opens a prompt with `text`, which the user edits and which is then passed to `apply`.
@@ -150,7 +150,7 @@ impl UpdateContext<'_> {
 /// Formats stop criteria, such as `noise 0.5 time 60`. If there are none, returns `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
-        ("noise", stop.noise_codes),
+        ("noise", stop.noise_levels),
         ("rmse", stop.rmse_linear),
         ("spp", stop.spp.map(f64::from)),
         ("time", stop.seconds),
@@ -179,7 +179,7 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             |expected: &str| format!("{word} cannot be \"{}\": {expected}.", truncated(value));
         let number = || positive.ok_or_else(|| wrong("expected a number greater than 0"));
         match word.to_ascii_lowercase().as_str() {
-            "noise" => stop.noise_codes = Some(number()?),
+            "noise" => stop.noise_levels = Some(number()?),
             "rmse" => stop.rmse_linear = Some(number()?),
             "time" => stop.seconds = Some(number()?),
             "spp" => {
@@ -204,7 +204,7 @@ mod tests {
     fn stop_criteria_round_trip_through_text() {
         let all = Stop {
             spp: Some(1000),
-            noise_codes: Some(0.5),
+            noise_levels: Some(0.5),
             rmse_linear: Some(0.001),
             seconds: Some(60.0),
         };

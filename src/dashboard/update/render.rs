@@ -6,9 +6,9 @@ use crate::dashboard::model::Colors;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::prompt::stop_text;
 use crate::dashboard::update::{UpdateContext, cycled};
+use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
-use std::sync::Arc;
 
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
@@ -32,8 +32,8 @@ impl UpdateContext<'_> {
     /// Opens the list of noise targets (noise values at which rendering stops) with the cursor on
     /// the current target.
     pub(super) fn open_noise_targets(&mut self) {
-        let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
-        let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);
+        let wanted = self.model.stop.noise_levels.unwrap_or(0.5);
+        let cursor = QUALITIES.iter().position(|levels| *levels <= wanted);
         self.model.overlay =
             Some(Overlay::NoiseTargets { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
     }

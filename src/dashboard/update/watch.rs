@@ -5,13 +5,13 @@ use crate::dashboard::model::{Mode, WatchTable, short_name};
 use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
+use std::path::Path;
+use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{WatchReport, WatchedShards};
 use zerkalo_scene::Scene;
-use zerkalo_terminal::event::{Mouse, MouseKind};
 use zerkalo_scene::value::sanitized;
-use std::path::Path;
-use std::sync::Arc;
+use zerkalo_terminal::event::{Mouse, MouseKind};
 
 impl UpdateContext<'_> {
     /// Stores a report on the watched files. A cursor in the first row of the table stays in the
@@ -34,7 +34,7 @@ impl UpdateContext<'_> {
             "" => "no film yet".to_string(),
             source => short_name(Path::new(&sanitized(source))),
         };
-        self.model.stop = Stop { noise_codes: report.target_codes, ..Stop::default() };
+        self.model.stop = Stop { noise_levels: report.target_levels, ..Stop::default() };
         let key = |row: &WatchedShards| (row.path.clone(), row.shards.clone());
         let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
         let same = report.shards.iter().position(|row| Some(key(row)) == at);

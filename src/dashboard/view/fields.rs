@@ -8,13 +8,13 @@ use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns, paragraphs, skip};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::film::Display;
-use zerkalo_scene::edit::{Property, Widget};
-use zerkalo_scene::value::{number, round_significant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
+use zerkalo_render::film::Display;
+use zerkalo_scene::edit::{Property, Widget};
+use zerkalo_scene::value::{number, round_significant};
 
 /// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
 /// the property under the cursor.
@@ -105,7 +105,8 @@ impl Fields<'_> {
         if let Some(editor) = self.state.editor.as_ref().filter(|_| chosen) {
             return typed(editor, &mut to, theme);
         }
-        let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().codes_8(color)));
+        let swatch =
+            field.swatch.and_then(|color| theme.swatch(Display::default().levels_8(color)));
         if let Some(style) = swatch {
             to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
         }

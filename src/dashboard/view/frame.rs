@@ -6,11 +6,11 @@ use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::film::Tone;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::widgets::{Block, Clear, Widget};
+use zerkalo_render::film::Tone;
 
 /// Draws the border of a panel with its title. `focused` is `true` if the panel has the focus.
 pub fn panel(area: Rect, title: &str, focused: bool, theme: &Theme, buffer: &mut Buffer) {

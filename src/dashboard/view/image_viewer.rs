@@ -5,11 +5,11 @@ use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
-use zerkalo_terminal::cells::PictureCells;
-use zerkalo_terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
+use zerkalo_terminal::cells::PictureCells;
+use zerkalo_terminal::image::{Protocol, ViewerImage};
 
 /// Draws the viewed image in half blocks (characters that show two pixels per cell) and returns
 /// these cells. If the terminal supports an image protocol, the uploaded image later replaces the

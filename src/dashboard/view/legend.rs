@@ -3,10 +3,10 @@
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
+use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 
 /// Width of the legend's colour bar in columns.
 const BAR: usize = 12;

@@ -5,12 +5,12 @@ use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::view::text::{Row, paragraphs};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::session::State;
-use zerkalo_scene::Diagnostic;
-use zerkalo_scene::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
+use zerkalo_render::session::State;
+use zerkalo_scene::Diagnostic;
+use zerkalo_scene::value::sanitized;
 
 /// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {

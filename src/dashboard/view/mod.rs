@@ -23,13 +23,13 @@ mod watch;
 use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
-use zerkalo_terminal::cells::{Colors, PictureCells};
 use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use text::Row;
 use theme::Theme;
+use zerkalo_terminal::cells::{Colors, PictureCells};
 
 /// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]

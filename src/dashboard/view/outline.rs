@@ -8,9 +8,9 @@ use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns};
 use crate::dashboard::view::theme::Theme;
+use ratatui::buffer::Buffer;
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::cells::object_color;
-use ratatui::buffer::Buffer;
 
 /// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {

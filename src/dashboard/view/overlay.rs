@@ -10,10 +10,10 @@ use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::session::QUALITIES;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
+use zerkalo_render::session::QUALITIES;
 
 /// Draws the open overlay. Returns the position of the text cursor, or `None` if the cursor is
 /// hidden.
@@ -105,7 +105,7 @@ impl Painter<'_> {
         let good = self.theme.good();
         let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
         let cost_of = |i| report.map_or(Cost::Unknown, |r| cost(r, &model.convergence, i));
-        for (row, (i, noise_codes)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
+        for (row, (i, noise_levels)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
             let (mut to, [name, remainder, _]) = self.choice(row, i == cursor);
             let cost = match cost_of(i) {
                 Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
@@ -113,10 +113,10 @@ impl Painter<'_> {
                 Cost::Left(from, to) => format!("{} more", durations(from, to)),
                 Cost::Unknown => "not known yet".to_string(),
             };
-            let mark = if model.stop.noise_codes == Some(noise_codes) { "→ " } else { "  " };
+            let mark = if model.stop.noise_levels == Some(noise_levels) { "→ " } else { "  " };
             to.put_right("  ", 0, remainder).put_right(&cost, 8, name);
             to.put_right("  ", 0, remainder).put(mark, good);
-            to.put_wide(&noise_codes.to_string(), 5, name);
+            to.put_wide(&noise_levels.to_string(), 5, name);
             to.skip(2).put(LOOKS[i], remainder);
         }
         self.say(ABOUT, self.theme.dim());

@@ -5,16 +5,16 @@ use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use std::sync::Arc;
 use zerkalo_render::film::{Display, LinearImage, TILE};
 use zerkalo_render::session::{Snapshot, State};
 use zerkalo_terminal::cells::{
     NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
 };
 use zerkalo_world::FirstHit;
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::style::Style;
-use std::sync::Arc;
 
 /// Converter of the dashboard's model to rasters: images whose pixels are half cells of the
 /// terminal. It caches the pinned picture (an earlier picture that the user has stored for
@@ -78,7 +78,7 @@ impl PictureView {
                 Some(resized(displayed(&radiance, &model.display, from), size))
             }
             DisplayChannel::Noise => {
-                let noise = &snapshot.tiles.noise_codes;
+                let noise = &snapshot.tiles.noise_levels;
                 self.tiles(model, snapshot, "8-bit levels of noise", size, noise)
             }
             DisplayChannel::Samples => {
@@ -274,7 +274,7 @@ mod tests {
         let radiance = [[0.01, 0.2, 3.0], [0.5, 0.0, 0.1]];
         let raster = displayed(&radiance, &display, [2, 1]);
         for (pixel, radiance) in raster.pixels.iter().zip(radiance) {
-            assert_eq!(*pixel, display.codes_8(radiance.map(f64::from)));
+            assert_eq!(*pixel, display.levels_8(radiance.map(f64::from)));
         }
     }
 }

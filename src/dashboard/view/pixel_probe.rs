@@ -5,11 +5,11 @@ use crate::dashboard::model::Model;
 use crate::dashboard::view::frame::overlay;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::film::quantised_8;
-use zerkalo_scene::edit::Target;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
+use zerkalo_render::film::quantised_8;
+use zerkalo_scene::edit::Target;
 
 /// Width in columns of the box with the values of the probed pixel, with its border.
 const WIDTH: u16 = 36;
@@ -51,7 +51,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         row.skip(1).put_wide(name, 10, theme.dim());
         if i == 1
             && let Some(probe) = model.probed()
-            && let Some(style) = theme.swatch(probe.codes.map(quantised_8))
+            && let Some(style) = theme.swatch(probe.levels.map(quantised_8))
         {
             row.put_right(" ", 0, style).put_right("██", columns(value), style);
         }
@@ -68,14 +68,14 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let [a, b] = probe.samples;
     let mut lines = vec![
         ("radiance", three(probe.radiance)),
-        ("levels", probe.codes.map(|c| format!("{c:.1}")).join("  ")),
+        ("levels", probe.levels.map(|c| format!("{c:.1}")).join("  ")),
         ("samples", format!("{}", u64::from(a) + u64::from(b))),
     ];
     if let Some(difference) = probe.difference {
         lines.push(("error", format!("± {}", three(difference))));
     }
-    if let Some(codes) = probe.tile_rmse_codes {
-        lines.push(("tile", format!("± {} levels", number(codes))));
+    if let Some(levels) = probe.tile_rmse_levels {
+        lines.push(("tile", format!("± {} levels", number(levels))));
     }
     if let Some(name) = seen(model, probe.pixel) {
         lines.push(("object", name));

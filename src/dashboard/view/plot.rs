@@ -82,19 +82,19 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     };
     let corner = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     let mut title = Row::new(buffer, corner, 0);
-    title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
-    let target = model.stop.noise_codes.filter(|t| *t > 0.0);
+    title.skip(14).put_right(&format!(" {} levels ", number(last.noise_levels)), 0, theme.text());
+    let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
     // Point at which the noise is expected to reach its target. Its time is the mean of the lower
     // and the upper estimate.
     let reached = match (target, eta) {
-        (Some(target), Some((from, to))) if target < last.noise_codes => {
+        (Some(target), Some((from, to))) if target < last.noise_levels => {
             Some((last.seconds + 0.5 * (from + to), target))
         }
         _ => None,
     };
     let seconds = points.iter().map(|p| p.seconds).chain(reached.map(|(s, _)| s));
-    let noise = points.iter().map(|p| p.noise_codes).chain(target);
+    let noise = points.iter().map(|p| p.noise_levels).chain(target);
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
     let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
@@ -124,15 +124,15 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                 dashed((0.0, y.part(target)), (1.0, y.part(target)), 0.5, theme.good());
             }
             if let Some((seconds, noise)) = reached {
-                let from = place(last.seconds, last.noise_codes);
+                let from = place(last.seconds, last.noise_levels);
                 dashed(from, place(seconds, noise), 0.4, theme.dim());
             }
             canvas.layer();
             for pair in points.windows(2) {
-                let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_codes));
+                let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_levels));
                 canvas.draw(&line(a, b, theme.accent()));
             }
-            let point = place(last.seconds, last.noise_codes);
+            let point = place(last.seconds, last.noise_levels);
             canvas.draw(&line(point, point, theme.accent()));
         })
         .render(plot, buffer);

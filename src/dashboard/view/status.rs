@@ -6,13 +6,13 @@ use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, State};
 use zerkalo_terminal::Multiplexer;
 use zerkalo_terminal::flow::PacingMode;
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::style::{Modifier, Style};
 
 /// Part of the status line, such as the noise or the sample count. A part is shown or omitted as a
 /// whole.
@@ -79,7 +79,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(4, vec![plain(number(speed)), dim(" Ms/s")]));
     }
     if let Some(noise) = report.noise {
-        parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
+        parts.push(part(2, noise_part(model, report, noise.rmse_levels, theme)));
     }
     match model.stop.seconds {
         _ if watching => {}
@@ -162,12 +162,12 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the picture's noise `codes` in 8-bit levels, the noise target, and the estimated time
+/// Formats the picture's noise `levels` in 8-bit levels, the noise target, and the estimated time
 /// until the target is reached, such as `noise 0.84 → 0.5 levels in 3–5 s`.
-fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
+fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
-    let mut text = vec![dim("noise "), (number(codes), theme.text())];
-    match model.stop.noise_codes.filter(|target| *target < codes) {
+    let mut text = vec![dim("noise "), (number(levels), theme.text())];
+    match model.stop.noise_levels.filter(|target| *target < levels) {
         Some(target) => {
             text.push((format!(" → {target}"), theme.good()));
             text.push(dim(" levels"));

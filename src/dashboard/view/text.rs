@@ -2,12 +2,12 @@
 //! truncated with an ellipsis.
 
 use crate::dashboard::overlay_layout::wrapped;
-use zerkalo_scene::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::borrow::Cow;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+use zerkalo_scene::value::sanitized;
 
 /// Returns the width of `text` in columns.
 pub fn columns(text: &str) -> usize {

@@ -3,9 +3,9 @@
 //! The tones are readable on both dark and light backgrounds. The most important text has the
 //! terminal's default colour.
 
-use zerkalo_terminal::cells::{Colors, nearest_xterm};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
+use zerkalo_terminal::cells::{Colors, nearest_xterm};
 
 /// Styles of the user interface for a set of terminal colours, with one method for each kind of
 /// text or border.

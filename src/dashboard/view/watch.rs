@@ -8,12 +8,12 @@ use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
-use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
-use zerkalo_scene::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
+use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
+use zerkalo_scene::value::sanitized;
 
 /// Width, in terminal columns, of the table column with the time since each file was written.
 const AGE: usize = 7;

@@ -18,12 +18,16 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays in the bit mask `lanes`, at least one, are coherent. Each ray is
-    /// compared with the first one in `lanes`. The difference of their unit directions may have a
-    /// length of at most `max_turn`. Each coordinate of their origins may differ by at most
-    /// `max_shift`.
+    /// Returns `true` if the rays in the bit mask `lanes` are coherent, so that they traverse a BVH
+    /// faster as a packet than separately. Each ray is compared with the first one in `lanes`. Let
+    /// w be the number of lanes of the packet. The difference of the unit directions may have a
+    /// length of at most w `turn`; each coordinate of the origins may differ by at most w `shift`.
     #[inline(always)]
-    pub fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
+    pub fn is_coherent(&self, lanes: u32, turn: f64, shift: f64) -> bool {
+        if L::WIDTH == 1 || lanes.count_ones() < 2 {
+            return false;
+        }
+        let [max_turn, max_shift] = [turn, shift].map(|bound| bound * L::WIDTH as f64);
         let lane = lanes.trailing_zeros() as usize;
         let turn = self.direction - Vec3::splat(self.direction.lane(lane));
         let shift = self.origin - Vec3::splat(self.origin.lane(lane));
@@ -40,8 +44,7 @@ pub struct Hit<L> {
     pub t: L,
     /// Id of the primitive that the ray hits. Undefined for a miss.
     pub primitive: L,
-    /// Id of the triangle that the ray hits, if the primitive is a mesh. Undefined for other
-    /// primitives and for a miss.
+    /// Id of the triangle that the ray hits. Undefined if `primitive` is not a mesh.
     pub triangle: L,
 }
 
@@ -53,8 +56,7 @@ impl<L: SimdFloat> Hit<L> {
         Self { t, primitive: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces the distance, the primitive id and the triangle id of the hits in the lanes of the
-    /// mask `lanes`.
+    /// Replaces the hits in `lanes`.
     #[inline(always)]
     pub fn take_in(&mut self, lanes: L::Mask, t: L, (primitive, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);
@@ -62,8 +64,8 @@ impl<L: SimdFloat> Hit<L> {
         self.triangle = L::select(lanes, triangle, self.triangle);
     }
 
-    /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is
-    /// positive and smaller than the distance of the hit in `self`.
+    /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is positive and
+    /// smaller than the distance in `self`.
     #[inline(always)]
     pub fn keep_closer(&mut self, mask: L::Mask, t: L, primitive: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);

@@ -41,8 +41,8 @@ struct RayTraversal<S> {
     frames: usize,
 }
 
-/// Traverses the hierarchy with each ray of the bit mask `lanes` separately. Calls `leaf(lane,
-/// index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
+/// Traverses the hierarchy with each ray separately. Rays whose limit is not positive are inactive.
+/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
 /// limit. The children of a node are visited from near to far. `leaf` returns the new limit of the
 /// ray. Calls `prefetch_leaf(index)` one step before it visits the leaf, so that the other rays
 /// advance in between. `frames` has memory for one stack frame for each lane and level.
@@ -50,7 +50,6 @@ struct RayTraversal<S> {
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
     (packet, limit): (&SlabPacket<L>, L),
-    lanes: u32,
     frames: &mut [StackFrame],
     prefetch_leaf: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
@@ -58,7 +57,7 @@ pub fn traverse_rays<L: SimdFloat>(
     let levels = bvh.depth();
     let mut rays = RayTraversal::each(packet, limit);
     // Bits of the lanes whose next child is a node (`at_node`) or a leaf (`at_leaf`).
-    let (mut at_node, mut at_leaf) = (lanes, 0u32);
+    let (mut at_node, mut at_leaf) = (limit.gt(L::zero()).bits(), 0u32);
     while at_node | at_leaf != 0 {
         let (mut node_lanes, mut leaf_lanes) = (at_node, at_leaf);
         (at_node, at_leaf) = (0, 0);

@@ -1,28 +1,27 @@
-//! Bounding volumes, which exclude primitives that rays cannot hit. They are in double precision,
-//! with a margin for the rounding errors of single precision: a primitive that a ray may hit is
-//! never excluded.
+//! Bounding volumes, which exclude primitives that rays cannot hit, in double precision, with a
+//! margin for the rounding errors of single precision.
 
+use crate::primitive::canonical::HalfSpace;
 use crate::primitive::form::Form;
 use glam::{DVec2, DVec3};
 
-/// Assumed largest displacement of a ray by rounding to single precision, as a fraction of the
-/// largest coordinate. The true displacement is a few times 2^-24; this bound is larger, for
-/// safety.
+/// Bound of the displacement of a ray by rounding to single precision, as a fraction of the largest
+/// coordinate. The true displacement is a few times 2^-24.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// Bounding sphere of geometry that rays may hit.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingSphere {
-    /// Centre of the sphere, in scene coordinates.
+    /// Centre.
     pub center: DVec3,
-    /// Radius of the sphere; infinite for geometry without finite bounds.
+    /// Radius; infinite for geometry without finite bounds.
     pub radius: f64,
 }
 
-/// Target of shadow rays: the position of a light, or the direction to it.
+/// Target of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
-    /// Position of a light at a finite distance, in scene coordinates.
+    /// Position of a light at a finite distance.
     Point(DVec3),
     /// Unit vector towards a distant light.
     Direction(DVec3),
@@ -37,12 +36,12 @@ pub enum LightTarget {
 /// depths this distance is largest at one end.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
-    /// Common origin of the rays: the centre of the lens.
+    /// Centre of the lens.
     pub apex: DVec3,
-    /// Forward direction of the frustum, of unit length, perpendicular to the lens.
+    /// Unit vector perpendicular to the lens.
     pub forward: DVec3,
-    /// Vectors from the apex to the corners of the quadrilateral through which all rays pass. Their
-    /// component along `forward` is 1.
+    /// Vectors from the apex to the corners of the quadrilateral, with a component of 1 along
+    /// `forward`.
     pub corners: [DVec3; 4],
     /// Radius of the lens; 0 if all rays start at the apex.
     pub lens_radius: f64,
@@ -51,9 +50,8 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Returns the blur of the lens between the depths `near` and `far`. Each ray from the edge of
-    /// the lens meets a ray from the apex at the depth `focus`. The blur is the largest distance
-    /// between two such rays in the given range of depths.
+    /// Returns the largest distance between a ray from the edge of the lens and the ray from the
+    /// apex that it meets at the depth `focus`, for depths from `near` to `far`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -62,14 +60,12 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the largest distance \[scene units\] by which rounding to single precision displaces
-    /// the origin of a ray of the frustum.
+    /// Returns the largest distance by which rounding displaces the origin of a ray of the frustum.
     fn origin_error(&self) -> f64 {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns `ball`, enlarged by two distances: the displacement of rays by the lens, and the
-    /// rounding errors of rays.
+    /// Returns `ball`, enlarged by the displacement of rays by the lens and by rounding errors.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
@@ -77,10 +73,9 @@ impl Frustum {
         BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
     }
 
-    /// Returns `true` if a ray of the frustum may hit `ball`. If the cone around the frustum is
-    /// narrower than a half-space, `ball` is tested against this cone. A wider cone is not convex;
-    /// `ball` is then tested against four planes, each through the apex and two neighbouring
-    /// corners.
+    /// Returns `true` if a ray of the frustum may hit `ball`. The test uses the cone around the
+    /// frustum. A cone wider than a half-space is not convex; the planes through the apex and two
+    /// neighbouring corners replace it.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let ball = &self.blurred(ball);
         let Self { apex, forward, corners, .. } = self;
@@ -106,17 +101,16 @@ impl Frustum {
 pub struct BoundingVolume {
     /// Sphere that contains the object.
     pub ball: BoundingSphere,
-    /// Unit normal and offset of the plane that contains flat geometry; `None` for other geometry.
-    plane: Option<(DVec3, f64)>,
-    /// `true` if no ray that leaves the surface outwards hits the same object again.
+    /// Plane that contains flat geometry.
+    plane: Option<HalfSpace>,
     convex: bool,
-    /// Largest distance \[scene units\] between the end of a shadow ray and the position of its
-    /// light. Occlusion is tested with this tolerance.
+    /// Largest distance between the end of a shadow ray and the position of its light.
     slack: f64,
 }
 
 impl BoundingSphere {
-    pub(crate) fn around(points: &[DVec3]) -> Self {
+    /// Returns a sphere around the mean of `points` that contains them.
+    pub fn around(points: &[DVec3]) -> Self {
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
         let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
         Self { center, radius }
@@ -130,8 +124,7 @@ impl BoundingSphere {
             <= self.radius + errors + other.radius * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the radius of the bounding sphere with a margin for the rounding errors of rays that
-    /// start at `apex`.
+    /// Returns the radius with a margin for the rounding errors of rays that start at `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
         self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
@@ -144,9 +137,8 @@ fn ray_error(point: DVec3) -> f64 {
 impl BoundingVolume {
     /// Creates the bounding volume of the canonical form `form`.
     pub fn new(form: &Form) -> Self {
-        let plane = form.plane().map(|plane| (plane.normal, plane.offset));
         let (ball, convex) = (form.bounding_sphere(), form.is_convex());
-        Self { ball, plane, convex, slack: 0.0 }
+        Self { ball, plane: form.plane(), convex, slack: 0.0 }
     }
 
     /// Returns `true` if the object is flat. A ray that leaves a flat object cannot hit it again.
@@ -154,7 +146,7 @@ impl BoundingVolume {
         self.plane.is_some()
     }
 
-    /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
+    /// See [`Form::is_convex`].
     pub fn is_convex(&self) -> bool {
         self.convex
     }
@@ -171,12 +163,12 @@ impl BoundingVolume {
         // Depths along `forward` between which the object lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
-        if let Some((normal, offset)) = self.plane {
-            // A ray from the apex with the direction c, whose component along `forward` is 1, meets
-            // the plane at the depth `height` / (`toward` . c). The divisor, called the slope, is
-            // linear in c. If the rays through all four corners meet the plane in front of the
-            // apex, the extreme depths are therefore at corners. `slack` and `slope_error` allow
-            // for rounding errors and for the tilt of the lens towards the plane.
+        if let Some(HalfSpace { normal, offset }) = self.plane {
+            // A ray from the apex with the direction c meets the plane at the depth `height` /
+            // (`toward` . c). The divisor, called the slope, is linear in c. If the rays through all
+            // corners meet the plane in front of the apex, the extreme depths are therefore at
+            // corners. `slack` and `slope_error` allow for rounding errors and for the tilt of the
+            // lens towards the plane.
             let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
@@ -184,8 +176,7 @@ impl BoundingVolume {
             let slope_error = (tilt + F32_RAY_ERROR * frustum.lens_radius) / frustum.focus;
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
-                // No depth is excluded, because the apex may be on either side of the plane within
-                // rounding errors.
+                // The apex may be on either side of the plane.
             } else if slopes.iter().all(|(slope, ray_error)| slope > ray_error) {
                 let nearest =
                     slopes.map(|(slope, ray_error)| (height - slack) / (slope + ray_error));
@@ -217,24 +208,22 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the tolerance \[scene units\] for the height of `point` above the plane of this flat
-    /// object. At larger heights, rounding errors cannot let a ray from or to `point` hit the
-    /// object.
+    /// Returns the height above the plane of this flat object below which rounding errors may let a
+    /// ray from or to `point` hit the object.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
-        let offset = self.plane.map_or(0.0, |(_, offset)| offset.abs());
+        let offset = self.plane.map_or(0.0, |plane| plane.offset.abs());
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
     /// Returns `true` if the object is flat, and a light and all points of the sphere `lit` are on
-    /// the same side of the object's plane. `above` receives this plane as unit normal and offset,
-    /// and returns two values: the height of the light above the plane, and the error of this
-    /// height.
-    fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
-        let Some((normal, offset)) = self.plane else { return false };
-        let height = normal.dot(lit.center) - offset;
-        let (beyond, unsure) = above((normal, offset));
+    /// the same side of the object's plane. `above` returns the height of the light above the plane,
+    /// and the error of this height.
+    fn is_beside(&self, lit: &BoundingSphere, above: impl Fn(HalfSpace) -> (f64, f64)) -> bool {
+        let Some(plane) = self.plane else { return false };
+        let height = plane.height(lit.center);
+        let (beyond, unsure) = above(plane);
         let sure = height.abs() > lit.radius + self.ray_error(lit.center) && beyond.abs() > unsure;
         let radius = lit.radius + ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         sure && height.abs() > radius && height * beyond > 0.0
@@ -243,9 +232,8 @@ impl BoundingVolume {
     /// Returns `true` if the object may be between some point of the sphere `lit` and some point of
     /// the sphere `light`.
     pub fn may_occlude_ball(&self, lit: &BoundingSphere, light: &BoundingSphere) -> bool {
-        let above = |(normal, offset): (DVec3, f64)| {
-            let unsure = light.radius + self.ray_error(light.center);
-            (normal.dot(light.center) - offset, unsure)
+        let above = |plane: HalfSpace| {
+            (plane.height(light.center), light.radius + self.ray_error(light.center))
         };
         if self.is_beside(lit, above) {
             return false;
@@ -253,52 +241,37 @@ impl BoundingVolume {
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        let grown = |ball: &BoundingSphere| BoundingSphere {
-            radius: ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center),
-            ..*ball
-        };
         distance_to_hull(self.ball.center, &grown(light), &grown(lit)) <= grown(&self.ball).radius
     }
 
     /// Returns `true` if the object may be between some point of the sphere `lit` and the light
     /// `towards`.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
-        let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
-        let radius = lit.radius + slack;
-        // A light may be on either side of the plane if its height is within rounding errors.
-        let above = |(normal, offset): (DVec3, f64)| match towards {
-            LightTarget::Point(light) => (normal.dot(*light) - offset, self.ray_error(*light)),
-            LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
+        let direction = match towards {
+            LightTarget::Point(light) => {
+                return self.may_occlude_ball(lit, &BoundingSphere { center: *light, radius: 0.0 });
+            }
+            LightTarget::Direction(direction) => *direction,
         };
-        if self.is_beside(lit, above) {
+        if self.is_beside(lit, |plane| (plane.normal.dot(direction), F32_RAY_ERROR)) {
             return false;
         }
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        match towards {
-            LightTarget::Direction(direction) => {
-                let to = self.ball.center - lit.center;
-                let along = to.dot(*direction);
-                let across = (to - *direction * along).length();
-                let both = (radius + self.ball.radius) * (1.0 + F32_RAY_ERROR)
-                    + ray_error(self.ball.center);
-                across <= both && along >= -both
-            }
-            LightTarget::Point(light) => {
-                let to = lit.center - *light;
-                let distance = to.length();
-                if distance <= radius {
-                    return true;
-                }
-                let sin = radius / distance;
-                let (axis, cos) = (to / distance, (1.0 - sin * sin).sqrt());
-                let cone = Cone { apex: *light, axis, sin, cos };
-                let nearest = (self.ball.center - *light).length() - self.ball.radius;
-                nearest <= distance + radius && cone.meets(&self.ball)
-            }
-        }
+        let to = self.ball.center - lit.center;
+        let along = to.dot(direction);
+        let across = (to - direction * along).length();
+        let radius = grown(lit).radius + self.ball.radius;
+        let both = radius * (1.0 + F32_RAY_ERROR) + ray_error(self.ball.center);
+        across <= both && along >= -both
     }
+}
+
+/// Returns `ball` enlarged by the rounding errors of rays from or to it.
+fn grown(ball: &BoundingSphere) -> BoundingSphere {
+    let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
+    BoundingSphere { radius, ..*ball }
 }
 
 /// Returns the distance between `point` and the convex hull of the spheres `a` and `b`; negative
@@ -310,10 +283,9 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     let direction = axis / length;
     let along = (point - a.center).dot(direction);
     let across = (point - a.center - direction * along).length();
-    // Distance between the point and the interpolated ball with the centre at `x` on the axis: a
-    // convex function of `x`. Its derivative is zero where the line from the centre to the point is
-    // at right angles to the side of the hull. The sine of the angle between this line and the
-    // perpendicular to the axis is then `slope`.
+    // Distance between the point and the interpolated ball with the centre at `x` on the axis, a
+    // convex function. It is least where the sine of the angle between the line from the centre to
+    // the point and the perpendicular to the axis is `slope`.
     let slope = (b.radius - a.radius) / length;
     let distance = |x: f64| DVec2::new(across, along - x).length() - (a.radius + slope * x);
     let ends = distance(0.0).min(distance(length));
@@ -325,8 +297,7 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     distance(nearest.clamp(0.0, length)).min(ends)
 }
 
-/// Infinite cone: all directions from an apex whose angle to an axis is below a limit (less than 90
-/// degrees).
+/// Infinite cone of less than 90 degrees around an axis.
 struct Cone {
     apex: DVec3,
     axis: DVec3,
@@ -335,9 +306,7 @@ struct Cone {
 }
 
 impl Cone {
-    /// Returns `true` if `ball` may overlap the cone: a part of the ball is in front of the apex,
-    /// and the distance of the ball's centre from the cone's side is at most the ball's radius. The
-    /// radius includes a margin for rounding errors.
+    /// Returns `true` if `ball` may overlap the cone.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -375,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pencil_meets_what_is_in_front_of_it() {
+    fn frustum_meets_what_is_in_front_of_it() {
         let part = |form: &Form| BoundingVolume::new(form).clip_to(&frustum());
         assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());

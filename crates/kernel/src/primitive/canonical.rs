@@ -1,10 +1,7 @@
-//! Trait of all canonical forms. A canonical form is the geometry of one kind of primitive, in
-//! double precision. It is the stage between the description in the scene file and the compiled
-//! primitive. Each kind implements all properties in its own file. A method has a default
-//! implementation only if this default is right for most kinds.
+//! Trait of all canonical forms, the stage between the description in the scene file and the
+//! compiled primitive. A method has a default implementation only if it is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
-use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Axis-parallel box: its lowest and its highest corner.
@@ -19,28 +16,47 @@ pub struct HalfSpace {
     pub offset: f64,
 }
 
-/// Default texture mapping of a canonical form, used if a material does not choose one.
+impl HalfSpace {
+    /// Creates the half-space behind the plane through `point` with the normal `normal`, of any
+    /// length.
+    pub fn through(point: DVec3, normal: DVec3) -> Self {
+        let normal = normal.normalize();
+        Self { normal, offset: normal.dot(point) }
+    }
+
+    /// Returns the signed distance of `point` from the boundary plane, positive outside.
+    pub fn height(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) - self.offset
+    }
+
+    /// Returns the image under the invertible affine map `map`.
+    pub fn transformed(&self, map: &DAffine3) -> Self {
+        let normals = map.matrix3.inverse().transpose();
+        Self::through(map.transform_point3(self.normal * self.offset), normals * self.normal)
+    }
+}
+
+/// Texture mapping that is used if a material does not choose one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultMapping {
-    /// Planar mapping, for flat geometry.
+    /// For flat geometry.
     Planar,
-    /// Spherical mapping, for geometry that is round on all sides.
+    /// For geometry that is round on all sides.
     Spherical,
-    /// Cylindrical mapping, for geometry that is round about an axis.
+    /// For geometry that is round about an axis.
     Cylindrical,
-    /// Box mapping, for geometry with flat sides and for all other geometry.
+    /// For geometry with flat sides and for all other geometry.
     Box,
     /// Texture coordinates that the geometry itself has.
     Uv,
 }
 
-/// Face of a [`Proxy`] (simplified geometry of an object): a plane or a sphere that replaces a part
-/// of the surface.
+/// Face of a [`Proxy`].
 #[derive(Clone, Copy, Debug)]
 pub enum ProxyFace {
-    /// Plane that replaces a flat part of the surface, given as the half-space behind it.
+    /// Flat part of the surface, given as the half-space behind it.
     Flat(HalfSpace),
-    /// Sphere in place of a round part of the surface.
+    /// Sphere that stands for a round part of the surface.
     Round(BoundingSphere),
 }
 
@@ -50,21 +66,20 @@ pub enum ProxyFace {
 pub struct Proxy {
     /// Faces that may be close to the faces of other objects.
     pub faces: Vec<ProxyFace>,
-    /// Lowest corner of the object's bounding box.
+    /// Lowest corner of the bounding box.
     pub low: DVec3,
-    /// Highest corner of the object's bounding box.
+    /// Highest corner of the bounding box.
     pub high: DVec3,
 }
 
 impl Proxy {
-    /// Creates the proxy of an object. `bounds` is `None` for an object without finite bounds.
+    /// Creates a proxy. `bounds` is `None` for an object without finite bounds.
     pub fn new(faces: Vec<ProxyFace>, bounds: Option<Bounds>) -> Self {
         let (low, high) = bounds.unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
         Self { faces, low, high }
     }
 
-    /// Creates the proxy of a round object. Its faces are those of the bounding box, each of which
-    /// touches the object.
+    /// Creates the proxy of a round object: the sides of its bounding box, which touch it.
     pub fn around((low, high): Bounds) -> Self {
         let faces = DVec3::AXES
             .into_iter()
@@ -77,29 +92,31 @@ impl Proxy {
 
 /// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    fn transformed(self, map: &DAffine3) -> Form
-    where
-        Self: Sized;
-
-    /// Returns the number of parts that can have a material of their own: the number of a
-    /// compound's solids, 1 for all other geometry.
+    /// Returns the number of parts that can have a material of their own.
     fn parts(&self) -> usize {
         1
     }
 
-    /// Returns the axis-parallel bounding box; `None` if the geometry has no finite bounds. It is
-    /// the smallest possible box, except for compounds.
+    /// Returns the axis-parallel bounding box, the smallest one except for compounds; `None` if the
+    /// geometry has no finite bounds.
     fn bounds(&self) -> Option<Bounds>;
 
-    /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds. The
-    /// default is the sphere around the bounding box.
+    /// Returns the largest magnitude of a coordinate of the bounding box; infinity if the geometry
+    /// has no finite bounds.
+    fn max_coordinate(&self) -> f64 {
+        match self.bounds() {
+            Some((low, high)) => low.abs().max(high.abs()).max_element(),
+            None => f64::INFINITY,
+        }
+    }
+
+    /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds.
     fn bounding_sphere(&self) -> BoundingSphere {
         sphere_around_box(self.bounds())
     }
 
-    /// Returns two values: the map from the object space of the geometry to the scene, and the
-    /// bounding box in object space. The default, `None`, means that there is no object space.
+    /// Returns the map from the object space of the geometry to the scene, and the bounding box in
+    /// object space; `None` if there is no object space.
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         None
     }
@@ -110,43 +127,36 @@ pub trait CanonicalShape {
         None
     }
 
-    /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
-    fn is_convex(&self) -> bool;
-
     /// Returns the smallest thickness of a solid, or the shorter edge of flat geometry, in scene
-    /// units. For a compound it is the thickness of the thinnest part. Cuts may leave thinner
-    /// pieces; the search for narrow gaps finds these.
+    /// units. A compound has the thickness of its thinnest part; the search for narrow gaps finds
+    /// thinner pieces, which cuts may leave.
     fn thickness(&self) -> f64;
 
-    /// Returns a lower bound of the distance between `point` and the surface; `None` if there is no
-    /// surface. The bound is 0 on the surface, except for rounding errors. For points outside of a
-    /// box around the geometry it may be the distance to the box.
+    /// Returns a lower bound of the distance between `point` and the surface, 0 on the surface
+    /// except for rounding errors; `None` if there is no surface. For points outside a box around
+    /// the geometry it may be the distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
     /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`: one
-    /// list for each solid with such a surface. A compound can have several solids.
+    /// list for each solid of a compound, or of other geometry, with such a surface.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
-    /// there is none. The unit of t is the length of `direction`.
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
-
-    /// Returns the default texture mapping, which is used if a material does not choose one.
+    /// See [`DefaultMapping`].
     fn default_mapping(&self) -> DefaultMapping;
 
-    /// Returns proxies: simplified geometry for the search for narrow gaps between objects. Empty
-    /// for geometry with too many details.
+    /// Returns the proxies; none for geometry with too many details.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry. Returns
-    /// `None` if the geometry is unbounded along the unit vector `axis`. The default is the extent
-    /// of the bounding box.
+    /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry; `None` if
+    /// it is unbounded along the unit vector `axis`. The default is the extent of the bounding box.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
+        let (low, high) = self.bounds()?;
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let (center, reach) = (axis.dot(middle), axis.abs().dot(half));
+        Some((center - reach, center + reach))
     }
 
-    /// Returns the corners on which the object can stand when it is snapped to the ground. The
-    /// default is none.
+    /// Returns the corners on which the object can stand when it is snapped to the ground.
     fn corners(&self) -> Vec<DVec3> {
         Vec::new()
     }
@@ -164,8 +174,7 @@ pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     Some((low, high))
 }
 
-/// Returns the sphere through the corners of a box; for `None` (an infinite box) its radius is
-/// infinite.
+/// Returns the sphere through the corners of a box; `None` is an infinite box.
 pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     match bounds {
         Some((low, high)) => {
@@ -175,27 +184,16 @@ pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     }
 }
 
-/// Returns the smallest and the largest value of `axis . p` over all p in `points`. Without points,
-/// these are infinity and minus infinity; the result is never `None`.
+/// Implements [`CanonicalShape::extent_along`] for the convex hull of `points`.
 pub fn extent_of_points(points: &[DVec3], axis: DVec3) -> Option<(f64, f64)> {
     let heights = points.iter().map(|p| axis.dot(*p));
     let low = heights.clone().fold(f64::INFINITY, f64::min);
     Some((low, heights.fold(f64::NEG_INFINITY, f64::max)))
 }
 
-/// Returns the smallest and the largest value of `axis . p` over the points p of the box `bounds`;
-/// `None` without a box.
-fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> {
-    let (low, high) = bounds?;
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let (center, reach) = (axis.dot(middle), axis.abs().dot(half));
-    Some((center - reach, center + reach))
-}
-
-/// Returns the normals of those sides of a convex solid whose distance from a point is at most
-/// `slack`, as a single list. Returns no list if there is no such side. `sides` has two values for
-/// each side: the height of the point above the side, and the outward normal of the side. The
-/// largest height counts as the distance between the point and the solid.
+/// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, the
+/// height of the point above it and its outward normal. The largest height counts as the distance
+/// between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);
@@ -203,7 +201,7 @@ pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>>
     if normals.is_empty() { Vec::new() } else { vec![normals] }
 }
 
-/// Returns the distance between `point` and a box; 0 inside of the box.
+/// Returns the distance between `point` and a box; 0 inside the box.
 pub fn box_distance((low, high): Bounds, point: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length()
 }
@@ -216,14 +214,8 @@ pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     point.distance(a + along * t)
 }
 
-/// Returns the half-space behind the plane through `point` with the normal `normal`, of any length.
-pub fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
-    let normal = normal.normalize();
-    HalfSpace { normal, offset: normal.dot(point) }
-}
-
-/// Returns the factor by which a linear map scales lengths. Returns `None` if the factor depends on
-/// the direction by more than rounding errors.
+/// Returns the factor by which a linear map scales lengths; `None` if the factor depends on the
+/// direction by more than rounding errors.
 pub fn similarity(linear: &DMat3) -> Option<f64> {
     let gram = linear.transpose() * *linear;
     let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;

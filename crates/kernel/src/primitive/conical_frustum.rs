@@ -1,26 +1,25 @@
-//! Conical frusta (tapered cylinders, including cylinders and cones) under any affine map. Rays are
-//! transformed into the space of the canonical solid x^2 + y^2 <= (m + k z)^2, |z| <= 1/2. The
-//! origin is the middle of its axis, m is the radius there, and k is the slope.
+//! Conical frusta (tapered cylinders, including cylinders and cones). Rays are transformed into the
+//! space of the canonical solid x^2 + y^2 <= (m + k z)^2, |z| <= 1/2. The origin is the middle of
+//! its axis, m is the radius there, and k is the slope.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
     normals_of_solid, segment_distance,
 };
-use crate::primitive::ellipsoid::{rows, times};
-use crate::primitive::form::{Form, cast_compiled};
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
+use crate::primitive::ellipsoid::{rows, times, transposed_times};
+use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// Canonical form of cylinders, cones and tapered cylinders: the image of the solid x^2 + y^2 <=
-/// (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
-/// [`Form::conical_frustum`] also accepts a top that is wider than the base.
+/// Image of the solid x^2 + y^2 <= (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible
+/// affine map. [`Form::conical_frustum`] also accepts a top that is wider than the base.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
-    /// Map from the space in which the frustum has base radius 1 and height 1 to the scene.
+    /// Map from the space of this solid to the scene.
     pub scene_from_unit: DAffine3,
     /// Radius at z = 1 divided by the radius at z = 0: from 0 (a cone) to 1 (a cylinder).
     pub top_radius: f64,
@@ -33,7 +32,7 @@ impl Form {
         let (scene_from_unit, top_radius) = if s <= 1.0 {
             (scene_from_canonical, s)
         } else {
-            // The frustum is turned upside down: the wider end is the base.
+            // The frustum is rotated upside down: the wider end is the base.
             let linear = DMat3::from_diagonal(DVec3::new(s, s, -1.0));
             let flip = DAffine3::from_mat3_translation(linear, DVec3::Z);
             (scene_from_canonical * flip, 1.0 / s)
@@ -43,16 +42,19 @@ impl Form {
 }
 
 /// Number of normals that approximate the circle of normals at the tip of a cone.
-pub(crate) const AROUND_TIP: u32 = 64;
+pub const AROUND_TIP: u32 = 64;
+
+impl ConicalFrustumForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_unit: *map * self.scene_from_unit, ..self }
+    }
+}
 
 impl CanonicalShape for ConicalFrustumForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_unit: *map * self.scene_from_unit, ..self }.into()
-    }
-
     fn bounds(&self) -> Option<Bounds> {
-        // The first two columns of the matrix map the unit disc to the base. The lengths of the
-        // rows of these two columns are the half-widths of the base's bounding box.
+        // The first two columns of the matrix map the unit disc to the base. The lengths of their
+        // rows are the half-widths of the base's bounding box.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(
@@ -69,13 +71,9 @@ impl CanonicalShape for ConicalFrustumForm {
         Some((self.scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         // Smallest distance in the scene between opposite faces of the box around the canonical
-        // solid. In canonical space this box is 2 by 2 by 1.
+        // solid, 2 by 2 by 1.
         let rows = self.scene_from_unit.matrix3.inverse().transpose();
         let across = rows.x_axis.length().max(rows.y_axis.length());
         (2.0 / across).min(rows.z_axis.length().recip())
@@ -116,10 +114,6 @@ impl CanonicalShape for ConicalFrustumForm {
         normals_of_solid(sides, slack)
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled((*self).into(), origin, direction)
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Cylindrical
     }
@@ -129,10 +123,9 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 }
 
-/// Returns the distance between `point` and the surface of a conical frustum. In each half-plane
-/// through the axis, the surface has an outline of three segments: from the middle of the base to
-/// its rim, from there to the rim of the cap, and on to the middle of the cap. The radius of the
-/// base is 1, and `top` is the radius of the cap.
+/// Returns the distance between `point` and the surface of a conical frustum. `top` is the radius of
+/// the cap. In each half-plane through the axis, the surface has an outline of three segments: from
+/// the middle of the base to its rim, to the rim of the cap, and on to the middle of the cap.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -168,10 +161,9 @@ pub struct ConicalFrustum<S> {
     /// Position in the scene of the middle of the frustum's axis.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
-    /// Change of the radius per unit of length along the canonical z axis, from -1 (a cone) to 0 (a
-    /// cylinder).
+    /// Slope k, from -1 (a cone) to 0 (a cylinder).
     slope: S,
-    /// Radius at the middle of the axis, in canonical space.
+    /// Radius m at the middle of the axis.
     mid_radius: S,
     /// Outward unit normal, in the scene, of the cap at z = 1/2.
     cap_normal: [S; 3],
@@ -181,21 +173,17 @@ pub struct ConicalFrustum<S> {
 }
 
 /// Squared radius, in canonical space, of a sphere around the middle of the axis that contains the
-/// frustum. It is 1 + 1/4 for a rim of radius 1 at the height 1/2, with a margin for rounding
-/// errors.
+/// frustum: 1 + 1/4 for a rim of radius 1 at the height 1/2, with a margin for rounding errors.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// Compiles a conical frustum; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius }) = form
-        else {
-            return None;
-        };
+    /// Compiles a conical frustum.
+    pub fn new(form: &ConicalFrustumForm) -> Self {
+        let ConicalFrustumForm { scene_from_unit: m, top_radius } = form;
         let inverse = m.matrix3.inverse();
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
-        Some(Self {
+        Self {
             center: center.to_array().map(S::from_f64),
             unit_from_scene: rows(inverse),
             slope: S::from_f64(top_radius - 1.0),
@@ -203,26 +191,25 @@ impl<S: Float> ConicalFrustum<S> {
             cap_normal: up.normalize().to_array().map(S::from_f64),
             height: S::from_f64(up.length().recip()),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 
-/// Chord: the segment of a ray's line that is inside of a frustum.
+/// Segment of a ray's line inside a frustum.
 struct Chord<L: SimdFloat> {
     /// Point of the line closest to the middle of the frustum's axis, in canonical space.
     point: Vec3<L>,
     /// Direction of the line, of unit length in canonical space.
     direction: Vec3<L>,
-    /// Distance in the scene from the ray's origin to `point`, a point of the ray's line.
+    /// Distance in the scene from the ray's origin to `point`.
     start: L,
     /// Length in the scene of a step of length 1 in canonical space.
     scale: L,
-    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's entry.
+    /// Distance in canonical space from `point` to the chord's entry.
     enter: L,
-    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's exit.
+    /// Distance in canonical space from `point` to the chord's exit.
     leave: L,
-    /// Lanes whose ray enters through the lateral surface. In other lanes it enters through the
-    /// base or the cap.
+    /// Lanes whose ray enters through the lateral surface, not through base or cap.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -238,16 +225,10 @@ impl<L: SimdFloat> Chord<L> {
 /// Returns the chord of each ray's line in the frustum; `None` if no line hits it.
 ///
 /// Distances are counted from the line's point closest to the solid's middle, so that a distant
-/// origin costs no precision. Let p be this point, d the direction, r the frustum's radius at the
-/// height of p, and k the slope; p' and d' are p and d without their z coordinates. The line
-/// crosses the lateral surface where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' -
-/// k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a cylinder it compares the
-/// radius with the line's distance from the axis. The roots are computed as q / a and c / q. Here q
-/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator (a
-/// straight line on the lateral surface), a is 0; c / q stays finite.
+/// origin costs no precision.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
-    let (zero, half) = (L::zero(), L::from_f64(0.5));
+    let half = L::from_f64(0.5);
     let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
@@ -262,6 +243,50 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     if near.none() {
         return None;
     }
+    let side = side_crossings(s, p, d);
+    // Interval between the planes of the base and the cap. For a line parallel to these planes it
+    // is practically unbounded if the line is between them, and otherwise too far away to overlap
+    // the solid.
+    let tiny = L::from_f64(1e-30);
+    let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
+    let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
+    let (enter_ends, leave_ends) = (z0.min(z1), z0.max(z1));
+    let (enter, leave) = (side.enter.max(enter_ends), side.leave.min(leave_ends));
+    Some(Chord {
+        point: p,
+        direction: d,
+        start: (back + again) * scale,
+        scale,
+        enter,
+        leave,
+        enters_side: side.enter.ge(enter_ends),
+        leaves_side: side.leave.le(leave_ends),
+        meets: near & side.crosses & enter.le(leave),
+    })
+}
+
+/// Interval in which a line is inside the infinite cone or cylinder of the lateral surface.
+struct SideCrossings<L: SimdFloat> {
+    enter: L,
+    leave: L,
+    crosses: L::Mask,
+}
+
+/// Returns the crossings of the line p + t d with the lateral surface, in canonical space.
+///
+/// Let r be the frustum's radius at the height of p, and k the slope; p' and d' are p and d without
+/// their z coordinates. The line crosses the surface where a t^2 + 2 b t + c = 0. The discriminant
+/// is computed as |r d' - k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a
+/// cylinder it compares the radius with the line's distance from the axis. The roots are q / a and
+/// c / q with q = -(b + sign(b) D), where D is the root of the discriminant. For a line parallel to
+/// a generator (a straight line on the lateral surface), a is 0; c / q stays finite.
+#[inline(always)]
+fn side_crossings<L: SimdFloat>(
+    s: &ConicalFrustum<L::Scalar>,
+    p: Vec3<L>,
+    d: Vec3<L>,
+) -> SideCrossings<L> {
+    let zero = L::zero();
     let k = L::splat(s.slope);
     let r = k.mul_add(p.z, L::splat(s.mid_radius));
     let (kd, kr) = (k * d.z, k * d.z * r);
@@ -276,56 +301,35 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let steep = a.lt(zero);
     let root = discriminant.max(zero).sqrt();
     let q = -(b + root.copysign(b));
-    let turns = q.abs().gt(zero);
-    let t0 = L::select(turns, q / a, zero);
-    let t1 = L::select(turns, c / q, zero);
+    let has_roots = q.abs().gt(zero);
+    let t0 = L::select(has_roots, q / a, zero);
+    let t1 = L::select(has_roots, c / q, zero);
     let (low, high) = (t0.min(t1), t0.max(t1));
     // A line that is parallel to a generator or to the axis and does not cross the lateral surface
-    // is inside of it everywhere or nowhere.
-    let level = L::mask(true).and_not(turns) & a.abs().le(zero);
+    // is inside it everywhere or nowhere.
+    let level = L::mask(true).and_not(has_roots) & a.abs().le(zero);
     let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
     // Only the nappe with a positive radius belongs to the solid. A steep line crosses this nappe
     // once: it enters there if the radius grows along the line, and leaves otherwise.
     let widens = kd.gt(zero);
-    let enter_side = L::select(steep, L::select(widens, high, none), low);
-    let leave_side = L::select(steep, L::select(widens, all, low), high);
-    let enter_side = L::select(level, none, enter_side);
-    let leave_side = L::select(level, all, leave_side);
-    let crosses = (steep | discriminant.ge(zero)).and_not(level) | (level & c.le(zero));
-    // Interval between the planes of the base and the cap. For a line parallel to these planes it
-    // is practically unbounded if the line is between them, and otherwise too far away to overlap
-    // the solid.
-    let tiny = L::from_f64(1e-30);
-    let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
-    let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
-    let (enter_ends, leave_ends) = (z0.min(z1), z0.max(z1));
-    let (enter, leave) = (enter_side.max(enter_ends), leave_side.min(leave_ends));
-    Some(Chord {
-        point: p,
-        direction: d,
-        start: (back + again) * scale,
-        scale,
-        enter,
-        leave,
-        enters_side: enter_side.ge(enter_ends),
-        leaves_side: leave_side.le(leave_ends),
-        meets: near & crosses & enter.le(leave),
-    })
+    let enter = L::select(steep, L::select(widens, high, none), low);
+    let leave = L::select(steep, L::select(widens, all, low), high);
+    SideCrossings {
+        enter: L::select(level, none, enter),
+        leave: L::select(level, all, leave),
+        crosses: (steep | discriminant.ge(zero)).and_not(level) | (level & c.le(zero)),
+    }
 }
 
-/// Returns two values for the point of the lateral surface with the canonical coordinates `x` and
-/// `y`. The first is the outward normal in scene space, which is not normalised. The second is the
-/// distance of the point from the axis in canonical space.
+/// Returns the outward normal in scene space, not normalised, at the point of the lateral surface
+/// with the canonical coordinates `x` and `y`, and the point's canonical distance from the axis.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
     // The apex has no normal; the direction of the axis is used there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
-    let (nx, ny, nz) = (x * inverse, y * inverse, -L::splat(s.slope));
-    // Normals transform by the transpose of the inverse map. The columns of this transpose are the
-    // rows of `unit_from_scene`.
-    let m = &s.unit_from_scene;
-    (Vec3::splat(m[0]) * nx + Vec3::splat(m[1]) * ny + Vec3::splat(m[2]) * nz, rho)
+    let normal = Vec3::new(x * inverse, y * inverse, -L::splat(s.slope));
+    (transposed_times(&s.unit_from_scene, normal), rho)
 }
 
 impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
@@ -336,8 +340,8 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Returns the surface point on the face closest to `point`: the lateral surface, the base or
-    /// the cap. The closest face is the one above which `point` has the largest height.
+    /// Projects onto the face above which `point` has the largest height: the lateral surface, the
+    /// base or the cap.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

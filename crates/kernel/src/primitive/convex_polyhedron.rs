@@ -1,40 +1,36 @@
-//! Bounded convex solids as intersections of slabs (parallel pairs of faces) and half-spaces.
+//! Bounded convex solids.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
-    extent_of_points, half_space, normals_of_solid,
+    extent_of_points, normals_of_solid,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// Canonical form of a bounded convex solid: an intersection of half-spaces, with its corners.
+/// Bounded intersection of half-spaces, with its corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexPolyhedronForm {
-    /// Half-space behind the plane of each face, in scene coordinates.
+    /// Half-space behind each face.
     pub faces: Vec<HalfSpace>,
-    /// Corners of the solid in scene coordinates.
+    /// Corners of the solid.
     pub corners: Vec<DVec3>,
 }
 
-impl CanonicalShape for ConvexPolyhedronForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        let normals = map.matrix3.inverse().transpose();
-        let face = |face: &HalfSpace| {
-            let on_plane = map.transform_point3(face.normal * face.offset);
-            half_space(on_plane, normals * face.normal)
-        };
+impl ConvexPolyhedronForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
         Self {
-            faces: self.faces.iter().map(face).collect(),
+            faces: self.faces.iter().map(|face| face.transformed(map)).collect(),
             corners: self.corners.iter().map(|c| map.transform_point3(*c)).collect(),
         }
-        .into()
     }
+}
 
+impl CanonicalShape for ConvexPolyhedronForm {
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners)
     }
@@ -43,43 +39,21 @@ impl CanonicalShape for ConvexPolyhedronForm {
         BoundingSphere::around(&self.corners)
     }
 
-    fn is_convex(&self) -> bool {
-        true
-    }
-
     fn thickness(&self) -> f64 {
         let behind = |face: &HalfSpace| {
-            let depths = self.corners.iter().map(|c| face.offset - face.normal.dot(*c));
-            depths.fold(0.0, f64::max)
+            self.corners.iter().map(|corner| -face.height(*corner)).fold(0.0, f64::max)
         };
         self.faces.iter().map(behind).fold(f64::INFINITY, f64::min)
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        let heights = self.faces.iter().map(|f| f.normal.dot(point) - f.offset);
+        let heights = self.faces.iter().map(|face| face.height(point));
         Some(heights.fold(f64::NEG_INFINITY, f64::max).abs())
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
-        let side = |f: &HalfSpace| (f.normal.dot(point) - f.offset, f.normal);
+        let side = |face: &HalfSpace| (face.height(point), face.normal);
         normals_of_solid(self.faces.iter().map(side).collect(), slack)
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-        for face in &self.faces {
-            let height = face.normal.dot(origin) - face.offset;
-            let rise = face.normal.dot(direction);
-            if rise < 0.0 {
-                enter = enter.max(-height / rise);
-            } else if rise > 0.0 {
-                leave = leave.min(-height / rise);
-            } else if height > 0.0 {
-                return None;
-            }
-        }
-        let t = if enter > 0.0 { enter } else { leave };
-        (enter <= leave && t > 0.0 && t.is_finite()).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {
@@ -100,7 +74,7 @@ impl CanonicalShape for ConvexPolyhedronForm {
     }
 }
 
-/// Slab: the points p with low <= normal . (p - center) <= high. `center` is a field of
+/// Pair of parallel faces: the points p with low <= normal . (p - center) <= high, with `center` of
 /// [`ConvexPolyhedron`].
 struct Slab<S> {
     normal: [S; 3],
@@ -108,15 +82,13 @@ struct Slab<S> {
     high: S,
 }
 
-/// Half-space of a single face: the points p with normal . (p - center) <= high. `center` is a
-/// field of [`ConvexPolyhedron`].
+/// Single face: the points p with normal . (p - center) <= high.
 struct Face<S> {
     normal: [S; 3],
     high: S,
 }
 
-/// Convex polyhedron compiled for ray intersection: its bounding sphere, its slabs (pairs of
-/// parallel faces), and its single faces.
+/// Convex polyhedron compiled for ray intersection: bounding sphere, slabs, single faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
@@ -126,19 +98,16 @@ pub struct ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Compiles a convex polyhedron; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) = form else {
-            return None;
-        };
+    /// Compiles a convex polyhedron.
+    pub fn new(form: &ConvexPolyhedronForm) -> Self {
+        let ConvexPolyhedronForm { faces, corners } = form;
         let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let center = 0.5 * (low + high);
         let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
         let mut out = Self {
             center: center.to_array().map(S::from_f64),
-            // Rounded up, so that the test against the bounding sphere never rejects a hit. It may
-            // accept a miss.
+            // Rounded up, so that the test against the bounding sphere never rejects a hit.
             radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
             reach: S::from_f64(form.max_coordinate()),
             slabs: Vec::new(),
@@ -162,13 +131,13 @@ impl<S: Float> ConvexPolyhedron<S> {
                 None => out.faces.push(Face { normal, high: S::from_f64(high) }),
             }
         }
-        Some(out)
+        out
     }
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Returns three values: the distances at which each ray's line enters and leaves the solid,
-    /// and the lanes that hit it. Returns `None` if no line hits the bounding sphere.
+    /// Returns the distances at which each ray's line enters and leaves the solid, and the lanes
+    /// that hit it; `None` if no line hits the bounding sphere.
     #[inline(always)]
     fn chord<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - Vec3::splat(self.center);
@@ -180,10 +149,10 @@ impl<S: Float> ConvexPolyhedron<S> {
         }
         let mut enter = L::from_f64(-L::MAX);
         let mut leave = L::from_f64(L::MAX);
-        // The speed of a ray towards a face to which it is parallel is +0 or -0. It is replaced by
-        // a tiny speed with the same sign. The quotient 0 / 0 cannot occur then. A line on the
-        // inner side of the face is not cut by it. A line on the outer side gets an empty chord. A
-        // line in the plane of the face touches the solid or misses it, depending on the sign.
+        // The speed of a ray towards a face to which it is parallel, +0 or -0, is replaced by a
+        // tiny speed with the same sign, so that 0 / 0 cannot occur. A line on the inner side of
+        // the face is not cut by it. A line on the outer side gets an empty chord. A line in the
+        // plane of the face touches the solid or misses it, depending on the sign.
         let tiny = L::from_f64(1e-30);
         let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in &self.slabs {
@@ -203,8 +172,6 @@ impl<S: Float> ConvexPolyhedron<S> {
             enter = L::select(entering, t.max(enter), enter);
             leave = L::select(entering, leave, t.min(leave));
         }
-        // Each lane depends on its own chord only, so that the result for a line close to a corner
-        // does not depend on the other lanes of the packet.
         Some((enter, leave, near & enter.le(leave)))
     }
 }
@@ -216,8 +183,7 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Returns the surface point on the face closest to `point`: the face above which `point` has
-    /// the largest height.
+    /// Projects onto the face above which `point` has the largest height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);
@@ -255,8 +221,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
         let from_center = ray.origin - Vec3::splat(self.center);
-        // The face at each end of the chord is the one whose plane is closest to this end, among
-        // the faces that the line crosses inwards (at the entry) or outwards (at the exit).
+        // The face at each end of the chord has the plane closest to this end, among the faces
+        // that the line crosses inwards (at the entry) or outwards (at the exit).
         let mut best = (L::from_f64(-L::MAX), L::from_f64(-L::MAX));
         let mut cosines = (L::one(), L::one());
         let mut face = |normal: Vec3<L>, offset: L| {

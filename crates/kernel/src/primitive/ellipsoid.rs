@@ -1,16 +1,14 @@
-//! Ellipsoids: images of the unit sphere under affine maps. Rays are transformed into the space of
-//! the unit sphere.
+//! Ellipsoids. Rays are transformed into the space of the unit sphere.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
-use crate::primitive::sphere::{cast_at_unit_sphere, intersections};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
+use crate::primitive::sphere::intersections;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Image of the unit sphere at the origin under an invertible affine map.
@@ -20,13 +18,16 @@ pub struct EllipsoidForm {
     pub scene_from_unit: DAffine3,
 }
 
-impl CanonicalShape for EllipsoidForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_unit: *map * self.scene_from_unit }.into()
+impl EllipsoidForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_unit: *map * self.scene_from_unit }
     }
+}
 
+impl CanonicalShape for EllipsoidForm {
     fn bounds(&self) -> Option<Bounds> {
-        // The half-widths of the image's bounding box are the lengths of the matrix's rows.
+        // The half-widths of the box are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
@@ -37,17 +38,12 @@ impl CanonicalShape for EllipsoidForm {
         let map = &self.scene_from_unit;
         let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
             .map(|a| a.length_squared());
-        // The largest half-axis is the largest singular value of the matrix. The Frobenius norm is
-        // an upper bound of it.
+        // The Frobenius norm is an upper bound of the largest singular value, the largest half-axis.
         BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
     }
 
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         Some((self.scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
-    }
-
-    fn is_convex(&self) -> bool {
-        true
     }
 
     fn thickness(&self) -> f64 {
@@ -68,14 +64,6 @@ impl CanonicalShape for EllipsoidForm {
         normals_of_solid(vec![(height, steepness.normalize())], slack)
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let unit_from_scene = self.scene_from_unit.inverse();
-        cast_at_unit_sphere(
-            unit_from_scene.transform_point3(origin),
-            unit_from_scene.transform_vector3(direction),
-        )
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Spherical
     }
@@ -85,8 +73,7 @@ impl CanonicalShape for EllipsoidForm {
     }
 }
 
-/// Returns the distance between `point` and the surface of an ellipsoid, the image of the unit
-/// sphere under the map `scene_from_unit`.
+/// Returns the distance between `point` and the surface of an ellipsoid.
 ///
 /// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
 /// closest point q of the surface q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for
@@ -96,12 +83,11 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
     let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-    // If `point` is the centre or on an axis, several surface points can be nearest to it. The
-    // offset selects one of them.
+    // The offset selects one of several nearest points if `point` is the centre or on an axis.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
     // `size` is the Frobenius norm of Q. The smallest half-axis is therefore at least 1 /
-    // sqrt(size) and at most 3^(1/4) times this length. The initial bounds of l follow from it.
+    // sqrt(size) and at most 3^(1/4) times this length.
     let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
     let mut nearest = p;
     for _ in 0..160 {
@@ -131,31 +117,38 @@ pub struct Ellipsoid<S> {
 }
 
 /// Returns the rows of a matrix, rounded to the precision `S`.
-pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
+pub fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
 /// Returns the product of the matrix with the rows `m` and the vector `v`.
 #[inline(always)]
-pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
+pub fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
 }
 
+/// Returns the product of the transpose of the matrix with the rows `m` and the vector `v`. A normal
+/// transforms by it if `m` is the inverse of the map.
+#[inline(always)]
+pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
+    Vec3::splat(m[0]) * v.x + Vec3::splat(m[1]) * v.y + Vec3::splat(m[2]) * v.z
+}
+
 impl<S: Float> Ellipsoid<S> {
-    /// Compiles an ellipsoid; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Ellipsoid(EllipsoidForm { scene_from_unit: m }) = form else { return None };
-        Some(Self {
-            center: m.translation.to_array().map(S::from_f64),
-            unit_from_scene: rows(m.matrix3.inverse()),
-            scene_from_unit: rows(m.matrix3),
+    /// Compiles an ellipsoid.
+    pub fn new(form: &EllipsoidForm) -> Self {
+        let DAffine3 { matrix3, translation } = form.scene_from_unit;
+        Self {
+            center: translation.to_array().map(S::from_f64),
+            unit_from_scene: rows(matrix3.inverse()),
+            scene_from_unit: rows(matrix3),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 
-/// Returns three values: the distances at which each ray's line enters and leaves the ellipsoid,
-/// and the lanes that hit it. Returns `None` if no line hits it.
+/// Returns the distances at which each ray's line enters and leaves the ellipsoid, and the lanes
+/// that hit it; `None` if no line hits it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
@@ -176,15 +169,9 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let center = Vec3::splat(self.center);
         let on_unit = times(&self.unit_from_scene, point - center).normalize();
-        // Normals transform by the transpose of the inverse map. The columns of this transpose are
-        // the rows of `unit_from_scene`.
-        let m = &self.unit_from_scene;
-        let normal = Vec3::splat(m[0]) * on_unit.x
-            + Vec3::splat(m[1]) * on_unit.y
-            + Vec3::splat(m[2]) * on_unit.z;
         SurfacePoint {
             point: times(&self.scene_from_unit, on_unit) + center,
-            normal: normal.normalize(),
+            normal: transposed_times(&self.unit_from_scene, on_unit).normalize(),
             max_coordinate: L::splat(self.reach),
         }
     }

@@ -1,5 +1,4 @@
-//! Canonical forms: the few kinds of geometry to which every shape with its transform is reduced,
-//! before it is compiled for a SIMD type.
+//! Canonical forms: the few kinds of geometry to which every shape with its transform is reduced.
 
 use crate::bvh::Ray;
 use crate::lanes::Vec3;
@@ -7,7 +6,7 @@ use crate::primitive::Aggregate;
 use crate::primitive::canonical::CanonicalShape;
 use crate::primitive::conical_frustum::ConicalFrustumForm;
 use crate::primitive::convex_polyhedron::ConvexPolyhedronForm;
-use crate::primitive::csg_tree::CsgSolid;
+use crate::primitive::csg::CsgSolid;
 use crate::primitive::ellipsoid::EllipsoidForm;
 use crate::primitive::mesh::instance::MeshForm;
 use crate::primitive::parallelogram::ParallelogramForm;
@@ -15,30 +14,27 @@ use crate::primitive::plane::PlaneForm;
 use crate::primitive::sphere::SphereForm;
 use crate::primitive::torus::TorusForm;
 use glam::{DAffine3, DVec3};
-use std::ops::Deref;
 
-macro_rules! forms {
-    ($($(#[$doc:meta])+ $kind:ident($form:ident, $noun:literal, $nouns:literal)),+ $(,)?) => {
-        /// Canonical form: the geometry of one object in double precision and scene coordinates.
-        /// Each variant is a kind of primitive.
+/// Declares an enum of canonical forms, which is dereferenced to their properties.
+macro_rules! form_enum {
+    ($(#[$meta:meta])* pub enum $name:ident { $($(#[$doc:meta])* $kind:ident($form:ident),)+ }) => {
+        $(#[$meta])*
         #[derive(Clone, Debug, PartialEq)]
-        pub enum Form {
-            $($(#[$doc])+ $kind($form),)+
+        pub enum $name {
+            $($(#[$doc])* $kind($form),)+
         }
 
         $(
-            impl From<$form> for Form {
+            impl From<$form> for $name {
                 fn from(form: $form) -> Self {
                     Self::$kind(form)
                 }
             }
         )+
 
-        impl Deref for Form {
+        impl std::ops::Deref for $name {
             type Target = dyn CanonicalShape;
 
-            /// Returns the geometry that the variant holds. Properties that every kind of geometry
-            /// has, such as the bounds, can therefore be read from the form itself.
             fn deref(&self) -> &Self::Target {
                 match self {
                     $(Self::$kind(form) => form,)+
@@ -46,48 +42,67 @@ macro_rules! forms {
             }
         }
 
+        impl $name {
+            /// Returns the image of the geometry under the invertible affine map `map`.
+            pub fn transformed(self, map: &DAffine3) -> Self {
+                match self {
+                    $(Self::$kind(form) => form.transformed(map).into(),)+
+                }
+            }
+        }
+    };
+}
+pub(in crate::primitive) use form_enum;
+
+macro_rules! forms {
+    ($($(#[$doc:meta])+ $kind:ident($form:ident, $noun:literal, $nouns:literal, convex: $convex:literal),)+) => {
+        form_enum! {
+            /// Canonical form: the geometry of one object in double precision and scene coordinates.
+            /// Each variant is a kind of primitive.
+            pub enum Form {
+                $($(#[$doc])+ $kind($form),)+
+            }
+        }
+
         impl Form {
-            /// Returns the noun for primitives of this kind in the scene's inventory: singular and
-            /// plural.
-            pub(crate) fn noun(&self) -> (&'static str, &'static str) {
+            /// Returns the noun for primitives of this kind, singular and plural.
+            pub fn noun(&self) -> (&'static str, &'static str) {
                 match self {
                     $(Self::$kind(_) => ($noun, $nouns),)+
                 }
             }
 
-            /// Returns the image of the geometry under the invertible affine map `map`. A
-            /// similarity maps a sphere to a sphere, any other map to an ellipsoid. The image of
-            /// any other form has the same variant.
-            pub fn transformed(self, map: &DAffine3) -> Self {
+            /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
+            pub fn is_convex(&self) -> bool {
                 match self {
-                    $(Self::$kind(form) => form.transformed(map),)+
+                    $(Self::$kind(_) => $convex,)+
                 }
             }
         }
     };
 }
 
-// List of the canonical forms. A new kind of primitive needs a line here: its variant, its type,
-// and the noun for such primitives in the inventory of a scene, singular and plural.
+// Kinds of primitives, each with its noun in the inventory of a scene, singular and plural. A new
+// kind needs a line here.
 forms! {
     /// Sphere, given by centre and radius.
-    Sphere(SphereForm, "sphere", "spheres"),
+    Sphere(SphereForm, "sphere", "spheres", convex: true),
     /// Image of the unit sphere under an affine map.
-    Ellipsoid(EllipsoidForm, "ellipsoid", "ellipsoids"),
+    Ellipsoid(EllipsoidForm, "ellipsoid", "ellipsoids", convex: true),
     /// Convex polyhedron: a bounded intersection of half-spaces.
-    ConvexPolyhedron(ConvexPolyhedronForm, "convex solid", "convex solids"),
+    ConvexPolyhedron(ConvexPolyhedronForm, "convex solid", "convex solids", convex: true),
     /// Image of a circular cylinder, cone or frustum under an affine map.
-    ConicalFrustum(ConicalFrustumForm, "tapered cylinder", "tapered cylinders"),
+    ConicalFrustum(ConicalFrustumForm, "tapered cylinder", "tapered cylinders", convex: true),
     /// Compound of solids: union, intersection or difference.
-    Csg(CsgSolid, "compound", "compounds"),
+    Csg(CsgSolid, "compound", "compounds", convex: false),
     /// Image of a triangle mesh under an affine map.
-    Mesh(MeshForm, "mesh", "meshes"),
+    Mesh(MeshForm, "mesh", "meshes", convex: false),
     /// Flat parallelogram, such as a rectangle.
-    Parallelogram(ParallelogramForm, "rectangle", "rectangles"),
+    Parallelogram(ParallelogramForm, "rectangle", "rectangles", convex: true),
     /// Infinite plane, given by normal and offset.
-    Plane(PlaneForm, "plane", "planes"),
+    Plane(PlaneForm, "plane", "planes", convex: true),
     /// Image of a torus under an affine map.
-    Torus(TorusForm, "torus", "tori"),
+    Torus(TorusForm, "torus", "tori", convex: false),
 }
 
 impl Form {
@@ -101,23 +116,14 @@ impl Form {
         !self.is_flat()
     }
 
-    /// Returns the largest magnitude of a coordinate of the bounding box. For an infinite plane it
-    /// is the distance of the plane from the origin.
-    pub fn max_coordinate(&self) -> f64 {
-        match self.bounds() {
-            Some((low, high)) => low.abs().max(high.abs()).max_element(),
-            None => self.plane().map_or(0.0, |plane| plane.offset.abs()),
-        }
+    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if there
+    /// is none. The unit of t is the length of `direction`.
+    pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let length = direction.length();
+        let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
+        let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
+        let alone = Aggregate::with_tree(std::slice::from_ref(self), false);
+        let t = alone.closest(&ray, alone.all()).t;
+        (t < f64::MAX).then_some(t / length)
     }
-}
-
-/// Implements [`CanonicalShape::cast`] for `form`: compiles it in double precision and intersects
-/// the ray with it.
-pub fn cast_compiled(form: Form, origin: DVec3, direction: DVec3) -> Option<f64> {
-    let length = direction.length();
-    let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
-    let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
-    let alone = Aggregate::with_tree(&[form], false);
-    let t = alone.closest(&ray, alone.all()).t;
-    (t < f64::MAX).then_some(t / length)
 }

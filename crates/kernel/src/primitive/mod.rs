@@ -3,36 +3,35 @@
 //! file, which the module `shape` describes. Several kinds of shapes become the same kind of
 //! primitive.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod aggregate;
-pub(crate) mod batch;
 mod bounding;
 mod canonical;
-pub(crate) mod conical_frustum;
-pub(crate) mod convex_polyhedron;
-pub(crate) mod csg;
-mod csg_interval;
-pub(crate) mod csg_tree;
-pub(crate) mod ellipsoid;
-pub(crate) mod form;
+mod compiled;
+mod conical_frustum;
+mod convex_polyhedron;
+mod csg;
+mod ellipsoid;
+mod form;
 pub mod mesh;
 mod parallelogram;
 mod plane;
-pub(crate) mod primitive_box;
-mod scene_bvh;
 mod shading_normal;
-pub(crate) mod solid;
-pub(crate) mod sphere;
+mod sphere;
 mod torus;
 
-pub use aggregate::{AccelerationStructure, Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
-pub use batch::{PrimitiveId, SurfacePoint, UvGradients};
+pub use aggregate::{
+    AccelerationStructure, Aggregate, BVH_MIN_PRIMITIVES, PrimitiveId, PrimitiveSet,
+};
 pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
 pub use canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, box_distance,
 };
-pub use conical_frustum::ConicalFrustumForm;
+pub use compiled::{SurfacePoint, UvGradients};
+pub use conical_frustum::{AROUND_TIP, ConicalFrustumForm};
 pub use convex_polyhedron::ConvexPolyhedronForm;
-pub use csg_tree::{CsgSolid, CsgTree};
+pub use csg::{CsgSolid, CsgTree, Solid};
 pub use ellipsoid::EllipsoidForm;
 pub use form::Form;
 pub use mesh::instance::MeshForm;

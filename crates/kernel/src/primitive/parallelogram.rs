@@ -1,14 +1,13 @@
-//! Flat parallelograms, the canonical form of rectangles and platforms.
+//! Flat parallelograms.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
     extent_of_points, segment_distance,
 };
-use crate::primitive::form::Form;
+use crate::primitive::compiled::{Primitive, SurfacePoint};
 use glam::{DAffine3, DVec3};
 
 /// Flat parallelogram of the points `corner + a u + b v`, with a and b in 0..=1. Its front is the
@@ -17,23 +16,25 @@ use glam::{DAffine3, DVec3};
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
     pub corner: DVec3,
-    /// Edge u from the corner: the vector to the next corner.
+    /// Edge from `corner` to the next corner.
     pub u: DVec3,
-    /// Edge v from the corner: the vector to the other adjacent corner.
+    /// Edge from `corner` to the other adjacent corner.
     pub v: DVec3,
 }
 
-impl CanonicalShape for ParallelogramForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl ParallelogramForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
-        // A map that mirrors space would exchange front and back. The edges are exchanged to
-        // prevent this.
+        // A map that mirrors space would exchange front and back.
         let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
-        Self { corner, u, v }.into()
+        Self { corner, u, v }
     }
+}
 
+impl CanonicalShape for ParallelogramForm {
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners())
     }
@@ -43,12 +44,7 @@ impl CanonicalShape for ParallelogramForm {
     }
 
     fn plane(&self) -> Option<HalfSpace> {
-        let normal = self.u.cross(self.v).normalize();
-        Some(HalfSpace { normal, offset: normal.dot(self.corner) })
-    }
-
-    fn is_convex(&self) -> bool {
-        true
+        Some(HalfSpace::through(self.corner, self.u.cross(self.v)))
     }
 
     fn thickness(&self) -> f64 {
@@ -70,8 +66,7 @@ impl CanonicalShape for ParallelogramForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let normal = self.u.cross(self.v).normalize();
         let from_corner = point - self.corner;
-        // Both numbers are signed distances from the line through `edge`: `distance` is that of the
-        // point, `width` is that of the opposite edge.
+        // Signed distances of the point and of the opposite edge from the line through `edge`.
         let is_between = |edge: DVec3, other: DVec3| {
             let across = edge.cross(normal).normalize();
             let (distance, width) = (across.dot(from_corner), across.dot(other));
@@ -81,19 +76,6 @@ impl CanonicalShape for ParallelogramForm {
             && is_between(self.u, self.v)
             && is_between(self.v, self.u);
         if on { vec![vec![normal]] } else { Vec::new() }
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let Self { corner, u, v } = *self;
-        let normal = u.cross(v);
-        let t = normal.dot(corner - origin) / normal.dot(direction);
-        let hit_point = origin + direction * t - corner;
-        // Coordinates along u and v by Cramer's rule in the parallelogram's plane.
-        let area = normal.length_squared();
-        let a = hit_point.cross(v).dot(normal) / area;
-        let b = u.cross(hit_point).dot(normal) / area;
-        let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
-        (t > 0.0 && t.is_finite() && inside).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {
@@ -115,8 +97,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// Parallelogram compiled for ray intersection. A point p of its plane has the two coordinates (p -
-/// corner) . `dual_u` and (p - corner) . `dual_v`. Inside of the parallelogram, both are in 0..=1.
+/// Parallelogram compiled for ray intersection. The coordinates (p - corner) . `dual_u` and (p -
+/// corner) . `dual_v` of a point p inside it are in 0..=1.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],
@@ -127,19 +109,19 @@ pub struct Parallelogram<S> {
 }
 
 impl<S: Float> Parallelogram<S> {
-    /// Compiles a parallelogram; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Parallelogram(ParallelogramForm { corner, u, v }) = form else { return None };
-        let n = u.cross(*v);
+    /// Compiles a parallelogram.
+    pub fn new(form: &ParallelogramForm) -> Self {
+        let ParallelogramForm { corner, u, v } = *form;
+        let n = u.cross(v);
         let area2 = n.length_squared();
         let rounded = |v: DVec3| v.to_array().map(S::from_f64);
-        Some(Self {
-            corner: rounded(*corner),
+        Self {
+            corner: rounded(corner),
             normal: rounded(n.normalize()),
             dual_u: rounded(v.cross(n) / area2),
-            dual_v: rounded(n.cross(*u) / area2),
+            dual_v: rounded(n.cross(u) / area2),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 
@@ -148,8 +130,7 @@ impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
         let from_corner = ray.origin - Vec3::splat(self.corner);
-        // For a ray parallel to the plane, t, a and b are infinite or NaN. The tests below then
-        // fail.
+        // For a ray parallel to the plane, t, a and b are infinite or NaN, and the tests fail.
         let t = -from_corner.dot(normal) / ray.direction.dot(normal);
         let hit_point = ray.direction.mul_add(t, from_corner);
         let a = hit_point.dot(Vec3::splat(self.dual_u));

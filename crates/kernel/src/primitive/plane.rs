@@ -1,13 +1,12 @@
-//! Infinite planes, and the half-spaces behind them, which can be parts of compounds (CSG).
+//! Infinite planes, and the half-spaces behind them, which can be parts of compounds.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, half_space,
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace,
 };
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
 /// Canonical form of an infinite plane. Its front is the side to which `normal` points.
@@ -19,24 +18,30 @@ pub struct PlaneForm {
     pub offset: f64,
 }
 
-impl CanonicalShape for PlaneForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        let normals = map.matrix3.inverse().transpose();
-        let on_plane = map.transform_point3(self.normal * self.offset);
-        let HalfSpace { normal, offset } = half_space(on_plane, normals * self.normal);
-        Self { normal, offset }.into()
+impl PlaneForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        let HalfSpace { normal, offset } = self.half_space().transformed(map);
+        Self { normal, offset }
     }
 
+    fn half_space(&self) -> HalfSpace {
+        HalfSpace { normal: self.normal, offset: self.offset }
+    }
+}
+
+impl CanonicalShape for PlaneForm {
     fn bounds(&self) -> Option<Bounds> {
         None
     }
 
-    fn plane(&self) -> Option<HalfSpace> {
-        Some(HalfSpace { normal: self.normal, offset: self.offset })
+    /// Returns the distance of the plane from the origin.
+    fn max_coordinate(&self) -> f64 {
+        self.offset.abs()
     }
 
-    fn is_convex(&self) -> bool {
-        true
+    fn plane(&self) -> Option<HalfSpace> {
+        Some(self.half_space())
     }
 
     fn thickness(&self) -> f64 {
@@ -44,17 +49,12 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        Some((self.normal.dot(point) - self.offset).abs())
+        Some(self.half_space().height(point).abs())
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
-        let on = (self.normal.dot(point) - self.offset).abs() <= slack;
+        let on = self.half_space().height(point).abs() <= slack;
         if on { vec![vec![self.normal]] } else { Vec::new() }
-    }
-
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        let t = (self.offset - self.normal.dot(origin)) / self.normal.dot(direction);
-        (t > 0.0 && t.is_finite()).then_some(t)
     }
 
     fn default_mapping(&self) -> DefaultMapping {
@@ -62,7 +62,7 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn proxies(&self) -> Vec<Proxy> {
-        vec![Proxy::new(self.plane().into_iter().map(ProxyFace::Flat).collect(), None)]
+        vec![Proxy::new(vec![ProxyFace::Flat(self.half_space())], None)]
     }
 
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
@@ -80,10 +80,10 @@ pub struct Plane<S> {
 }
 
 impl<S: Float> Plane<S> {
-    /// Compiles a plane; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Plane(PlaneForm { normal, offset }) = form else { return None };
-        Some(Self { normal: normal.to_array().map(S::from_f64), offset: S::from_f64(*offset) })
+    /// Rounds the plane to the precision of the lanes.
+    pub fn new(form: &PlaneForm) -> Self {
+        let normal = form.normal.to_array().map(S::from_f64);
+        Self { normal, offset: S::from_f64(form.offset) }
     }
 }
 
@@ -105,7 +105,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     }
 }
 
-/// Half-space behind a plane, as a part of compounds (CSG).
+/// Half-space behind the plane.
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 
@@ -116,9 +116,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
         let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let t = -height / speed;
         let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
-        // A line parallel to the plane does not cross it: all of the line is behind the plane or in
-        // front of it. If the distance of a crossing overflows, it is clamped to the largest
-        // number, which means that there is no crossing.
+        // A line parallel to the plane is behind it or in front of it everywhere. A distance that
+        // overflows is clamped to the largest number, which means that there is no crossing.
         let enter = L::select(enters, t.max(none).min(all), none);
         let leave = L::select(leaves, t.max(none).min(all), all);
         let meets = enters | leaves | height.le(L::zero());

@@ -2,15 +2,13 @@
 
 use crate::lanes::{SimdFloat, Vec3};
 
-/// Smallest cosine between a shading normal and the direction to the viewer. A normal with a
-/// smaller cosine is bent towards the viewer until it has about this cosine.
+/// Cosine between a shading normal and the direction to the viewer below which the normal is bent
+/// towards the viewer.
 const LEAST_COSINE: f64 = 0.02;
 
 /// Returns `shading` as a unit vector on the viewer's side of the surface. `normal` is the
-/// geometric normal on the viewer's side, and `direction` is the direction of the rays.
-///
-/// A shading normal that would turn away from the viewer is bent towards the viewer. If the bent
-/// normal is not finite or not on the side of `normal`, `normal` replaces it.
+/// geometric normal on the viewer's side, and `direction` is the direction of the rays. If the
+/// result is not finite or not on the side of `normal`, `normal` replaces it.
 #[inline(always)]
 pub fn keep_visible<L: SimdFloat>(
     shading: Vec3<L>,

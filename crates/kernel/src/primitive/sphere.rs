@@ -1,28 +1,29 @@
-//! Spheres: canonical form and ray intersection.
+//! Spheres.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, ProxyFace, normals_of_solid, similarity,
 };
+use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::csg::{Solid, SolidPrimitive, Span};
 use crate::primitive::ellipsoid::EllipsoidForm;
-use crate::primitive::form::Form;
-use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
 /// Canonical form of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereForm {
-    /// Centre of the sphere, in scene coordinates.
+    /// Centre.
     pub center: DVec3,
-    /// Radius of the sphere, greater than zero.
+    /// Radius, greater than 0.
     pub radius: f64,
 }
 
-impl CanonicalShape for SphereForm {
-    fn transformed(self, map: &DAffine3) -> Form {
+impl SphereForm {
+    /// Returns the image under the invertible affine map `map`: a sphere if the map is a similarity,
+    /// otherwise an ellipsoid.
+    pub fn transformed(self, map: &DAffine3) -> Solid {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
             Some(scale) => {
@@ -36,17 +37,15 @@ impl CanonicalShape for SphereForm {
             .into(),
         }
     }
+}
 
+impl CanonicalShape for SphereForm {
     fn bounds(&self) -> Option<Bounds> {
         Some((self.center - self.radius, self.center + self.radius))
     }
 
     fn bounding_sphere(&self) -> BoundingSphere {
         BoundingSphere { center: self.center, radius: self.radius }
-    }
-
-    fn is_convex(&self) -> bool {
-        true
     }
 
     fn thickness(&self) -> f64 {
@@ -63,10 +62,6 @@ impl CanonicalShape for SphereForm {
         normals_of_solid(vec![(distance - self.radius, from_center / distance)], slack)
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_at_unit_sphere((origin - self.center) / self.radius, direction / self.radius)
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Spherical
     }
@@ -81,14 +76,6 @@ impl CanonicalShape for SphereForm {
     }
 }
 
-/// Returns the smallest t > 0 with |o + t d| = 1; `None` if there is none.
-pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
-    let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
-    let root = (b * b - a * c).sqrt();
-    // NaN (no crossing) compares false.
-    [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0 && t.is_finite())
-}
-
 /// Sphere compiled for ray intersection, rounded to the precision of the lanes.
 #[derive(Clone, Copy)]
 pub struct Sphere<S> {
@@ -99,26 +86,25 @@ pub struct Sphere<S> {
 }
 
 impl<S: Float> Sphere<S> {
-    /// Compiles a sphere; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Sphere(SphereForm { center, radius }) = form else { return None };
-        Some(Self {
-            center: center.to_array().map(S::from_f64),
-            radius: S::from_f64(*radius),
-            radius2: S::from_f64(radius * radius),
+    /// Rounds the sphere to the precision of the lanes.
+    pub fn new(form: &SphereForm) -> Self {
+        Self {
+            center: form.center.to_array().map(S::from_f64),
+            radius: S::from_f64(form.radius),
+            radius2: S::from_f64(form.radius * form.radius),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 
-/// Returns three values: the distances at which each line enters and leaves a sphere, and the lanes
-/// that hit it. Returns `None` if no line hits it.
+/// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it;
+/// `None` if no line hits it. `f` is the line's origin relative to the centre, and `d` is its unit
+/// direction.
 ///
-/// `f` is the line's origin relative to the centre, and `d` is its unit direction. The discriminant
-/// is computed from the vector f - (f.d) d, whose length is the line's distance from the centre.
-/// The root closer to the origin is computed from the product of both roots. Neither computation
-/// cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision
-/// Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
+/// The discriminant is computed from the vector f - (f.d) d, whose length is the line's distance
+/// from the centre, and the root closer to the origin from the product of both roots. Neither
+/// computation cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019,
+/// *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);
@@ -131,8 +117,7 @@ pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option
     let root = discriminant.max(L::zero()).sqrt();
     let q = b + root.copysign(b);
     let c = f.length_squared() - radius2;
-    // q is 0 only if the ray starts on the sphere and is tangent to it there. Both distances are
-    // then 0.
+    // q is 0 only if the ray starts on the sphere and is tangent to it: both distances are 0.
     let other = c / q;
     let other = L::select(q.abs().gt(L::zero()), other, L::zero());
     let behind = b.lt(L::zero());

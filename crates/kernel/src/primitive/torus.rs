@@ -1,5 +1,6 @@
-//! Tori under any affine map. Rays are transformed into the space of a torus about the y axis, with
-//! a ring of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
+//! Tori. Rays are transformed into the space of a torus about the y axis, with a ring (the circle in
+//! the middle of the tube) of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, with rho^2
+//! = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
 //! These zeros of h are found by Newton's method in brackets, one zero in each bracket. Let s be
@@ -16,37 +17,41 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid, similarity,
     sphere_around_box,
 };
-use crate::primitive::ellipsoid::{rows, times};
-use crate::primitive::form::{Form, cast_compiled};
-use crate::primitive::solid::{SolidPrimitive, Span};
+use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::csg::{SolidPrimitive, Span};
+use crate::primitive::ellipsoid::{rows, times, transposed_times};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
-/// Canonical form of a torus: the image of a torus about the y axis under an invertible affine map.
+/// Image of a torus about the y axis under an invertible affine map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusForm {
     /// Map to the scene from the space of the torus, in which its centre is the origin.
     pub scene_from_torus: DAffine3,
-    /// Radius of the ring, the circle in the middle of the tube; greater than 0.
+    /// Radius of the ring, greater than 0.
     pub ring: f64,
     /// Radius of the tube, greater than 0, at most `ring`.
     pub tube: f64,
 }
 
 impl TorusForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_torus: *map * self.scene_from_torus, ..self }
+    }
+
     /// Returns the map to the scene from the space in which the ring has radius 1.
     fn scene_from_unit(&self) -> DAffine3 {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Returns two values for `point`, which is in the space of the torus: its distance from the
-    /// ring (the circle in the middle of the tube), and the unit vector from the ring to it.
+    /// Returns the distance of `point`, in the space of the torus, from the ring, and the unit vector
+    /// from the ring to it.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -55,14 +60,9 @@ impl TorusForm {
 }
 
 impl CanonicalShape for TorusForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_torus: *map * self.scene_from_torus, ..self }.into()
-    }
-
-    /// Returns the bounding box. The torus is the Minkowski sum of its ring and of a ball with the
-    /// radius of the tube. Each half-width of the box is therefore the sum of the half-widths of
-    /// ring and ball.
     fn bounds(&self) -> Option<Bounds> {
+        // The torus is the Minkowski sum of its ring and of a ball with the radius of the tube. So
+        // is its box.
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
         let half = [rows.x_axis, rows.y_axis, rows.z_axis]
@@ -87,23 +87,17 @@ impl CanonicalShape for TorusForm {
         Some((self.scene_from_torus, (-half, half)))
     }
 
-    fn is_convex(&self) -> bool {
-        false
-    }
-
-    /// Returns the thickness of the tube in the scene. The map to the scene turns a cube around a
-    /// ball with the radius of the tube into a parallelepiped. The thickness is the smallest
-    /// distance between opposite faces of this parallelepiped.
+    /// Returns the smallest distance between opposite faces of the parallelepiped that is the image
+    /// of a cube around a ball with the radius of the tube.
     fn thickness(&self) -> f64 {
         let rows = self.scene_from_torus.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the distance between `point` and the surface. It is exact if the map to the scene is
-    /// a similarity. Otherwise it is a lower bound, the larger of two numbers. One is the distance
-    /// from the bounding box. The other is the distance in the space of the torus times a lower
-    /// bound of the factor by which the map scales lengths.
+    /// Returns the exact distance if the map to the scene is a similarity. Otherwise the larger of
+    /// two lower bounds: the distance from the bounding box, and the distance in the space of the
+    /// torus times a lower bound of the factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -124,12 +118,8 @@ impl CanonicalShape for TorusForm {
         normals_of_solid(vec![(height, steepness.normalize())], slack)
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled((*self).into(), origin, direction)
-    }
-
-    /// Returns [`DefaultMapping::Uv`]: the form has texture coordinates of its own. u is the angle
-    /// around the ring, v the angle around the tube, both from 0 to 1.
+    /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from 0
+    /// to 1.
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Uv
     }
@@ -154,24 +144,22 @@ pub struct Torus<S> {
 }
 
 impl<S: Float> Torus<S> {
-    /// Compiles a torus; `None` for any other form.
-    pub fn new(form: &Form) -> Option<Self> {
-        let Form::Torus(torus) = form else { return None };
-        let DAffine3 { matrix3, translation } = torus.scene_from_unit();
-        Some(Self {
+    /// Compiles a torus.
+    pub fn new(form: &TorusForm) -> Self {
+        let DAffine3 { matrix3, translation } = form.scene_from_unit();
+        Self {
             center: translation.to_array().map(S::from_f64),
             unit_from_scene: rows(matrix3.inverse()),
             scene_from_unit: rows(matrix3),
-            tube: S::from_f64(torus.tube / torus.ring),
-            inverse_ring: S::from_f64(torus.ring.recip()),
+            tube: S::from_f64(form.tube / form.ring),
+            inverse_ring: S::from_f64(form.ring.recip()),
             reach: S::from_f64(form.max_coordinate()),
-        })
+        }
     }
 }
 
-/// Width of the margin by which the search region for intersections is larger than the torus, in
-/// multiples of the machine epsilon. Lengths are measured in the space in which the ring has radius
-/// 1.
+/// Margin by which the search region for intersections is larger than the torus, in multiples of
+/// the machine epsilon, where the ring has radius 1.
 const ROOM: f64 = 64.0;
 
 /// Largest number of steps of the search for one intersection. Bisection alone needs 54 steps in
@@ -193,33 +181,43 @@ struct UnitLine<L: SimdFloat> {
     /// Length in the scene of a step of length 1 in the space of the torus.
     scale: L,
     tube: L,
-    /// Position at which the line enters the region of the torus (see `near`).
+    /// Position at which the line enters the region of the torus.
     low: L,
-    /// Position at which the line leaves the region of the torus (see `near`).
+    /// Position at which the line leaves the region of the torus.
     high: L,
     /// Lanes whose line crosses the region of the torus: the part of its bounding sphere between
-    /// the two planes that touch the tube from below and above.
+    /// the two planes that touch the tube from below and above, with the margin [`ROOM`].
     near: L::Mask,
 }
 
-/// Positions on a line that separate its intersections with the torus from each other, in ascending
-/// order. `inside` has the lanes in which each position is inside of the torus.
+/// Position on a line relative to the torus.
+struct Place<L> {
+    /// Distance rho from the axis, minus 1.
+    beyond: L,
+    /// Height above the plane of the ring.
+    y: L,
+    /// Derivative of rho by the position.
+    speed: L,
+    /// Reciprocal of rho.
+    inward: L,
+}
+
+/// Positions on a line that separate its intersections with the torus, in ascending order.
 struct Separators<L: SimdFloat> {
     places: [L; 5],
+    /// Lanes in which each position is inside the torus.
     inside: [L::Mask; 5],
 }
 
 impl<L: SimdFloat> UnitLine<L> {
-    /// Transforms the lines of rays to the space of the torus. Returns `None` if no line of the
-    /// packet crosses the region of the torus (see [`UnitLine::near`]).
+    /// Returns `None` if no line of the packet crosses the region of the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
         let d = times(&torus.unit_from_scene, ray.direction);
         let scale = L::one() / d.length_squared().sqrt();
         let d = d * scale;
-        // The point closest to the centre is computed in two steps. The second step removes the
-        // rounding error of the first step along the direction.
+        // The second step removes the rounding error of the first step along the direction.
         let back = -f.dot(d);
         let p = d.mul_add(back, f);
         let again = -p.dot(d);
@@ -233,8 +231,6 @@ impl<L: SimdFloat> UnitLine<L> {
             return None;
         }
         let chord = chord2.max(L::zero()).sqrt();
-        // Part of the line between the planes that touch the tube (with its margin) from below and
-        // above.
         let inverse = L::one() / d.y.abs().max(L::from_f64(1e-30)).copysign(d.y);
         let half = tube + room;
         let (y0, y1) = ((-half - p.y) * inverse, (half - p.y) * inverse);
@@ -256,47 +252,40 @@ impl<L: SimdFloat> UnitLine<L> {
         })
     }
 
-    /// Returns four values at position `s` of the line: rho - 1, with rho the distance from the
-    /// torus's axis; the height above the plane of the ring; the derivative of rho by `s`; and 1 /
-    /// rho.
     #[inline(always)]
-    fn place(&self, s: L) -> (L, L, L, L) {
+    fn place(&self, s: L) -> Place<L> {
         let p = self.direction.mul_add(s, self.point);
         let rho = p.x.mul_add(p.x, p.z * p.z).sqrt();
         let inward = L::one() / rho.max(L::from_f64(1e-30));
         let limit = self.across2.sqrt();
         let speed = p.x.mul_add(self.direction.x, p.z * self.direction.z) * inward;
-        (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
+        Place { beyond: rho - L::one(), y: p.y, speed: speed.max(-limit).min(limit), inward }
     }
 
-    /// Returns two values at position `s` of the line: the height of the point above the torus's
-    /// surface, and the derivative of this height by `s`. The height is the squared distance from
-    /// the ring minus the squared radius of the tube. It is negative inside of the torus.
+    /// Returns h at position `s` of the line, and its derivative.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
-        let (beyond, y, speed, _) = self.place(s);
+        let Place { beyond, y, speed, .. } = self.place(s);
         let height = beyond.mul_add(beyond, (y - self.tube) * (y + self.tube));
         let slope = beyond.mul_add(speed, y * self.direction.y);
         (height, slope + slope)
     }
 
-    /// Returns two values at position `s` of the line: half the derivative of [`UnitLine::height`],
-    /// and the derivative of this half.
+    /// Returns half the derivative of h at position `s` of the line, and the derivative of this half.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
-        let (beyond, y, speed, inward) = self.place(s);
+        let Place { beyond, y, speed, inward } = self.place(s);
         let slope = beyond.mul_add(speed, y * self.direction.y);
         (slope, L::one() - (self.across2 - speed * speed) * inward)
     }
 
-    /// Returns the lanes in which the position `s` is inside of the torus or on its surface.
     #[inline(always)]
     fn inside(&self, s: L) -> L::Mask {
         self.height(s).0.le(L::zero())
     }
 
-    /// Returns the positions on the line of the extremes of [`UnitLine::height`]: minimum, maximum,
-    /// minimum. A single extreme is repeated three times.
+    /// Returns the positions of the extremes of h: minimum, maximum, minimum. A single extreme is
+    /// repeated three times.
     #[inline(always)]
     fn extremes(&self) -> [L; 3] {
         let (zero, one) = (L::zero(), L::one());
@@ -340,10 +329,8 @@ impl<L: SimdFloat> UnitLine<L> {
 
     /// Returns the zero of `function` between `low` and `high` in the lanes of `open`. `function`
     /// returns its value and its derivative. `sign` times the value must be negative at `low` and
-    /// positive at `high`.
-    ///
-    /// The search takes Newton steps. It bisects where Newton's step leaves the bracket or is slow.
-    /// The steps of a lane do not depend on other lanes.
+    /// positive at `high`. The search bisects where Newton's step leaves the bracket or is slow. The
+    /// steps of a lane do not depend on other lanes.
     #[inline(always)]
     fn root(
         &self,
@@ -377,14 +364,13 @@ impl<L: SimdFloat> UnitLine<L> {
         place
     }
 
-    /// Returns the positions that separate the line's intersections with the torus from each other.
-    /// Intersections before the position `start` are ignored.
+    /// Returns the separators of the intersections after the position `start`.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
         let [first, second, third] = self.extremes().map(within);
         let places = [self.low.max(start), first, second, third, self.high.max(start)];
-        // The last position is outside of the torus. The first one is outside, too, unless it is
+        // The last position is outside the torus. The first one is outside, too, unless it is
         // `start` and `start` is inside.
         let inside = [
             start.gt(self.low) & self.inside(places[0]),
@@ -412,7 +398,7 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
             return None;
         }
         let Separators { places, inside } = line.separators(line.origin);
-        // The first bracket that has one end inside of the torus and the other end outside.
+        // The first bracket that has one end inside the torus and the other end outside.
         let (mut low, mut high, mut sign) = (places[0], places[4], L::one());
         let mut open = ahead;
         for i in 0..4 {
@@ -440,16 +426,10 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
         let inverse = L::one() / L::select(on_axis, L::one(), rho);
         let ring = Vec3::new(L::select(on_axis, L::one(), p.x * inverse), L::zero(), p.z * inverse);
         let outward = (p - ring).normalize();
-        // Normals transform by the transpose of the inverse map. The columns of this transpose are
-        // the rows of `unit_from_scene`.
-        let m = &self.unit_from_scene;
-        let normal = Vec3::splat(m[0]) * outward.x
-            + Vec3::splat(m[1]) * outward.y
-            + Vec3::splat(m[2]) * outward.z;
         let on_surface = outward.mul_add(L::splat(self.tube), ring);
         SurfacePoint {
             point: times(&self.scene_from_unit, on_surface) + center,
-            normal: normal.normalize(),
+            normal: transposed_times(&self.unit_from_scene, outward).normalize(),
             max_coordinate: L::splat(self.reach),
         }
     }
@@ -483,8 +463,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// Returns the two intervals in which each line is inside of the torus. The second one or both may
-/// be empty. Returns `None` if no line crosses the region of the torus (see [`UnitLine::near`]).
+/// Returns the spans of each line; the second one or both may be empty. Returns `None` if no line
+/// crosses the region of the torus.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

@@ -53,20 +53,20 @@ pub struct Display {
 
 impl Display {
     /// Converts radiance to unrounded sRGB values, 0..=255.
-    pub fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
+    pub fn levels(&self, radiance: [f64; 3]) -> [f64; 3] {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::codes`].
+    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::levels`].
     /// A lookup table makes this method several times faster than that one.
-    pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
+    pub fn levels_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
 
-    /// Returns [`Display::codes_8`] as a closure with precomputed constants, for many pixels.
+    /// Returns [`Display::levels_8`] as a closure with precomputed constants, for many pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
-        move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
+        move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.level_8(c))
     }
 
     /// Converts radiance to linear light of the display, 0..=1: exposure and tone curve without
@@ -112,8 +112,8 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
 }
 
 /// Converts an unrounded sRGB value, 0..=255, to 16 bits and rounds it; 255 becomes 65535.
-pub fn quantised_16(code: f64) -> u16 {
-    (code * (65535.0 / 255.0)).round() as u16
+pub fn quantised_16(level: f64) -> u16 {
+    (level * (65535.0 / 255.0)).round() as u16
 }
 
 #[cfg(test)]
@@ -128,15 +128,15 @@ mod tests {
         // value round-trips.
         let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
         assert!((above - below).abs() < 1e-6 && above > below);
-        for code in 0..=255u8 {
-            let v = f64::from(code) / 255.0;
+        for level in 0..=255u8 {
+            let v = f64::from(level) / 255.0;
             let linear = linear_from_srgb(v);
-            let codes = Display::default().codes([linear; 3]);
-            assert!((codes[0] - f64::from(code)).abs() < 1e-5, "{code}: {codes:?}");
-            assert_eq!(quantised_8(codes[1]), code);
-            assert_eq!(quantised_16(codes[2]), u16::from(code) * 257);
+            let levels = Display::default().levels([linear; 3]);
+            assert!((levels[0] - f64::from(level)).abs() < 1e-5, "{level}: {levels:?}");
+            assert_eq!(quantised_8(levels[1]), level);
+            assert_eq!(quantised_16(levels[2]), u16::from(level) * 257);
         }
-        let grey = Display::default().codes([0.5, 0.214_041_14, 0.01]);
+        let grey = Display::default().levels([0.5, 0.214_041_14, 0.01]);
         let expected = [187.515_6, 127.5, 25.463];
         (0..3).for_each(|c| assert!((grey[c] - expected[c]).abs() < 2e-3, "{grey:?}"));
     }
@@ -152,7 +152,7 @@ mod tests {
     fn exposure_multiplies_by_powers_of_two() {
         let bright = Display { exposure_ev: 3.0, tone: Tone::Clip };
         let plain = Display::default();
-        assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
+        assert_eq!(bright.levels([0.01, 0.1, 2.0]), plain.levels([0.08, 0.8, 1.0]));
     }
 
     /// Checks the tone mapper against values of the specification's shader, evaluated by hand in
@@ -186,11 +186,11 @@ mod tests {
             let display = Display { exposure_ev: 0.0, tone };
             let mut last = 0.0;
             for i in 0..20_000 {
-                let [r, g, b] = display.codes([f64::from(i) * 1e-3; 3]);
+                let [r, g, b] = display.levels([f64::from(i) * 1e-3; 3]);
                 assert!(r >= last && r <= 255.0 && r == g && g == b, "{name} at {i}");
                 last = r;
             }
-            assert!(display.codes([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
+            assert!(display.levels([1e30, 1e300, 0.0]).iter().all(|c| (0.0..=255.0).contains(c)));
         }
         let unknown = "filmic".parse::<Tone>().unwrap_err();
         assert_eq!(unknown, "tone curve `filmic` is not known; known: clip, neutral");

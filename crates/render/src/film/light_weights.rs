@@ -15,7 +15,7 @@ impl LightWeights {
     /// Returns factors, `[group][channel]`, for the integer sums of a film with the given `scales`.
     /// A sum times its factor is the sum of the radiance of a pixel's samples in one light group
     /// and channel, under these weights.
-    pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
+    pub fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
@@ -35,7 +35,7 @@ pub enum Replicates {
 
 /// Integer sums and sample counts of one pixel of a film.
 #[derive(Clone, Copy)]
-pub(super) struct Sums<'a> {
+pub struct Sums<'a> {
     /// Integer sums of the replicates A and B (halves of the samples), each `[group][channel]`.
     pub values: [&'a [i64]; 2],
     /// Number of samples in each of the replicates A and B (halves of the samples).
@@ -93,7 +93,7 @@ impl Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::test_film::TestFilm;
+    use crate::film::testing::TestFilm;
     use crate::film::testing::{each_tile, fill, film, only, white};
 
     #[test]

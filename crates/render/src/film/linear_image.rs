@@ -53,7 +53,7 @@ impl LinearImage {
 mod tests {
     use super::*;
     use crate::film::Thumbnail;
-    use crate::film::test_film::TestFilm;
+    use crate::film::testing::TestFilm;
     use crate::film::testing::{each_tile, fill, film, white};
 
     fn pixel(image: &LinearImage, x: usize, y: usize) -> [f32; 3] {

@@ -6,52 +6,31 @@
 //! light group has its own sums, for white light of unit intensity. When a picture is computed,
 //! [`LightWeights`] multiply the sums of each group by its colour and intensity.
 
-mod bands;
 mod box_filter;
 mod display;
 mod downsample;
-mod exr;
-mod exr_header;
-mod exr_read;
 pub mod file;
-mod image_data;
 mod invalid;
 mod light_weights;
 mod linear_image;
-mod metadata;
 mod noise;
 #[cfg(test)]
 mod noise_test;
-mod output;
 mod pixel_probe;
-mod png;
-mod png_read;
 mod srgb_table;
 mod store;
-#[cfg(test)]
-#[path = "../../../../tests/support/test_film.rs"]
-pub mod test_film;
-#[cfg(test)]
-mod test_random;
-#[cfg(test)]
+#[doc(hidden)]
 pub mod testing;
 mod tile;
 
-pub use bands::{Bands, WholeFilm};
 pub use box_filter::box_means;
 pub use display::{Display, Tone, quantised_16};
 pub use downsample::{DirtyTile, IncrementalDownsample, Thumbnail};
-pub use exr_read::{ReadPicture, read_exr};
-pub use image_data::{Depth, ImageData};
 pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
-pub use light_weights::{LightWeights, Replicates};
+pub use light_weights::{LightWeights, Replicates, Sums};
 pub use linear_image::LinearImage;
-pub use metadata::FileMetadata;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
-pub use output::ImageOutput;
 pub use pixel_probe::PixelProbe;
-pub use png::png_of_rgb;
-pub use png_read::read_png;
 pub use srgb_table::quantised_8;
 pub use store::{Film, Header, Mismatch, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};

@@ -6,8 +6,8 @@
 //! In linear light the mean of d^2 is therefore the mean square error of the picture, unbiased for
 //! any sampler.
 //!
-//! The displayed error is code(M) - code(truth), where code is the display transform to 8-bit
-//! levels. Its square is estimated by the mean of (code(M) - code(M + d))^2 and (code(M) - code(M -
+//! The displayed error is level(M) - level(truth), where level is the display transform to 8-bit
+//! levels. Its square is estimated by the mean of (level(M) - level(M + d))^2 and (level(M) - level(M -
 //! d))^2, where M + d is A and M - d is B. These differences displace M by d, which is as large as
 //! the error of M. A curved or clipped tone curve therefore changes the estimate as much as the
 //! error. The hardest case of the tests is a dark pixel with 16 samples in each of A and B, only a
@@ -47,18 +47,18 @@ pub struct Mse {
     /// Mean square error of linear radiance.
     pub linear: f64,
     /// Mean square error of the displayed picture, in squared 8-bit levels.
-    pub codes: f64,
+    pub levels: f64,
 }
 
 impl Mse {
     /// Value of [`TileNoise::squares`] for tests: the smallest positive numbers. The number of
     /// effective pixels computed from it is practically infinite.
     #[cfg(test)]
-    pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
+    pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 
     fn add(&mut self, weight: f64, other: Self) {
         self.linear += weight * other.linear;
-        self.codes += weight * other.codes;
+        self.levels += weight * other.levels;
     }
 }
 
@@ -152,20 +152,20 @@ impl Estimator {
                     let displaced = |sign: f64| [0, 1, 2].map(|c| (mean[c] + sign * d[c]).max(0.0));
                     (displaced(1.0), displaced(-1.0))
                 };
-                let (mean, a, b) = (self.codes(mean), self.codes(a), self.codes(b));
-                let mut codes = 0.0;
+                let (mean, a, b) = (self.levels(mean), self.levels(a), self.levels(b));
+                let mut levels = 0.0;
                 for c in 0..3 {
                     let (to_a, to_b) = (a[c] - mean[c], b[c] - mean[c]);
-                    codes += 0.5 * (to_a * to_a + to_b * to_b);
+                    levels += 0.5 * (to_a * to_a + to_b * to_b);
                 }
-                half.add(1.0, Mse { linear, codes });
-                squares.add(1.0, Mse { linear: linear * linear, codes: codes * codes });
+                half.add(1.0, Mse { linear, levels });
+                squares.add(1.0, Mse { linear: linear * linear, levels: levels * levels });
             }
         }
         let pixels = width * height;
         let mean_over = |sums: Mse, pixels: usize| {
             let values = (3 * pixels) as f64;
-            Mse { linear: sums.linear / values, codes: sums.codes / values }
+            Mse { linear: sums.linear / values, levels: sums.levels / values }
         };
         // In a tile with a single pixel, both estimates come from this pixel.
         let black = mean_over(halves[0], pixels.div_ceil(2));
@@ -180,8 +180,8 @@ impl Estimator {
     }
 
     #[inline(always)]
-    fn codes(&self, radiance: [f64; 3]) -> [f64; 3] {
-        toned(self.tone, radiance.map(|c| c * self.exposure)).map(|c| self.curve.code(c))
+    fn levels(&self, radiance: [f64; 3]) -> [f64; 3] {
+        toned(self.tone, radiance.map(|c| c * self.exposure)).map(|c| self.curve.level(c))
     }
 }
 
@@ -205,7 +205,7 @@ impl TileNoise {
         };
         Mse {
             linear: mean(self.allocation.linear, self.reported.linear),
-            codes: mean(self.allocation.codes, self.reported.codes),
+            levels: mean(self.allocation.levels, self.reported.levels),
         }
     }
 }
@@ -216,11 +216,11 @@ pub struct Noise {
     /// Root mean square error over pixels and channels, in linear radiance.
     pub rmse_linear: f64,
     /// Root mean square error of the displayed picture over pixels and channels, in 8-bit levels.
-    pub rmse_codes: f64,
+    pub rmse_levels: f64,
     /// 95th percentile, over the tiles, of the RMSE of a displayed tile, in 8-bit levels.
-    pub p95_codes: f64,
+    pub p95_levels: f64,
     /// Largest RMSE of a displayed tile, in 8-bit levels.
-    pub worst_codes: f64,
+    pub worst_levels: f64,
     /// Number of effective pixels (Kish's effective sample size), for the linear and for the
     /// displayed error. It is (sum of e)^2 / (sum of e^2), where e is the squared error of a pixel;
     /// 0 if there is no error.
@@ -228,12 +228,12 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Returns this estimate, but takes `rmse_linear` and `rmse_codes` from `other` where they are
+    /// Returns this estimate, but takes `rmse_linear` and `rmse_levels` from `other` where they are
     /// larger there. The other fields do not change.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             rmse_linear: self.rmse_linear.max(other.rmse_linear),
-            rmse_codes: self.rmse_codes.max(other.rmse_codes),
+            rmse_levels: self.rmse_levels.max(other.rmse_levels),
             ..self
         }
     }
@@ -257,12 +257,12 @@ impl Noise {
             all.add(weight, tile.of_all());
             squares.add(1.0, tile.squares);
             pixels += weight;
-            tile_errors.push(tile.of_all().codes);
+            tile_errors.push(tile.of_all().levels);
         }
         // Smallest value that at least 95 % of the tiles do not exceed.
         let rank = (tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
-        let p95_codes = p95.sqrt();
+        let p95_levels = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
         // `sum` adds up means over the three channels, but `squares` is computed from sums over the
         // channels. The factor 3 converts the means to sums.
@@ -272,7 +272,7 @@ impl Noise {
         };
         let effective_pixels = Mse {
             linear: effective(all.linear, squares.linear),
-            codes: effective(all.codes, squares.codes),
+            levels: effective(all.levels, squares.levels),
         };
         let rmse = |white: f64, all: f64| {
             let sum = if is_uniform { all } else { white.max(all) };
@@ -280,9 +280,9 @@ impl Noise {
         };
         Some(Self {
             rmse_linear: rmse(reported.linear, all.linear),
-            rmse_codes: rmse(reported.codes, all.codes),
-            p95_codes,
-            worst_codes: worst.sqrt(),
+            rmse_levels: rmse(reported.levels, all.levels),
+            p95_levels,
+            worst_levels: worst.sqrt(),
             effective_pixels,
         })
     }

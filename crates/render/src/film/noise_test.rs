@@ -1,7 +1,7 @@
 //! Tests of the noise estimate: pictures with a known error.
 
 use crate::film::noise::*;
-use crate::film::test_film::TestFilm;
+use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, fill, film, only, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
@@ -50,7 +50,7 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 
 struct Outcome {
     linear: Vec<f64>,
-    codes: Vec<f64>,
+    levels: Vec<f64>,
     /// Relative standard deviation of a tile's estimated RMSE over films with different random
     /// seeds; the mean over all tiles.
     tile_spread: f64,
@@ -63,28 +63,28 @@ struct Outcome {
 fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
     let pixels = scene(normal, dark, &mut Rng(11));
     let (mix, display) = (white(1), Display::default());
-    let mut outcome = Outcome { linear: vec![], codes: vec![], tile_spread: 0.0 };
+    let mut outcome = Outcome { linear: vec![], levels: vec![], tile_spread: 0.0 };
     let mut tiles: Vec<Vec<f64>> = vec![vec![]; 12];
     for seed in 0..20 {
         let mut rng = Rng(1000 + seed);
         let mut film = film(64, 48, &[2f64.powi(28)]);
         fill(&mut film, n, |x, y, _| pixels[y * 64 + x].sum(n, stratified, &mut rng).to_vec());
         let picture: Vec<[f64; 3]> = (0..48).flat_map(|y| film.pixels_of_row(y, &mix)).collect();
-        let (mut linear, mut codes) = (0.0, 0.0);
+        let (mut linear, mut levels) = (0.0, 0.0);
         for (i, pixel) in pixels.iter().enumerate() {
             let (got, truth) = (picture[i], pixel.mean());
-            let (got_codes, true_codes) = (display.codes(got), display.codes(truth));
+            let (got_levels, true_levels) = (display.levels(got), display.levels(truth));
             for c in 0..3 {
                 linear += (got[c] - truth[c]).powi(2) / (3.0 * 64.0 * 48.0);
-                codes += (got_codes[c] - true_codes[c]).powi(2) / (3.0 * 64.0 * 48.0);
+                levels += (got_levels[c] - true_levels[c]).powi(2) / (3.0 * 64.0 * 48.0);
             }
         }
         let noise = film.noise(&mix, &display).unwrap();
         outcome.linear.push(linear.sqrt() / noise.rmse_linear);
-        outcome.codes.push(codes.sqrt() / noise.rmse_codes);
+        outcome.levels.push(levels.sqrt() / noise.rmse_levels);
         let estimator = Estimator::new(film.scales(), &mix, &display);
         for (index, tile) in film.touched() {
-            tiles[index].push(estimator.tile(tile).unwrap().reported.codes.sqrt());
+            tiles[index].push(estimator.tile(tile).unwrap().reported.levels.sqrt());
         }
     }
     let spreads: Vec<_> = tiles
@@ -113,15 +113,15 @@ fn estimates_equal_true_errors_in_the_mean() {
             (false, true, [0.0; 3]),
         ] {
             let outcome = ratios(n, normal, stratified, dark);
-            let (linear, codes) = (mean(&outcome.linear), mean(&outcome.codes));
+            let (linear, levels) = (mean(&outcome.linear), mean(&outcome.levels));
             let case = format!(
                 "n {n}, normal {normal}, stratified {stratified}, dark {dark:?}: linear {linear:.3}, \
-                 codes {codes:.3}, spread {:.3}",
+                 levels {levels:.3}, spread {:.3}",
                 outcome.tile_spread
             );
             println!("{case}");
             assert!((0.95..1.05).contains(&linear), "{case}");
-            assert!((0.9..1.1).contains(&codes), "{case}");
+            assert!((0.9..1.1).contains(&levels), "{case}");
             assert!(outcome.tile_spread <= 0.2, "{case}");
         }
     }
@@ -135,7 +135,7 @@ fn estimates_equal_true_errors_in_the_mean() {
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
     let display = Display::default();
-    let curve = |x: f64| display.codes([x; 3])[0];
+    let curve = |x: f64| display.levels([x; 3])[0];
     let mut sum = [0.0; 4];
     for _ in 0..20_000 {
         let chance = 10f64.powf(-2.5 * rng.unit());
@@ -147,7 +147,7 @@ fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
         let picture = 0.5 * (a + b);
         let slope = (curve(picture + 1e-7) - curve((picture - 1e-7).max(0.0))) / 2e-7;
         sum[0] += (curve(picture) - curve(0.7 * chance)).powi(2);
-        sum[1] += film.noise(&white(1), &display).unwrap().rmse_codes.powi(2);
+        sum[1] += film.noise(&white(1), &display).unwrap().rmse_levels.powi(2);
         sum[2] += (0.5 * (curve(a) - curve(b))).powi(2);
         sum[3] += (0.5 * (a - b) * slope).powi(2);
     }
@@ -167,18 +167,18 @@ fn estimate_of_one_pixel_matches_the_formula() {
     // The error is half of each difference.
     let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
     assert!((tile.reported.linear - expected).abs() < 1e-15, "{tile:?}");
-    let code = |x: f64| display.codes([x; 3])[0];
+    let level = |x: f64| display.levels([x; 3])[0];
     let apart = |a: f64, b: f64| {
-        let m = code(0.5 * (a + b));
-        0.5 * ((code(a) - m).powi(2) + (code(b) - m).powi(2))
+        let m = level(0.5 * (a + b));
+        0.5 * ((level(a) - m).powi(2) + (level(b) - m).powi(2))
     };
     let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
-    assert!((tile.reported.codes / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
+    assert!((tile.reported.levels / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
     assert_eq!((tile.pixels, tile.allocation), (1, tile.reported));
     // Far above white the displayed difference is 0, because A and B are both clipped.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
     let noise = film.noise(&only(0, 2), &bright).unwrap();
-    assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
+    assert_eq!((noise.rmse_levels, quantised_8(bright.levels([0.125; 3])[0])), (0.0, 255));
     assert!(noise.rmse_linear > 0.0);
 }
 
@@ -197,7 +197,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
                 row
             });
             for ((m, a), b) in m.iter().zip(&a).zip(&b).skip((y + 1) % 2).step_by(2) {
-                let [m, a, b] = [m, a, b].map(|radiance| display.codes(*radiance));
+                let [m, a, b] = [m, a, b].map(|radiance| display.levels(*radiance));
                 for c in 0..3 {
                     mse += ((a[c] - m[c]).powi(2) + (b[c] - m[c]).powi(2)) / (2.0 * 384.0);
                 }
@@ -205,7 +205,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
         }
         let estimator = Estimator::new(film.scales(), &white(1), &display);
         let noise = estimator.tile(film.tile(0).unwrap()).unwrap();
-        assert!((noise.reported.codes / mse - 1.0).abs() < 2e-5, "{name}: {noise:?} {mse}");
+        assert!((noise.reported.levels / mse - 1.0).abs() < 2e-5, "{name}: {noise:?} {mse}");
     }
 }
 
@@ -217,9 +217,9 @@ fn unequal_counts_have_no_noise() {
     fill(&mut film, 3, |_, _, _| vec![1.0; 3]);
     let zero = Noise {
         rmse_linear: 0.0,
-        rmse_codes: 0.0,
-        p95_codes: 0.0,
-        worst_codes: 0.0,
+        rmse_levels: 0.0,
+        p95_levels: 0.0,
+        worst_levels: 0.0,
         effective_pixels: Mse::default(),
     };
     assert_eq!(noise(&film), Some(zero));
@@ -238,7 +238,7 @@ fn unequal_counts_have_no_noise() {
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };
     let (n, m) = (12u32, 8u32);
-    let (mut rng, mut estimates, mut codes, mut errors) = (Rng(9), 0.0, 0.0, [0.0; 2]);
+    let (mut rng, mut estimates, mut levels, mut errors) = (Rng(9), 0.0, 0.0, [0.0; 2]);
     for _ in 0..200 {
         let mut film = film(16, 16, &[2f64.powi(20)]);
         each_tile(&mut film, |tile, _| {
@@ -255,34 +255,34 @@ fn replicate_with_fewer_samples_still_has_an_estimate() {
         assert_eq!(estimator.tile(tile), None);
         let noise = estimator.tile_so_far(tile).unwrap();
         estimates += noise.reported.linear;
-        codes += noise.reported.codes;
-        let truth = display.codes([0.5; 3])[0];
+        levels += noise.reported.levels;
+        let truth = display.levels([0.5; 3])[0];
         for pixel in 0..256 {
             let value = film.pixel(pixel % 16, pixel / 16, &white(1));
             errors[0] += (value[0] - 0.5).powi(2) / 256.0;
-            errors[1] += (display.codes(value)[0] - truth).powi(2) / 256.0;
+            errors[1] += (display.levels(value)[0] - truth).powi(2) / 256.0;
         }
     }
-    let ratios = [(errors[0] / estimates).sqrt(), (errors[1] / codes).sqrt()];
+    let ratios = [(errors[0] / estimates).sqrt(), (errors[1] / levels).sqrt()];
     assert!(ratios.iter().all(|r| (0.98..1.02).contains(r)), "{ratios:?}");
 }
 
 #[test]
 fn noise_combines_the_tiles() {
-    let tile = |codes: f64, pixels| {
-        let mse = Mse { linear: 0.01, codes: codes * codes };
+    let tile = |levels: f64, pixels| {
+        let mse = Mse { linear: 0.01, levels: levels * levels };
         Some(TileNoise { reported: mse, allocation: mse, squares: Mse::SPREAD, pixels, samples: 4 })
     };
     let tiles = (1..=20).map(|i| tile(f64::from(i), 256)).chain([tile(7.0, 0)]);
     let noise = Noise::of_tiles(tiles).unwrap();
     assert!((noise.rmse_linear - 0.1).abs() < 1e-14);
-    assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
-    assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
+    assert!((noise.rmse_levels - 143.5f64.sqrt()).abs() < 1e-12);
+    assert_eq!((noise.p95_levels, noise.worst_levels), (19.0, 20.0));
     // If the tiles have different numbers of samples, the larger of two estimates is reported: that
     // from the white half of the pixels, and that from all pixels. If the numbers are equal, the
     // estimate from all pixels is reported.
     let rmse = |reported: f64, allocation: f64, samples: [u32; 2]| {
-        let mse = |x: f64| Mse { linear: x, codes: x };
+        let mse = |x: f64| Mse { linear: x, levels: x };
         let tile = |samples| {
             Some(TileNoise {
                 reported: mse(reported),
@@ -292,7 +292,7 @@ fn noise_combines_the_tiles() {
                 samples,
             })
         };
-        Noise::of_tiles(samples.map(tile)).unwrap().rmse_codes
+        Noise::of_tiles(samples.map(tile)).unwrap().rmse_levels
     };
     assert_eq!((rmse(4.0, 2.0, [4, 8]), rmse(2.0, 6.0, [4, 8])), (2.0, 2.0));
     assert_eq!((rmse(6.0, 2.0, [8, 8]), rmse(2.0, 6.0, [8, 8])), (2.0, 2.0));

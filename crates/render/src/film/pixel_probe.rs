@@ -16,7 +16,7 @@ pub struct PixelProbe {
     /// Linear radiance of the pixel; black without samples.
     pub radiance: [f64; 3],
     /// Value of the pixel on the display in 8-bit levels, 0..=255, not rounded.
-    pub codes: [f64; 3],
+    pub levels: [f64; 3],
     /// Half the difference of the replicates A and B (halves of the samples) in radiance, an
     /// estimate of the pixel's error. A single pixel's estimate is correct only within a factor of
     /// two or three. `None` if one of the replicates has no samples.
@@ -26,7 +26,7 @@ pub struct PixelProbe {
     pub tile_rmse_linear: Option<f64>,
     /// Estimated RMSE of the tile that contains the pixel, on the display in 8-bit levels. `None`
     /// if one of the replicates (halves of the samples) has no samples.
-    pub tile_rmse_codes: Option<f64>,
+    pub tile_rmse_levels: Option<f64>,
 }
 
 impl PixelProbe {
@@ -45,10 +45,10 @@ impl PixelProbe {
             pixel: [x, y],
             samples: [0; 2],
             radiance: [0.0; 3],
-            codes: display.codes([0.0; 3]),
+            levels: display.levels([0.0; 3]),
             difference: None,
             tile_rmse_linear: None,
-            tile_rmse_codes: None,
+            tile_rmse_levels: None,
         };
         let Some(tile) = film.tile(y / TILE * film.tile_columns() + x / TILE) else {
             return Some(probe);
@@ -57,7 +57,7 @@ impl PixelProbe {
         let sums = tile.sums(y % TILE * TILE + x % TILE);
         probe.samples = sums.counts;
         probe.radiance = sums.mean(Replicates::Both, &per_unit);
-        probe.codes = display.codes(probe.radiance);
+        probe.levels = display.levels(probe.radiance);
         if !sums.counts.contains(&0) {
             let [a, b] =
                 [Replicates::A, Replicates::B].map(|replicates| sums.mean(replicates, &per_unit));
@@ -66,7 +66,7 @@ impl PixelProbe {
         if let Some(noise) = Estimator::new(film.scales(), weights, display).tile_so_far(tile) {
             let noise = noise.of_all();
             probe.tile_rmse_linear = Some(noise.linear.sqrt());
-            probe.tile_rmse_codes = Some(noise.codes.sqrt());
+            probe.tile_rmse_levels = Some(noise.levels.sqrt());
         }
         Some(probe)
     }
@@ -85,7 +85,7 @@ mod tests {
         let probe = |film: &Film, pixel| PixelProbe::of_film(film, pixel, &mix, &display);
         let empty = probe(&film, [19, 17]).unwrap();
         assert_eq!((empty.samples, empty.radiance, empty.difference), ([0; 2], [0.0; 3], None));
-        assert_eq!(empty.tile_rmse_codes, None);
+        assert_eq!(empty.tile_rmse_levels, None);
         assert_eq!([probe(&film, [20, 0]), probe(&film, [0, 18])], [None; 2]);
         fill(&mut film, 2, |x, y, r| {
             let v = if [x, y] == [19, 17] { [2.0, 6.0][r] } else { 2.0 };
@@ -94,12 +94,12 @@ mod tests {
         let full = probe(&film, [19, 17]).unwrap();
         assert_eq!((full.pixel, full.samples), ([19, 17], [2, 2]));
         assert_eq!(full.radiance, [2.0, 4.0, 6.0]);
-        assert_eq!(full.codes, display.codes([2.0, 4.0, 6.0]));
+        assert_eq!(full.levels, display.levels([2.0, 4.0, 6.0]));
         assert_eq!(full.difference, Some([1.0, 2.0, 0.0]));
         // The corner tile has 4 x 2 pixels. One of them has an error of 1 in red and 2 in green.
         let rmse = full.tile_rmse_linear.unwrap();
         assert!((rmse - (5.0f64 / 24.0).sqrt()).abs() < 1e-12, "{rmse}");
-        assert!(full.tile_rmse_codes.is_some_and(|codes| codes > 0.0));
+        assert!(full.tile_rmse_levels.is_some_and(|levels| levels > 0.0));
         film.restart();
         each_tile(&mut film, |tile, _| tile.set_lattice(8));
         assert_eq!(probe(&film, [16, 16]).unwrap().samples, [1, 0]);

@@ -50,7 +50,7 @@ impl SrgbTable {
     /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded. The result differs from
     /// the exact value by less than 5.5e-4 8-bit levels.
     #[inline(always)]
-    pub fn code(&self, linear: f64) -> f64 {
+    pub fn level(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
         let [at_zero, slope] = self.chords[entry.min(ENTRIES - 1)];
         at_zero + slope * linear
@@ -58,8 +58,8 @@ impl SrgbTable {
 
     /// Encodes linear light 0..=1 as an 8-bit sRGB value, equal to the rounded exact encoding.
     #[inline]
-    pub fn code_8(&self, linear: f64) -> u8 {
-        let above = self.code(linear) + 0.5;
+    pub fn level_8(&self, linear: f64) -> u8 {
+        let above = self.level(linear) + 0.5;
         let nearest = above.floor();
         if (above - nearest - 0.5).abs() >= 0.5 - MAX_ERROR_CODES {
             return quantised_8(255.0 * srgb_from_linear(linear));
@@ -69,8 +69,8 @@ impl SrgbTable {
 }
 
 /// Rounds an unrounded sRGB value, 0..=255, to 8 bits.
-pub fn quantised_8(code: f64) -> u8 {
-    code.round() as u8
+pub fn quantised_8(level: f64) -> u8 {
+    level.round() as u8
 }
 
 #[cfg(test)]
@@ -85,7 +85,7 @@ mod tests {
             let even = f64::from(i) * 1e-6;
             for linear in [even, even * even * even] {
                 let exact = 255.0 * srgb_from_linear(linear);
-                worst = worst.max((SrgbTable::shared().code(linear) - exact).abs());
+                worst = worst.max((SrgbTable::shared().level(linear) - exact).abs());
             }
         }
         assert!(worst < MAX_ERROR_CODES, "{worst}");
@@ -97,23 +97,23 @@ mod tests {
         let exact = |linear| quantised_8(255.0 * srgb_from_linear(linear));
         for i in 0..=200_000 {
             let linear = f64::from(i) * 5e-6;
-            assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
+            assert_eq!(SrgbTable::shared().level_8(linear), exact(linear), "{linear}");
         }
         // Tests values whose relative distance from a border between two 8-bit values is at most
         // 2e-5.
-        for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
+        for border in (0..255).map(|level| (f64::from(level) + 0.5) / 255.0) {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {
                 let linear = linear * (1.0 + f64::from(step) * 1e-8);
-                assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
+                assert_eq!(SrgbTable::shared().level_8(linear), exact(linear), "{linear}");
             }
         }
     }
 
     #[test]
     fn table_is_exact_at_both_ends() {
-        assert_eq!(SrgbTable::shared().code(0.0), 0.0);
-        assert!((SrgbTable::shared().code(1.0) - 255.0).abs() < 1e-12);
-        assert_eq!(SrgbTable::shared().code(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
+        assert_eq!(SrgbTable::shared().level(0.0), 0.0);
+        assert!((SrgbTable::shared().level(1.0) - 255.0).abs() < 1e-12);
+        assert_eq!(SrgbTable::shared().level(f64::MIN_POSITIVE), 255.0 * 12.92 * f64::MIN_POSITIVE);
     }
 }

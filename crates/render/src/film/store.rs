@@ -337,7 +337,7 @@ impl Film {
 
     /// Calls `f` with the column and the integer sums of each pixel of row `y`. Tiles without
     /// samples are skipped.
-    pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
+    pub fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
         let columns = self.tile_columns();
         for column in 0..columns {
             let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
@@ -442,7 +442,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::test_film::TestFilm;
+    use crate::film::testing::TestFilm;
     use crate::film::testing::{fill, film, white};
 
     #[test]

@@ -96,8 +96,8 @@ impl Plan {
             s.display.exposure_ev,
             s.display.tone,
             s.rays_per_pixel,
-            s.noise_codes,
-            self.predicted_codes,
+            s.noise_levels,
+            self.predicted_levels,
             self.slopes[0],
             self.slopes[1],
             s.shards,
@@ -192,11 +192,11 @@ impl Plan {
                 tone: lines.setting("tone", "clip or neutral", |text| Tone::from_str(text).ok())?,
             },
             rays_per_pixel: lines.setting("rays_per_pixel", "an integer from 0", number)?,
-            noise_codes: lines.setting("noise", "a number above 0", positive)?,
+            noise_levels: lines.setting("noise", "a number above 0", positive)?,
             shards: 0,
             base_plan: None,
         };
-        let predicted_codes = lines.setting("predicted_noise", "a number from 0", |text| {
+        let predicted_levels = lines.setting("predicted_noise", "a number from 0", |text| {
             number(text).filter(|n: &f64| n.is_finite() && *n >= 0.0)
         })?;
         let slopes = lines.setting("slopes", "two numbers from 0.1 to 2", |text| {
@@ -226,7 +226,7 @@ impl Plan {
             let what = format!("found `{}`, expected the checksum", truncated(line));
             return Err(lines.error(what));
         }
-        Ok(Self { settings, predicted_codes, slopes, tiles })
+        Ok(Self { settings, predicted_levels, slopes, tiles })
     }
 }
 
@@ -329,7 +329,7 @@ mod tests {
         let mut plan = plan(8, &[[4, 16], [8, 8], [16, 480]]);
         plan.settings.base_plan = Some(0x12);
         plan.settings.display = Display { exposure_ev: -1.1, tone: Tone::Neutral };
-        plan.predicted_codes = 1.0 / 3.0;
+        plan.predicted_levels = 1.0 / 3.0;
         assert_eq!(parsed(&plan.text()).unwrap(), plan);
         assert!(plan.text().ends_with(&format!("checksum {:016x}\n", plan.checksum())));
     }

@@ -59,7 +59,7 @@ pub struct PlanSettings {
     /// a direction of a glossy lobe), over the whole render; 0 for no limit.
     pub rays_per_pixel: u32,
     /// Noise target: RMSE of the displayed picture in 8-bit levels.
-    pub noise_codes: f64,
+    pub noise_levels: f64,
     /// Number of shards into which the render is divided, 1 to [`MAX_SHARDS`]. Each is for one
     /// process. They are numbered from 1.
     pub shards: u32,
@@ -76,7 +76,7 @@ pub struct Plan {
     /// Settings of the planned render: the inputs of its samples, and its noise target.
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
-    pub predicted_codes: f64,
+    pub predicted_levels: f64,
     /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles in which no path makes a
     /// random choice, then of the other tiles (see [`PlannedTile::glossy`]).
     pub slopes: [f64; 2],
@@ -119,7 +119,7 @@ impl Plan {
         };
         Some(Self {
             settings,
-            predicted_codes: prediction.rmse,
+            predicted_levels: prediction.rmse,
             slopes: prediction.slopes,
             tiles: prediction.tiles.iter().map(tile).collect(),
         })

@@ -24,11 +24,11 @@ pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
             precision: "single".into(),
             display: Display::default(),
             rays_per_pixel: 0,
-            noise_codes: 0.25,
+            noise_levels: 0.25,
             shards,
             base_plan: None,
         },
-        predicted_codes: 0.248,
+        predicted_levels: 0.248,
         slopes: [0.5, 0.75],
         tiles: tiles.iter().map(tile).collect(),
     }

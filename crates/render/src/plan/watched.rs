@@ -18,6 +18,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
+use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
 /// Time since the last replacement of an unfinished film file after which the file counts as late.
@@ -60,14 +61,6 @@ struct WatchedFile {
     /// Number of samples, over all pixels, that the plan assigns to the shards of the film file.
     /// `None` before the file is added to the sum, and for files without a plan.
     total: Option<u64>,
-}
-
-/// Properties of a file that change when it is replaced: modification time, length, inode.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct FileStamp {
-    modified: SystemTime,
-    length: u64,
-    inode: u64,
 }
 
 #[derive(Debug)]
@@ -254,7 +247,7 @@ impl WatchedFilms {
         self.files.iter().enumerate().filter_map(|(i, file)| Some((i, file.input()?)))
     }
 
-    /// Reads the film files whose stamps (time, length, inode) have changed. Returns their indices.
+    /// Reads the film files whose stamps have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
@@ -497,18 +490,5 @@ impl WatchedState {
             Self::Running => 3,
             Self::Complete => 4,
         }
-    }
-}
-
-impl FileStamp {
-    /// Returns the stamp (time, length, inode) of the file at `path`, or `None` if there is no such
-    /// file.
-    fn of(path: &Path) -> Option<Self> {
-        let metadata = fs::metadata(path).ok()?;
-        #[cfg(unix)]
-        let inode = std::os::unix::fs::MetadataExt::ino(&metadata);
-        #[cfg(not(unix))]
-        let inode = 0;
-        Some(Self { modified: metadata.modified().ok()?, length: metadata.len(), inode })
     }
 }

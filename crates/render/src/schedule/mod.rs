@@ -213,9 +213,9 @@ impl Schedule {
 
     /// Returns the latest estimate of each tile's RMSE as displayed, in 8-bit levels, in row order;
     /// 0 before the first estimate.
-    pub fn tile_noise_codes(&self) -> Vec<f32> {
-        let codes = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().codes.sqrt() as f32);
-        self.tiles.iter().map(codes).collect()
+    pub fn tile_noise_levels(&self) -> Vec<f32> {
+        let levels = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().levels.sqrt() as f32);
+        self.tiles.iter().map(levels).collect()
     }
 
     /// Returns the latest estimate of each tile's error, in row order; `None` before the first

@@ -6,7 +6,7 @@ use crate::film::{Mse, Noise};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
     /// RMSE of the displayed picture, in 8-bit levels.
-    Codes,
+    Levels,
     /// RMSE of the picture in linear radiance.
     Linear,
 }
@@ -14,14 +14,14 @@ pub enum Criterion {
 impl Criterion {
     pub(super) fn of(self, error: Mse) -> f64 {
         match self {
-            Self::Codes => error.codes,
+            Self::Levels => error.levels,
             Self::Linear => error.linear,
         }
     }
 
     pub(super) fn of_picture(self, noise: Noise) -> f64 {
         match self {
-            Self::Codes => noise.rmse_codes,
+            Self::Levels => noise.rmse_levels,
             Self::Linear => noise.rmse_linear,
         }
     }
@@ -36,7 +36,7 @@ pub struct Stop {
     pub spp: Option<u32>,
     /// Target for the estimated RMSE of the whole picture as displayed, in 8-bit levels. `None` for
     /// no target.
-    pub noise_codes: Option<f64>,
+    pub noise_levels: Option<f64>,
     /// Target for the estimated RMSE of the whole picture in linear radiance. `None` for no target.
     pub rmse_linear: Option<f64>,
     /// Time limit of the render in seconds. It is tested between waves, sets of jobs that run
@@ -98,6 +98,6 @@ impl Settings {
     /// Creates settings that minimise the error of the displayed picture. `rays_per_pixel` is 0; a
     /// renderer replaces it by that of the scene.
     pub fn new(adaptive: bool, stop: Stop) -> Self {
-        Self { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
+        Self { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
     }
 }

@@ -27,8 +27,9 @@ impl Schedule {
         out.extend([u8::from(self.estimate), self.replicate as u8]);
         out.push(u8::from(self.noise.is_some()));
         if let Some(noise) = self.noise {
-            let Noise { rmse_linear, rmse_codes, p95_codes, worst_codes, effective_pixels } = noise;
-            floats(&[rmse_linear, rmse_codes, p95_codes, worst_codes], &mut out);
+            let Noise { rmse_linear, rmse_levels, p95_levels, worst_levels, effective_pixels } =
+                noise;
+            floats(&[rmse_linear, rmse_levels, p95_levels, worst_levels], &mut out);
             mse(effective_pixels, &mut out);
         }
         length(self.convergence.points.len(), &mut out);
@@ -58,7 +59,7 @@ impl Schedule {
     /// not valid or does not belong to the film; the schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
-        let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Codes };
+        let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Levels };
         (self.samples, self.rays) = (fields.u64()?, fields.u64()?);
         self.estimated_at = fields.u32()?;
         self.estimate = flag(&mut fields)?;
@@ -66,9 +67,9 @@ impl Schedule {
         if flag(&mut fields)? {
             self.noise = Some(Noise {
                 rmse_linear: error(&mut fields)?,
-                rmse_codes: error(&mut fields)?,
-                p95_codes: error(&mut fields)?,
-                worst_codes: error(&mut fields)?,
+                rmse_levels: error(&mut fields)?,
+                p95_levels: error(&mut fields)?,
+                worst_levels: error(&mut fields)?,
                 effective_pixels: decode_mse(&mut fields)?,
             });
         }
@@ -142,12 +143,12 @@ fn floats(values: &[f64], out: &mut Vec<u8>) {
     values.iter().for_each(|value| out.extend(value.to_le_bytes()));
 }
 
-fn mse(Mse { linear, codes }: Mse, out: &mut Vec<u8>) {
-    floats(&[linear, codes], out);
+fn mse(Mse { linear, levels }: Mse, out: &mut Vec<u8>) {
+    floats(&[linear, levels], out);
 }
 
 fn decode_mse(fields: &mut Fields) -> Option<Mse> {
-    Some(Mse { linear: error(fields)?, codes: error(fields)? })
+    Some(Mse { linear: error(fields)?, levels: error(fields)? })
 }
 
 /// Decodes the estimated error of a tile or of the picture. In extreme pictures it is infinite or

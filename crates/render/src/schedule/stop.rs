@@ -34,16 +34,16 @@ impl Schedule {
     }
 
     /// Returns a lower and an upper estimate of the seconds left until the RMSE of the displayed
-    /// picture falls to `codes` 8-bit levels, whatever the stop criteria are. `seconds` is the time
+    /// picture falls to `levels` 8-bit levels, whatever the stop criteria are. `seconds` is the time
     /// since the start of the render. Returns `None` before the first noise estimate.
-    pub fn seconds_to_noise(&self, codes: f64, seconds: f64) -> Option<(f64, f64)> {
+    pub fn seconds_to_noise(&self, levels: f64, seconds: f64) -> Option<(f64, f64)> {
         let noise = self.noise?;
-        if noise.rmse_codes <= codes {
+        if noise.rmse_levels <= levels {
             return Some((0.0, 0.0));
         }
         let target = match self.settings.criterion {
-            Criterion::Codes => codes,
-            Criterion::Linear => codes * noise.rmse_linear / noise.rmse_codes,
+            Criterion::Levels => levels,
+            Criterion::Linear => levels * noise.rmse_linear / noise.rmse_levels,
         };
         self.seconds_to_error(target, seconds)
     }
@@ -71,18 +71,18 @@ impl Schedule {
     /// target for each of the two measures, returns the one for the measure that adaptive sampling
     /// minimises. Returns `None` if the render has no error target.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
-        let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
+        let levels = self.settings.stop.noise_levels.map(|t| (Criterion::Levels, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
         match self.settings.criterion {
-            Criterion::Codes => codes.or(linear),
-            Criterion::Linear => linear.or(codes),
+            Criterion::Levels => levels.or(linear),
+            Criterion::Linear => linear.or(levels),
         }
     }
 
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
         if let Some(noise) = self.largest_recent_noise().filter(|_| self.min_samples_reached()) {
-            if stop.noise_codes.is_some_and(|t| noise.rmse_codes <= t) {
+            if stop.noise_levels.is_some_and(|t| noise.rmse_levels <= t) {
                 return Some(StoppedBy::Noise);
             }
             if stop.rmse_linear.is_some_and(|t| noise.rmse_linear <= t) {

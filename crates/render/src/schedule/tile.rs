@@ -104,7 +104,7 @@ impl Tile {
         let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
         let growth = f64::from(latest.samples) / f64::from(earlier.samples);
         let factor = growth.powf(-2.0 * USUAL_SLOPE);
-        let scaled = |mse: Mse| Mse { linear: factor * mse.linear, codes: factor * mse.codes };
+        let scaled = |mse: Mse| Mse { linear: factor * mse.linear, levels: factor * mse.levels };
         let (reported, allocation) = (scaled(earlier.reported), scaled(earlier.allocation));
         Some(TileNoise { reported, allocation, ..latest })
     }

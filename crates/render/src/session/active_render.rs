@@ -325,7 +325,7 @@ impl ActiveRender {
         self.update_first_hits(context, f64::INFINITY);
         let (frame, report) = (self.frame(context), self.report(context, state));
         let noise = match report.noise {
-            Some(_) => self.schedule.tile_noise_codes(),
+            Some(_) => self.schedule.tile_noise_levels(),
             None => Vec::new(),
         };
         let downsample = &mut self.downsample;
@@ -346,7 +346,8 @@ impl ActiveRender {
             first_picture_seconds: self.first_picture_after.map(|time| time.as_secs_f64()),
             noise: self.schedule.noise(),
             eta_seconds: self.schedule.eta_seconds(seconds),
-            quality_seconds: QUALITIES.map(|codes| self.schedule.seconds_to_noise(codes, seconds)),
+            quality_seconds: QUALITIES
+                .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),
             progress: self.schedule.progress(seconds),
             bad_samples: self.state.film.bad_samples().count,
             saturated_samples: self.state.film.saturated_samples(),

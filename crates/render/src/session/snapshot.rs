@@ -67,20 +67,20 @@ pub struct TileMaps {
     /// Number of rows of tiles of the film.
     pub rows: usize,
     /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
-    pub noise_codes: Vec<f32>,
+    pub noise_levels: Vec<f32>,
     /// Samples per pixel of each tile, over both replicates (halves of the samples).
     pub spp: Vec<u32>,
 }
 
 impl TileMaps {
-    pub(super) fn of(film: &Film, noise_codes: Vec<f32>) -> Self {
+    pub(super) fn of(film: &Film, noise_levels: Vec<f32>) -> Self {
         let count = |tile: usize| {
             let [a, b] = film.counts(tile);
             a.saturating_add(b)
         };
         let columns = film.tile_columns();
         let rows = film.tile_count() / columns;
-        Self { columns, rows, noise_codes, spp: (0..film.tile_count()).map(count).collect() }
+        Self { columns, rows, noise_levels, spp: (0..film.tile_count()).map(count).collect() }
     }
 }
 
@@ -95,13 +95,13 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a snapshot of `film`. `noise_codes` has the RMSE of each tile in 8-bit levels.
+    /// Creates a snapshot of `film`. `noise_levels` has the RMSE of each tile in 8-bit levels.
     /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
     /// so that only changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,
-        noise_codes: Vec<f32>,
+        noise_levels: Vec<f32>,
         report: Report,
         downsample: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
@@ -117,7 +117,7 @@ impl Frame {
             downsample.thumbnail()
         });
         let tiles = match self.view.raster {
-            Some(_) => Arc::new(TileMaps::of(film, noise_codes)),
+            Some(_) => Arc::new(TileMaps::of(film, noise_levels)),
             None => Arc::default(),
         };
         let probe = self

@@ -23,7 +23,7 @@ fn session(stop: Stop) -> Session {
         display: Display::default(),
     };
     let settings =
-        Settings { adaptive: false, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: false, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     Session::new(1, options, settings).unwrap()
 }
 
@@ -221,8 +221,8 @@ fn snapshots_hold_what_the_view_requests() {
     let noisy = wait_for(&session, |s| s.report.noise.is_some());
     let picture = noisy.picture.expect("a picture");
     assert_eq!((picture.cols, picture.rows), (8, 4));
-    assert_eq!(noisy.tiles.noise_codes.len(), 16);
-    assert!(noisy.tiles.noise_codes.iter().any(|noise| *noise > 0.0));
+    assert_eq!(noisy.tiles.noise_levels.len(), 16);
+    assert!(noisy.tiles.noise_levels.iter().any(|noise| *noise > 0.0));
     session.set_view(View::default());
     wait_for(&session, |s| s.picture.is_none());
 }
@@ -232,8 +232,8 @@ fn reports_hold_noise_and_time_left() {
     let mut session = session(endless());
     session.set_scene(scene(64));
     let running = wait_for(&session, |s| s.report.noise.is_some()).report;
-    let Noise { rmse_codes, .. } = running.noise.unwrap();
-    assert!(rmse_codes > 0.0 && rmse_codes < 255.0);
+    let Noise { rmse_levels, .. } = running.noise.unwrap();
+    assert!(rmse_levels > 0.0 && rmse_levels < 255.0);
     let (low, high) = running.eta_seconds.expect("a time");
     assert!(low > 0.0 && high >= low);
     assert!(running.progress.is_some_and(|p| p > 0.0 && p < 1.0));

@@ -49,7 +49,7 @@ pub struct WatchReport {
     pub progress: Option<f64>,
     /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
     /// plan.
-    pub target_codes: Option<f64>,
+    pub target_levels: Option<f64>,
     /// Width and height of the picture in pixels, from the film files or else from the plan. `None`
     /// if there are neither.
     pub size: Option<[u32; 2]>,
@@ -159,7 +159,7 @@ struct Worker {
 /// Report on the film that a watch session shows, and RMSE of the film's tiles in 8-bit levels.
 struct Shown {
     report: Report,
-    noise_codes: Vec<f32>,
+    noise_levels: Vec<f32>,
 }
 
 impl Worker {
@@ -233,8 +233,9 @@ impl Worker {
         let noise = |tile| film.tile(tile).and_then(|tile| estimator.tile_so_far(tile));
         let tiles: Vec<Option<TileNoise>> =
             self.pool.install(|| (0..film.tile_count()).into_par_iter().map(noise).collect());
-        let codes = |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().codes.sqrt() as f32);
-        let noise_codes = tiles.iter().map(codes).collect();
+        let levels =
+            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().levels.sqrt() as f32);
+        let noise_levels = tiles.iter().map(levels).collect();
         let report = Report {
             generation: 1,
             rays: self.films.rays(),
@@ -244,7 +245,7 @@ impl Worker {
             threads: self.pool.current_num_threads(),
             ..Report::of_samples(film)
         };
-        self.shown = Some(Shown { report, noise_codes });
+        self.shown = Some(Shown { report, noise_levels });
     }
 
     fn progress(&self) -> Option<f64> {
@@ -255,7 +256,7 @@ impl Worker {
 
     fn publish(&mut self) {
         let (Some(film), Some(header)) = (self.films.film(), self.films.header()) else { return };
-        let Some(Shown { report, noise_codes }) = &self.shown else { return };
+        let Some(Shown { report, noise_levels }) = &self.shown else { return };
         let frame = Frame {
             view: self.view,
             mix: header.weights.clone(),
@@ -265,7 +266,7 @@ impl Worker {
         };
         let downsample = &mut self.downsample;
         let snapshot =
-            frame.snapshot(film, noise_codes.clone(), report.clone(), downsample, &self.pool);
+            frame.snapshot(film, noise_levels.clone(), report.clone(), downsample, &self.pool);
         self.slot.put(snapshot);
         // A full channel means that a wake-up is pending.
         let _ = self.notify.try_send(());
@@ -299,7 +300,7 @@ impl WatchReport {
             shards,
             complete: films.complete_shards(),
             progress,
-            target_codes: settings.map(|settings| settings.noise_codes),
+            target_levels: settings.map(|settings| settings.noise_levels),
             size: film_size.or(settings.map(|settings| settings.size)),
             display: display.unwrap_or_default(),
             source: source.unwrap_or_default().to_string(),

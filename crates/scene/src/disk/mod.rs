@@ -4,6 +4,7 @@
 mod open;
 mod owner;
 mod replace;
+mod stamp;
 
 pub(crate) use open::open_regular_with;
 pub use open::{open_regular, require_regular};
@@ -11,3 +12,4 @@ pub use owner::{is_own, user_name};
 pub use replace::{
     Existing, Replacement, TEMPORARY, WriteError, check_writable, lock, replace_file, write,
 };
+pub use stamp::FileStamp;

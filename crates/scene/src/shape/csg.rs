@@ -14,8 +14,7 @@ use crate::value::{
 use glam::DVec3;
 use toml::de::DeValue;
 use toml::{Spanned, Value};
-use zerkalo_kernel::primitive::Form;
-use zerkalo_kernel::primitive::csg_tree::{CsgSolid, CsgTree};
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree, Form};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
@@ -196,9 +195,11 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
                 trees.push(inner.tree.shifted(parts.len()));
                 parts.extend(inner.parts);
             }
+            // Other geometry is left out; `unfit_reason` reports it.
             simple => {
+                let Some(solid) = simple.into_solid() else { continue };
                 trees.push(CsgTree::Part(parts.len()));
-                parts.push(simple);
+                parts.push(solid);
             }
         }
     }

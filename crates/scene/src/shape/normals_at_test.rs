@@ -3,7 +3,7 @@
 use crate::shape::{EXAMPLES, Shape};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;
-use zerkalo_kernel::primitive::conical_frustum::AROUND_TIP;
+use zerkalo_kernel::primitive::AROUND_TIP;
 
 /// Checks `normals_at` for rays from all sides. At the point where a ray hits the shape, it must
 /// return a normal that is not perpendicular to the ray. At the origin of the ray, which is not on

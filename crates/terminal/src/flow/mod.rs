@@ -149,7 +149,7 @@ pub struct FlowControl {
     /// Earliest time at which a frame may again contain refinement: cells whose differences are
     /// below the threshold of visibility. The delay limits refinement to a quarter of the
     /// connection's rate (`REFINEMENT_SHARE`).
-    pub(crate) refine_at: Duration,
+    pub refine_at: Duration,
     send_queue: SendQueueEstimate,
     /// Last measurement of the connection's rate by acknowledgements; `None` before the first one.
     ack_sample: Option<AckSample>,

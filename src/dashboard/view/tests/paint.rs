@@ -5,16 +5,16 @@
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
-use zerkalo_render::film::Display;
-use zerkalo_render::Options;
-use zerkalo_render::schedule::{Criterion, Settings, Stop};
-use zerkalo_render::session::{Session, Snapshot, State, View};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_terminal::diff::Encoder;
-use zerkalo_world as world;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use zerkalo_render::Options;
+use zerkalo_render::film::Display;
+use zerkalo_render::schedule::{Criterion, Settings, Stop};
+use zerkalo_render::session::{Session, Snapshot, State, View};
+use zerkalo_terminal::diff::Encoder;
+use zerkalo_world as world;
 
 fn rendered(model: &Model, spp: u32) -> Snapshot {
     let options = Options {
@@ -24,7 +24,7 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
     };
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let settings =
-        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+        Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut session = Session::new(2, options, settings).unwrap();
     session.set_view(View { raster: Some(model.layout().unwrap().raster), probe: model.probe });
     session.set_scene(Arc::clone(model.scene()));

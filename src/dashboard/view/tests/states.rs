@@ -9,6 +9,8 @@ use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
+use std::sync::Arc;
+use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};
 use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
@@ -16,8 +18,6 @@ use zerkalo_render::session::{
 };
 use zerkalo_scene::edit::{self, Target};
 use zerkalo_scene::{Scene, built_in};
-use std::sync::Arc;
-use std::time::Duration;
 
 /// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
@@ -26,7 +26,7 @@ pub type Named = (&'static str, fn(&mut Model));
 /// pixel of the built-in scene.
 pub fn tracing(screen: [u16; 2]) -> Model {
     let path = Some("scenes/mirror-room.toml".into());
-    let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+    let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
     let mut model = Model::new(path, "", Ok(Arc::new(built_in())), stop, 2);
     model.screen = screen;
     model.first_time = false;
@@ -67,7 +67,7 @@ pub fn snapshot(report: Report) -> Snapshot {
         tiles: Arc::new(TileMaps {
             columns: 40,
             rows: 30,
-            noise_codes: (0..1200).map(|i| 0.1 + i as f32 * 0.01).collect(),
+            noise_levels: (0..1200).map(|i| 0.1 + i as f32 * 0.01).collect(),
             spp: (0..1200).map(|i| 32 + i % 900).collect(),
         }),
         probe: None,
@@ -114,7 +114,7 @@ fn resting(model: &mut Model, by: StoppedBy) {
     let snapshot = model.snapshot.as_mut().unwrap();
     snapshot.report.state = State::Finished(by);
     snapshot.report.eta_seconds = None;
-    snapshot.report.noise.as_mut().unwrap().rmse_codes = 0.49;
+    snapshot.report.noise.as_mut().unwrap().rmse_levels = 0.49;
 }
 
 fn notice(model: &mut Model, tone: Tone, text: &str) {
@@ -149,10 +149,10 @@ fn probing(model: &mut Model) {
         pixel: [320, 240],
         samples: [106, 106],
         radiance: [0.2123, 0.18, 0.0904],
-        codes: [127.46, 118.2, 83.9],
+        levels: [127.46, 118.2, 83.9],
         difference: Some([0.012, 0.01, 0.004]),
         tile_rmse_linear: Some(0.01),
-        tile_rmse_codes: Some(0.84),
+        tile_rmse_levels: Some(0.84),
     });
 }
 
@@ -192,7 +192,7 @@ fn watched_plan() -> WatchReport {
         ],
         complete: Some([2, 9]),
         progress: Some(0.345),
-        target_codes: Some(0.25),
+        target_levels: Some(0.25),
         size: Some([640, 480]),
         display: Display::default(),
         source: "scenes/mirror-room.toml".to_string(),
@@ -290,20 +290,20 @@ pub const STATES: &[Named] = &[
             watched("", Some("mirror-room.zk"), WatchedState::Late, [1_234_567, 0], Some(7200));
         let shards = vec![WatchedShards { total: None, ..row }];
         let report = watched_plan();
-        let (complete, progress, target_codes) = (None, None, None);
-        watching(m, &WatchReport { shards, complete, progress, target_codes, ..report });
+        let (complete, progress, target_levels) = (None, None, None);
+        watching(m, &WatchReport { shards, complete, progress, target_levels, ..report });
     }),
     ("watching-before-the-first-file", |m| {
         m.snapshot = None;
         m.convergence = Default::default();
         let shards = vec![watched("", Some("job-1.zk"), WatchedState::Missing, [0; 2], None)];
-        let (complete, progress, target_codes) = (None, None, None);
+        let (complete, progress, target_levels) = (None, None, None);
         let report = watched_plan();
         let size = None;
         let source = String::new();
         watching(
             m,
-            &WatchReport { shards, complete, progress, target_codes, size, source, ..report },
+            &WatchReport { shards, complete, progress, target_levels, size, source, ..report },
         );
     }),
     ("watching-help", |m| {

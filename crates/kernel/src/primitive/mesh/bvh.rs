@@ -1,17 +1,18 @@
-//! BVH over the triangles of a mesh, built once per mesh. A leaf has up to eight triangles in
-//! structure-of-arrays layout. A single ray is intersected with all eight at once; a packet of rays
-//! is intersected with one triangle after the other.
+//! BVH over the triangles of a mesh. A leaf has up to eight triangles in structure-of-arrays layout. A
+//! single ray is intersected with all eight at once, a packet with one triangle after the other.
 
 use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
+use crate::primitive::canonical::Bounds;
 use crate::primitive::mesh::{TriangleMesh, smooth};
+use glam::DVec3;
 use std::fmt;
 use std::sync::OnceLock;
 
-/// Leaf of a mesh's BVH: up to eight triangles. The coordinates of unused slots are NaN.
+/// Leaf of a mesh's BVH. The coordinates of unused slots are NaN.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct TriangleBlock {
-    /// Coordinates of the triangles' corners, indexed by `[corner][axis][triangle]`.
+    /// Coordinates, indexed by `[corner][axis][triangle]`.
     pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
 }
 
@@ -21,14 +22,12 @@ pub struct Mesh {
     mesh: TriangleMesh,
     boxes: Bvh8,
     leaves: Vec<TriangleBlock>,
-    /// Index of the first triangle of each BVH leaf. The triangles of a leaf have consecutive
-    /// indices.
+    /// Index of the first triangle of each leaf.
     firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// Two meshes are equal only if they are the same allocation. Two meshes that were read from the
-/// same file are therefore not equal.
+/// Two meshes are equal only if they are the same allocation.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
@@ -61,19 +60,15 @@ impl TriangleBlock {
 }
 
 impl Mesh {
-    /// Builds the BVH of a mesh. The triangles are reordered so that those of a leaf are
-    /// consecutive.
+    /// Builds the BVH of a mesh. The triangles are reordered: those of a leaf are consecutive.
     pub fn new(mut mesh: TriangleMesh) -> Self {
         let corners = |i: usize| {
             let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
             let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
             [reduce(f32::min), reduce(f32::max)]
         };
-        // A high traversal cost gives large leaves. Large leaves are cheap, because a single ray is
-        // intersected with all triangles of a leaf at once by SIMD.
-        let quality = BuildQuality { traversal_cost: 8.0, ..BuildQuality::FAST };
         let Bvh8Build { bvh: boxes, order, leaves } =
-            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
+            Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, BuildQuality::FAST);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();
         if !mesh.color_of.is_empty() {
             mesh.color_of = order.iter().map(|i| mesh.color_of[*i as usize]).collect();
@@ -99,14 +94,13 @@ impl Mesh {
         &self.leaves
     }
 
-    /// Returns the index of the first triangle of a BVH leaf. The triangles of a leaf have
-    /// consecutive indices.
+    /// Returns the index of the first triangle of a leaf.
     pub fn first_triangle(&self, leaf: usize) -> u32 {
         self.firsts[leaf]
     }
 
-    /// Returns a unit normal per vertex. If the file has normals, these are returned. Otherwise a
-    /// vertex has the mean normal of the adjacent triangles; the first call computes these means.
+    /// Returns a unit normal per vertex: those of the file, or else the mean normal of the adjacent
+    /// triangles, which the first call computes.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,
@@ -116,20 +110,34 @@ impl Mesh {
 
     /// Returns the largest dot product of `direction` with a corner of a triangle: the support
     /// function of the mesh.
-    pub fn support(&self, direction: [f64; 3]) -> f64 {
-        let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
-        let mut best = f64::NEG_INFINITY;
-        let mut stack = vec![(0u32, f64::INFINITY)];
+    pub fn support(&self, direction: DVec3) -> f64 {
+        -self.least(
+            |(low, high)| -(direction * low).max(direction * high).element_sum(),
+            |corners| -corners.map(|c| direction.dot(c)).into_iter().fold(f64::NAN, f64::max),
+        )
+    }
+
+    /// Returns the least value of `of_triangle` over all triangles. `lower_bound` returns a number
+    /// that is at most the values of all triangles in a box.
+    pub fn least(
+        &self,
+        lower_bound: impl Fn(Bounds) -> f64,
+        of_triangle: impl Fn([DVec3; 3]) -> f64,
+    ) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut stack = vec![(0u32, f64::NEG_INFINITY)];
         while let Some((index, bound)) = stack.pop() {
-            if bound <= best {
+            if bound >= least {
                 continue;
             }
             let node = &self.boxes.nodes()[index as usize];
             let first = stack.len();
             for i in node.children() {
-                let reach = |a| along(a, node.bounds[a][i]).max(along(a, node.bounds[a + 3][i]));
-                let bound: f64 = (0..3).map(reach).sum();
-                if bound <= best {
+                let corner = |from: usize| {
+                    DVec3::from([0, 1, 2].map(|a| f64::from(node.bounds[a + from][i])))
+                };
+                let bound = lower_bound((corner(0), corner(3)));
+                if bound >= least {
                     continue;
                 }
                 if node.child[i] & LEAF_FLAG == 0 {
@@ -137,16 +145,18 @@ impl Mesh {
                     continue;
                 }
                 let leaf = &self.leaves[(node.child[i] & !LEAF_FLAG) as usize];
-                for [x, y, z] in &leaf.corners {
-                    for ((x, y), z) in x.iter().zip(y).zip(z) {
-                        // `max` ignores the NaNs of unused slots.
-                        best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
-                    }
+                for slot in 0..BVH_WIDTH {
+                    let corner = |c: &[[f32; BVH_WIDTH]; 3]| {
+                        DVec3::from(c.each_ref().map(|axis| f64::from(axis[slot])))
+                    };
+                    // `min` ignores the NaNs of unused slots.
+                    least = least.min(of_triangle(leaf.corners.each_ref().map(corner)));
                 }
             }
-            stack[first..].sort_by(|(_, a), (_, b)| a.total_cmp(b));
+            // The box with the least bound is last and popped first.
+            stack[first..].sort_by(|(_, a), (_, b)| b.total_cmp(a));
         }
-        best
+        least
     }
 
     /// Returns the memory of the mesh and its BVH in bytes.

@@ -1,28 +1,26 @@
-//! Triangle meshes as primitives. A ray is transformed into the space of the mesh and traverses the
-//! mesh's BVH there; hits are transformed back.
-//!
-//! Coordinates of a mesh are in single precision for every SIMD type; computation has the precision
-//! of the lanes.
+//! Meshes as primitives. A ray is transformed into the space of the mesh and traverses the mesh's BVH
+//! there. Coordinates of a mesh are in single precision for every SIMD type; computation has the
+//! precision of the lanes.
 
-use crate::bvh::{Hit, LEAF_FLAG, Ray};
-use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
-use crate::primitive::batch::{SurfacePoint, UvGradients};
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
+use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
 };
-use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::form::Form;
 use crate::primitive::keep_visible;
 use crate::primitive::mesh::{Mesh, intersection};
-use crate::primitive::primitive_box::PrimitiveBox;
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Assumed ratio of a mesh's extent to the size of its smallest details. It determines the choice
-/// of single or double precision.
+/// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single or
+/// double precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
-/// Canonical form of a mesh: the image of a triangle mesh under an invertible affine map.
+/// Image of a triangle mesh under an invertible affine map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshForm {
     /// Triangles in the space of the mesh.
@@ -33,17 +31,20 @@ pub struct MeshForm {
     pub smooth: bool,
 }
 
-impl CanonicalShape for MeshForm {
-    fn transformed(self, map: &DAffine3) -> Form {
-        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }.into()
+impl MeshForm {
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }
     }
+}
 
+impl CanonicalShape for MeshForm {
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_mesh;
         let rows = m.matrix3.transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());
-        let high = rows.map(|r| self.mesh.support(r));
-        let low = rows.map(|r| -self.mesh.support(r.map(|x| -x)));
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let high = rows.map(|row| self.mesh.support(row));
+        let low = rows.map(|row| -self.mesh.support(-row));
         Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
     }
 
@@ -52,18 +53,14 @@ impl CanonicalShape for MeshForm {
         Some((self.scene_from_mesh, (low, high)))
     }
 
-    fn is_convex(&self) -> bool {
-        false
-    }
-
     fn thickness(&self) -> f64 {
         let [low, high] = self.mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
         let m = self.scene_from_mesh.matrix3;
         let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
         let size = ((high - low) * DVec3::from(stretched)).to_array();
         let longest = size.into_iter().fold(0.0, f64::max);
-        // The thickness of a needle or a thin sheet is the shortest side of its bounding box. Sides
-        // of length 0 are left out, because a flat mesh encloses no volume.
+        // A needle or a thin sheet is as thick as the shortest side of its bounding box. Sides of
+        // length 0 are left out, because a flat mesh encloses no volume.
         let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         thinnest.min(longest / EXTENT_PER_DETAIL)
     }
@@ -96,10 +93,6 @@ impl CanonicalShape for MeshForm {
         if normals.is_empty() { Vec::new() } else { vec![normals] }
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled(self.clone().into(), origin, direction)
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         match self.mesh.mesh().uvs {
             Some(_) => DefaultMapping::Uv,
@@ -107,8 +100,7 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// Returns no proxies (simplified geometry for the search for narrow gaps): a mesh has many
-    /// faces, and its corners are in single precision.
+    /// A mesh has many faces, and its corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
         Vec::new()
     }
@@ -154,62 +146,32 @@ fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f6
     // Lower bound of the ratio of a length in the scene to the same length in mesh space.
     let columns = inverse.matrix3.to_cols_array();
     let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
-    let mut least = f64::INFINITY;
-    let mut stack = vec![(0u32, 0.0)];
-    while let Some((branch, bound)) = stack.pop() {
-        if bound >= least {
-            continue;
-        }
-        let branch = &mesh.boxes().nodes()[branch as usize];
-        let first = stack.len();
-        for i in branch.children() {
-            let corner =
-                |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.bounds[a + from][i])));
-            let away = (corner(0) - inside).max(inside - corner(3)).max(DVec3::ZERO).length();
-            let bound = away * shrinks;
-            if bound >= least {
-                continue;
-            }
-            if branch.child[i] & LEAF_FLAG == 0 {
-                stack.push((branch.child[i], bound));
-                continue;
-            }
-            let leaf = &mesh.leaves()[(branch.child[i] & !LEAF_FLAG) as usize];
-            for place in 0..leaf.corners[0][0].len() {
-                let corners = leaf.corners.map(|corner| {
-                    scene_from_mesh
-                        .transform_point3(DVec3::from(corner.map(|axis| f64::from(axis[place]))))
-                });
-                // Unused places of a leaf hold NaN, which `min` ignores.
-                least = least.min(triangle_distance(corners, point));
-            }
-        }
-        // The nearest box is last and popped first.
-        stack[first..].sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    }
-    least
+    let to_scene = |corner: DVec3| scene_from_mesh.transform_point3(corner);
+    mesh.least(
+        |bounds| box_distance(bounds, inside) * shrinks,
+        |corners| triangle_distance(corners.map(to_scene), point),
+    )
 }
 
 /// Mesh placed in the scene, compiled for ray intersection.
 struct MeshInstance<S> {
     mesh: Arc<Mesh>,
-    /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
+    /// Rays that miss this box are not transformed.
     extent: PrimitiveBox<S>,
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
     /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
-    /// space. Points are transformed relative to the centre. The rounding error of the linear map
-    /// is then in proportion to the distance between the point and the centre.
+    /// space. Points are transformed relative to it, so that the rounding error of the linear map
+    /// is in proportion to the distance from it.
     center: [S; 3],
     mesh_center: [S; 3],
     reach: S,
     smooth: bool,
 }
 
-/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive. A hit holds
-/// the id of the mesh and the id of the triangle.
+/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive.
 pub struct Meshes<S> {
-    primitives: Vec<MeshInstance<S>>,
+    meshes: Vec<MeshInstance<S>>,
 }
 
 /// Corners of one mesh triangle per lane, in the space of the mesh.
@@ -219,7 +181,8 @@ struct Triangle<L> {
 
 impl<S: Float> MeshInstance<S> {
     fn new(form: &Form) -> Option<Self> {
-        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = form else { return None };
+        let Form::Mesh(form) = form else { return None };
+        let MeshForm { mesh, scene_from_mesh, smooth } = form;
         let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
         let inverse = scene_from_mesh.matrix3.inverse();
@@ -229,8 +192,8 @@ impl<S: Float> MeshInstance<S> {
             .into_iter()
             .map(DVec3::length)
             .fold(0.0, f64::max);
-        // Rounding errors in mesh space are at most those of the largest corner coordinate. `inner`
-        // is this coordinate, converted to scene units.
+        // Rounding errors in mesh space are at most those of the largest corner coordinate, here
+        // in scene units.
         let inner = low.abs().max(high.abs()).max_element() * scale;
         let outer = form.max_coordinate();
         Some(Self {
@@ -250,8 +213,7 @@ impl<S: Float> MeshInstance<S> {
         x * v.x + y * v.y + z * v.z
     }
 
-    /// Transforms the normal `n` from mesh space to the scene by the transpose of
-    /// `mesh_from_scene`. The result is not normalised.
+    /// Transforms the normal `n` to the scene. The result is not normalised.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
@@ -263,8 +225,7 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Returns two values for each ray: the ray in mesh space, and the length in mesh space of a
-    /// step along the ray whose length in the scene is 1.
+    /// Returns the ray in mesh space, and the length there of a step of length 1 in the scene.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -273,55 +234,48 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
-    /// triangle with the id `triangle_tag`. Each lane has its own triangle.
+    /// Returns the values of a vertex attribute, `N` numbers each, at the three vertices of the
+    /// triangle `triangle_tag`. Each lane has its own triangle.
     #[inline(always)]
-    fn vertices<L: SimdFloat<Scalar = S>>(
+    fn attribute<const N: usize, L: SimdFloat<Scalar = S>>(
         &self,
         triangle_tag: L,
-        attributes: &[[f32; 3]],
-    ) -> [Vec3<L>; 3] {
-        let triangles = &self.mesh.mesh().triangles;
-        // Indices: vertex, axis, lane. Each triangle and each vertex is read once.
-        let mut values = [[[S::default(); MAX_WIDTH]; 3]; 3];
+        of_vertices: &[[f32; N]],
+    ) -> [[L; N]; 3] {
+        // Indices: vertex, component, lane. Each triangle and each vertex is read once.
+        let mut values = [[[S::default(); MAX_WIDTH]; N]; 3];
         for lane in 0..L::WIDTH {
-            // Lanes that hit another primitive may hold any triangle id. It is clamped to a valid
-            // index.
-            let triangle =
-                triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)];
-            for (vertex, values) in triangle.into_iter().zip(&mut values) {
-                for (x, values) in attributes[vertex as usize].into_iter().zip(values) {
+            for (vertex, values) in self.vertices(triangle_tag, lane).into_iter().zip(&mut values) {
+                for (x, values) in of_vertices[vertex as usize].into_iter().zip(values) {
                     values[lane] = S::from_f64(f64::from(x));
                 }
             }
         }
+        let vector = |values: &[S; MAX_WIDTH]| L::from_fn(|i| values[i]);
         let [a, b, c] = &values;
-        [a, b, c].map(|[x, y, z]| {
-            Vec3::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
-        })
+        [a, b, c].map(|components| components.each_ref().map(vector))
     }
 
-    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
-    /// triangle with the id `triangle_tag`. A value is a pair of numbers. Each lane has its own
-    /// triangle.
+    /// Returns the vertices of the triangle in one lane. Lanes that hit another primitive may hold
+    /// any triangle id; it is clamped to a valid one.
     #[inline(always)]
-    fn pairs<L: SimdFloat<Scalar = S>>(
+    fn vertices<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L, lane: usize) -> [u32; 3] {
+        let triangles = &self.mesh.mesh().triangles;
+        triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)]
+    }
+
+    #[inline(always)]
+    fn vectors<L: SimdFloat<Scalar = S>>(
         &self,
         triangle_tag: L,
-        attributes: &[[f32; 2]],
-    ) -> [[L; 2]; 3] {
-        let triangles = &self.mesh.mesh().triangles;
-        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
-        let component = |vertex: usize, k: usize| {
-            let pair = |lane| attributes[triangles[number(lane)][vertex] as usize][k];
-            L::from_fn(|lane| S::from_f64(f64::from(pair(lane))))
-        };
-        array_from_fn(|vertex| [component(vertex, 0), component(vertex, 1)])
+        of_vertices: &[[f32; 3]],
+    ) -> [Vec3<L>; 3] {
+        self.attribute(triangle_tag, of_vertices).map(|[x, y, z]| Vec3::new(x, y, z))
     }
 
     #[inline(always)]
     fn triangle<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L) -> Triangle<L> {
-        Triangle { corners: self.vertices(triangle_tag, &self.mesh.mesh().positions) }
+        Triangle { corners: self.vectors(triangle_tag, &self.mesh.mesh().positions) }
     }
 }
 
@@ -333,8 +287,7 @@ impl<L: SimdFloat> Triangle<L> {
         (b - a).cross(c - a)
     }
 
-    /// Returns two gradients in the plane of the triangle: those of the barycentric weights of the
-    /// second and of the third corner.
+    /// Returns the gradients of the barycentric weights of the second and of the third corner.
     #[inline(always)]
     fn gradients(&self) -> [Vec3<L>; 2] {
         let [a, b, c] = self.corners;
@@ -344,8 +297,7 @@ impl<L: SimdFloat> Triangle<L> {
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
-    /// Returns approximate barycentric weights of the triangle's point closest to `p`. None is
-    /// negative, and their sum is 1.
+    /// Returns approximate barycentric weights, at least 0, of the triangle's point closest to `p`.
     #[inline(always)]
     fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
@@ -358,9 +310,9 @@ impl<L: SimdFloat> Triangle<L> {
 }
 
 impl<S: Float> Meshes<S> {
-    /// Compiles the meshes among the canonical forms `forms`, in order.
+    /// Compiles the meshes among `forms`.
     pub fn new(forms: &[Form]) -> Self {
-        Self { primitives: forms.iter().filter_map(MeshInstance::new).collect() }
+        Self { meshes: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
     /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
@@ -373,18 +325,18 @@ impl<S: Float> Meshes<S> {
         ray: &Ray<L>,
         hit: &mut Hit<L>,
     ) {
-        for (tag, primitive) in (base + range.start as u32..).zip(&self.primitives[range]) {
-            let near = primitive.extent.meets(ray, hit.t);
+        for (tag, instance) in (base + range.start as u32..).zip(&self.meshes[range]) {
+            let near = instance.extent.meets(ray, hit.t);
             if near.none() {
                 continue;
             }
-            let (inner, length) = primitive.ray(ray);
+            let (inner, length) = instance.ray(ray);
             // The distance limit in mesh space is enlarged by the rounding error of the transform.
-            // Whether a hit is closer than earlier hits is decided below by distances in the scene.
-            // The result therefore does not depend on the order of the primitives.
+            // Whether a hit is closer than earlier hits is decided below by distances in the scene,
+            // so that the result does not depend on the order of the primitives.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
-            let found = intersection::closest(&primitive.mesh, &inner, limit);
+            let found = intersection::closest(&instance.mesh, &inner, limit);
             let hit_mask = found.t.lt(limit);
             let before = hit.t;
             hit.keep_closer(hit_mask, found.t / length, tag);
@@ -403,88 +355,82 @@ impl<S: Float> Meshes<S> {
         wanted: L::Mask,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for primitive in &self.primitives[range] {
+        for instance in &self.meshes[range] {
             let open = wanted.and_not(occluded);
             if open.none() {
                 break;
             }
-            let open = open & primitive.extent.meets(ray, limit);
+            let open = open & instance.extent.meets(ray, limit);
             if open.none() {
                 continue;
             }
-            let (inner, length) = primitive.ray(ray);
+            let (inner, length) = instance.ray(ray);
             let limit = L::select(open, limit * length, L::from_f64(-1.0));
-            occluded = occluded | intersection::occluded(&primitive.mesh, &inner, limit);
+            occluded = occluded | intersection::occluded(&instance.mesh, &inner, limit);
         }
         occluded
     }
 
-    /// Returns the projection of `point` onto the plane of the hit triangle of `primitive`, with
-    /// the normal of the triangle. `point` is the computed hit point of a ray, with rounding
-    /// errors. `triangle_tag` is the id of the triangle.
+    /// Returns the projection of `point` onto the plane of the triangle `triangle_tag`, with the
+    /// normal there.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
-        primitive: usize,
+        number: usize,
         triangle_tag: L,
         point: Vec3<L>,
     ) -> SurfacePoint<L> {
-        let primitive = &self.primitives[primitive];
-        let triangle = primitive.triangle(triangle_tag);
+        let instance = &self.meshes[number];
+        let triangle = instance.triangle(triangle_tag);
         // The normal is divided by its largest component. Otherwise the square of its length would
         // overflow for large triangles and underflow for small ones.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
         let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
-        let height = flat.dot(primitive.point(point) - triangle.corners[0]);
-        let normal = primitive.normal(flat);
+        let height = flat.dot(instance.point(point) - triangle.corners[0]);
+        let normal = instance.normal(flat);
         let inverse = L::one() / normal.length_squared().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
-        SurfacePoint { point, normal, max_coordinate: L::splat(primitive.reach) }
+        SurfacePoint { point, normal, max_coordinate: L::splat(instance.reach) }
     }
 
-    /// Returns the shading normal of `primitive` at the hit point `point` on the triangle with the
-    /// id `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
-    /// direction of the rays.
-    ///
-    /// The shading normal is on the viewer's side. A normal that would turn away from the viewer is
-    /// bent towards the viewer.
+    /// See [`Aggregate::shading_normal`](crate::primitive::Aggregate::shading_normal).
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
-        primitive: usize,
+        number: usize,
         triangle_tag: L,
         (point, normal): (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
-        let primitive = &self.primitives[primitive];
-        if !primitive.smooth {
+        let instance = &self.meshes[number];
+        if !instance.smooth {
             return normal;
         }
-        let weights = primitive.triangle(triangle_tag).weights(primitive.point(point));
-        let [a, b, c] = primitive.vertices(triangle_tag, primitive.mesh.smooth_normals());
-        let smooth = primitive.normal(a * weights[0] + b * weights[1] + c * weights[2]);
+        let weights = instance.triangle(triangle_tag).weights(instance.point(point));
+        let [a, b, c] = instance.vectors(triangle_tag, instance.mesh.smooth_normals());
+        let smooth = instance.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
         // replaces it by `normal`.
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates of `primitive` at `point` in the triangle with the id
-    /// `triangle_tag`; `None` if the mesh file has none.
+    /// Returns the texture coordinates at `point` in the triangle `triangle_tag`; `None` if the mesh
+    /// file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
-        primitive: usize,
+        number: usize,
         triangle_tag: L,
         point: Vec3<L>,
     ) -> Option<UvGradients<L>> {
-        let primitive = &self.primitives[primitive];
-        let triangle = primitive.triangle(triangle_tag);
-        let corners = primitive.pairs(triangle_tag, primitive.mesh.mesh().uvs.as_deref()?);
-        let weights = triangle.weights(primitive.point(point));
+        let instance = &self.meshes[number];
+        let triangle = instance.triangle(triangle_tag);
+        let corners = instance.attribute(triangle_tag, instance.mesh.mesh().uvs.as_deref()?);
+        let weights = triangle.weights(instance.point(point));
         let gradient = triangle.gradients();
         let along = |k: usize| {
             let [a, b, c] = corners.map(|pair| pair[k]);
@@ -495,15 +441,14 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the colour of the triangle with the id `triangle_tag` of `primitive`; `None` if the
-    /// mesh file has no colours.
+    /// Returns the colour of the triangle `triangle_tag`; `None` if the mesh file has no colours.
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(
         &self,
-        primitive: usize,
+        number: usize,
         triangle_tag: L,
     ) -> Option<Vec3<L>> {
-        let mesh = self.primitives[primitive].mesh.mesh();
+        let mesh = self.meshes[number].mesh.mesh();
         mesh.color(0)?;
         let number = |lane| (triangle_tag.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
@@ -514,12 +459,12 @@ impl<S: Float> Meshes<S> {
 
     /// Returns `true` if some mesh has interpolated normals.
     pub fn is_smooth(&self) -> bool {
-        self.primitives.iter().any(|primitive| primitive.smooth)
+        self.meshes.iter().any(|instance| instance.smooth)
     }
 
     /// Returns `true` if some mesh has vertex or face colours.
     pub fn is_colored(&self) -> bool {
-        self.primitives.iter().any(|primitive| primitive.mesh.mesh().color(0).is_some())
+        self.meshes.iter().any(|instance| instance.mesh.mesh().color(0).is_some())
     }
 }
 

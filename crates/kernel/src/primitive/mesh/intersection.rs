@@ -14,22 +14,17 @@ use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 use crate::primitive::mesh::{Mesh, TriangleBlock};
 
-/// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
-/// whole. The rays of other packets traverse it separately.
-///
-/// Every active ray of a packet is compared with the first active ray. The packet is coherent if
-/// two numbers are at most a bound in every comparison. The first is the length of the difference
-/// of the unit directions. The second is the largest coordinate of the difference of the origins,
-/// divided by the size of the mesh. The bound is this constant times the number of lanes, divided
-/// by the square root of the number of triangles.
+/// Coherence limit, for [`Ray::is_coherent`]: bound of the differences of directions, and of those
+/// of origins divided by the size of the mesh. It is divided by the square root of the number of
+/// triangles.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four rays, these limits are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Upper limit of the bound that follows from [`COHERENCE_LIMIT`], divided by the number of lanes.
-/// It takes effect for meshes of fewer than about 3900 triangles.
+/// Upper limit of the bound that follows from [`COHERENCE_LIMIT`]. It takes effect for meshes of
+/// fewer than about 3900 triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest hit of each ray with the triangles of a mesh.
@@ -200,8 +195,11 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     #[inline(always)]
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let packet = slab_packet(ray, self.mesh);
-        let wanted = limit.gt(L::zero()).bits();
-        if is_coherent(ray, wanted, self.mesh) {
+        let [low, high] = self.mesh.mesh().bounds;
+        let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
+        let turn = COHERENCE_LIMIT / (self.mesh.mesh().triangles.len() as f64).sqrt();
+        let turn = turn.min(MAX_COHERENT_SPREAD);
+        if ray.is_coherent(limit.gt(L::zero()).bits(), turn, turn * size) {
             return self.traverse_as_packet((ray, &packet), limit);
         }
         self.traverse_separately((ray, &packet), limit)
@@ -215,7 +213,6 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         limit: L,
     ) -> TriangleHit<L> {
         let rays = ShearedRay::new(ray).each();
-        let wanted = limit.gt(L::zero()).bits();
         let mut found = [(L::Scalar::default(), 0u32); MAX_WIDTH];
         for (lane, found) in found.iter_mut().enumerate().take(L::WIDTH) {
             *found = (limit.lane(lane), 0);
@@ -245,7 +242,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         };
         let boxes = self.mesh.boxes();
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            traverse_rays(boxes, (packet, limit), wanted, stack, soon, leaf)
+            traverse_rays(boxes, (packet, limit), stack, soon, leaf)
         });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };
@@ -257,21 +254,6 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         }
         TriangleHit { t, triangle }
     }
-}
-
-/// Returns `true` if the rays in the bit mask `wanted` traverse the mesh's BVH as a packet, because
-/// they are coherent (see [`COHERENCE_LIMIT`]).
-#[inline(always)]
-fn is_coherent<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
-    if L::WIDTH == 1 || wanted.count_ones() < 2 {
-        return false;
-    }
-    let [low, high] = mesh.mesh().bounds;
-    let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
-    let turn =
-        (COHERENCE_LIMIT / (mesh.mesh().triangles.len() as f64).sqrt()).min(MAX_COHERENT_SPREAD);
-    let turn = turn * L::WIDTH as f64;
-    ray.is_coherent(wanted, turn, turn * size)
 }
 
 /// Returns the closest triangle of the mesh that each ray hits within the distance `limit`. Of

@@ -42,9 +42,7 @@ pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
 use crate::film::store::Header;
-use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
 use std::collections::BTreeMap;
-use zerkalo_scene::disk::WriteError;
 
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
@@ -85,26 +83,5 @@ impl FilmFileHeader {
     /// Returns the name of the scene file that was rendered. Returns `None` if the metadata lack it.
     pub fn source(&self) -> Option<&str> {
         self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
-    }
-
-    /// Writes the picture of `film` to `output`. `self` must be the header of `film`. `depth` is
-    /// the number of bits per channel of a PNG.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be written.
-    pub fn write_picture(
-        &self,
-        film: &Film,
-        depth: Depth,
-        output: &ImageOutput,
-    ) -> Result<(), WriteError> {
-        let picture = ImageData {
-            size: [film.width(), film.height()].map(|n| n as u32),
-            mix: &self.weights,
-            group_names: &self.group_names,
-            display: self.display,
-            depth,
-        };
-        output.write(&picture, &mut WholeFilm { film, metadata: &self.metadata })
     }
 }

@@ -1,7 +1,7 @@
 //! Unit tests of film files.
 
 use super::*;
-use crate::film::test_film::TestFilm;
+use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, film, white};
 use crate::film::{Film, InvalidSample, TILE};
 use std::io::Cursor;

@@ -13,7 +13,7 @@ use crate::wave::JobReport;
 /// Value of [`TileNoise::squares`] in all simulated estimates: the sum of e^2 over the pixels of a
 /// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
 /// over very many pixels.
-const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
+const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 /// Light period of the simulated pictures, in samples per replicate (half of the samples). From
 /// this count on, the tiles in [`Model::periodic`] have no error.
 const PERIOD: f64 = 16.0;
@@ -90,7 +90,7 @@ impl Model {
     fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
-        let mse = |codes: f64| Mse { codes, linear: codes * 1e-6 };
+        let mse = |levels: f64| Mse { levels, linear: levels * 1e-6 };
         let [mut allocation, mut reported] = [0, 1].map(|half| {
             if a.is_empty() {
                 return mse(self.true_mse(tile));
@@ -100,7 +100,7 @@ impl Model {
             mse(squares / 2.0 / a.len() as f64)
         });
         if self.hidden.contains(&tile) {
-            (allocation, reported) = (mse(0.0), mse(2.0 * reported.codes));
+            (allocation, reported) = (mse(0.0), mse(2.0 * reported.levels));
         }
         let samples = self.counts[0][tile];
         TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS, samples }
@@ -175,11 +175,11 @@ impl Model {
 }
 
 fn until(stop: Stop, adaptive: bool) -> Settings {
-    Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
+    Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
 }
 
-fn noise(codes: f64) -> Stop {
-    Stop { noise_codes: Some(codes), ..Stop::default() }
+fn noise(levels: f64) -> Stop {
+    Stop { noise_levels: Some(levels), ..Stop::default() }
 }
 
 fn spp(spp: u32) -> Stop {

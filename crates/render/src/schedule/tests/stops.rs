@@ -47,7 +47,7 @@ fn caps_hold_for_glossy_tiles_only() {
         assert!(schedule.tiles.iter().all(|t| !t.glossy || t.done == 20));
         assert!(schedule.tiles.iter().any(|t| !t.glossy && t.done > 200));
         assert!(
-            schedule.noise().unwrap().rmse_codes > 1.0,
+            schedule.noise().unwrap().rmse_levels > 1.0,
             "the noise is that of the whole picture"
         );
 
@@ -92,7 +92,7 @@ fn time_is_overshot_by_little() {
 
 #[test]
 fn first_reached_criterion_ends_the_work() {
-    let stop = Stop { spp: Some(64), noise_codes: Some(1e-3), ..Stop::default() };
+    let stop = Stop { spp: Some(64), noise_levels: Some(1e-3), ..Stop::default() };
     assert_eq!(model_of(NOISY).finish(until(stop, true)).1, StoppedBy::Spp);
     let stop = Stop { spp: Some(1 << 20), rmse_linear: Some(1e-3), ..Stop::default() };
     assert_eq!(model_of(NOISY).finish(until(stop, true)).1, StoppedBy::Rmse);
@@ -181,5 +181,5 @@ fn p95_is_the_percentile_of_tiles() {
     let (schedule, _) = model.finish(until(spp(32), false));
     // The 95th of 100 tiles by error is tile 94, with sigma 94. Both replicates have 16 samples, so
     // that the RMSE of their mean is 94 / sqrt(32).
-    assert!((schedule.noise().unwrap().p95_codes - 94.0 / 32f64.sqrt()).abs() < 1e-9);
+    assert!((schedule.noise().unwrap().p95_levels - 94.0 / 32f64.sqrt()).abs() < 1e-9);
 }

@@ -1,13 +1,14 @@
-//! Compound solids (CSG): their parts, and the tree of set operations that combines them.
+//! Canonical form of compounds: their parts, and the tree of set operations that combines them.
 
 use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
-use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::csg::solid::Solid;
+use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
 
 /// Tree of set operations on the parts of a compound.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
-    /// One part of the solid (a single primitive), as its index in [`CsgSolid::parts`].
+    /// Part, as its index in [`CsgSolid::parts`].
     Part(usize),
     /// Union: points in any of the operands.
     Union(Vec<CsgTree>),
@@ -20,7 +21,7 @@ pub enum CsgTree {
 impl CsgTree {
     /// Returns the tree with all part indices increased by `by`, for use as an operand of a larger
     /// compound.
-    pub(crate) fn shifted(self, by: usize) -> Self {
+    pub fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
             Self::Part(i) => Self::Part(i + by),
@@ -34,29 +35,19 @@ impl CsgTree {
 /// Compound solid: several solids combined by set operations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Solids that are combined. Valid kinds are `Sphere`, `Ellipsoid`, `ConvexPolyhedron`,
-    /// `ConicalFrustum`, `Torus`, and `Plane`, which means the half-space behind it.
-    pub parts: Vec<Form>,
+    /// Solids that are combined; each can have a material of its own.
+    pub parts: Vec<Solid>,
     /// Tree of set operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
 }
 
 impl CanonicalShape for CsgSolid {
-    fn transformed(self, map: &DAffine3) -> Form {
-        let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
-        Self { parts, tree: self.tree }.into()
-    }
-
     fn parts(&self) -> usize {
         self.parts.len()
     }
 
     fn bounds(&self) -> Option<Bounds> {
         self.bounds_of(&self.tree)
-    }
-
-    fn is_convex(&self) -> bool {
-        false
     }
 
     fn thickness(&self) -> f64 {
@@ -71,22 +62,27 @@ impl CanonicalShape for CsgSolid {
         self.parts.iter().flat_map(|part| part.normals_at(point, slack)).collect()
     }
 
-    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
-        cast_compiled(self.clone().into(), origin, direction)
-    }
-
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Box
     }
 
-    /// Returns the proxies of all parts: simplified geometry with which narrow gaps between objects
-    /// are found.
     fn proxies(&self) -> Vec<Proxy> {
         self.parts.iter().flat_map(|form| form.proxies()).collect()
     }
 }
 
 impl CsgSolid {
+    /// Combines `parts` by `tree`; `None` if a part is not a solid.
+    pub fn new(parts: impl IntoIterator<Item = Form>, tree: CsgTree) -> Option<Self> {
+        let parts = parts.into_iter().map(Form::into_solid).collect::<Option<_>>()?;
+        Some(Self { parts, tree })
+    }
+
+    /// Returns the image of the solid under the invertible affine map `map`.
+    pub fn transformed(self, map: &DAffine3) -> Self {
+        Self { parts: self.parts.into_iter().map(|p| p.transformed(map)).collect(), ..self }
+    }
+
     /// Returns `true` if the bounding boxes of the parts show that the solid has no points, for
     /// example an intersection of solids that are apart.
     pub fn is_empty(&self) -> bool {

@@ -1,8 +1,8 @@
 //! Metadata of picture files and film files: reading, and padding of values with spaces. The
 //! padding reserves place for a value that becomes known only at the end of a render.
 
-use crate::film::exr_read::read_exr_meta;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
+use crate::image_file::exr_reader::read_exr_meta;
 use exr::meta::attribute::AttributeValue;
 use png::Decoder;
 use std::io::BufReader;

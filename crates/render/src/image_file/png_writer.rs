@@ -1,10 +1,10 @@
 //! PNG writer: displayed pictures in 8 or 16 bits per channel, sRGB, with text metadata.
 
-use crate::film::bands::Bands;
-use crate::film::display::quantised_16;
-use crate::film::image_data::{Depth, ImageData, WriteSeek, replace_start};
-use crate::film::light_weights::Replicates;
-use crate::film::metadata::padded;
+use crate::film::Replicates;
+use crate::film::quantised_16;
+use crate::image_file::bands::Bands;
+use crate::image_file::image_data::{Depth, ImageData, WriteSeek, replace_start};
+use crate::image_file::metadata::padded;
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent, Writer,
@@ -131,7 +131,7 @@ fn encode_row(
         }
         Depth::Sixteen => bytes.extend(
             row.iter()
-                .flat_map(|rgb| picture.display.codes(*rgb))
+                .flat_map(|rgb| picture.display.levels(*rgb))
                 .flat_map(|value| quantised_16(value).to_be_bytes()),
         ),
     }

@@ -25,18 +25,18 @@ pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
         return Err(format!("it has {count} pixels; expected at most {MAX_PIXELS}"));
     }
     let bytes = reader.output_buffer_size().ok_or("it is too large")?;
-    let mut codes = vec![0; bytes];
-    reader.next_frame(&mut codes).map_err(|error| error.to_string())?;
+    let mut levels = vec![0; bytes];
+    reader.next_frame(&mut levels).map_err(|error| error.to_string())?;
     let pixels = match reader.output_color_type().0 {
-        ColorType::Rgb => codes.as_chunks::<3>().0.to_vec(),
+        ColorType::Rgb => levels.as_chunks::<3>().0.to_vec(),
         ColorType::Rgba => {
-            codes.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()
+            levels.as_chunks::<4>().0.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect()
         }
         ColorType::GrayscaleAlpha => {
-            codes.as_chunks::<2>().0.iter().map(|[y, _]| [*y; 3]).collect()
+            levels.as_chunks::<2>().0.iter().map(|[y, _]| [*y; 3]).collect()
         }
         // Indexed colours do not occur here, because the decoder expands palettes.
-        ColorType::Grayscale | ColorType::Indexed => codes.iter().map(|y| [*y; 3]).collect(),
+        ColorType::Grayscale | ColorType::Indexed => levels.iter().map(|y| [*y; 3]).collect(),
     };
     Ok(([width as usize, height as usize], pixels))
 }
@@ -44,16 +44,16 @@ pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::png_of_rgb;
+    use crate::image_file::png_of_rgb;
 
     #[test]
     fn written_png_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        let codes: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * 37 % 256) as u8).collect();
-        std::fs::write(&path, png_of_rgb([5, 3], &codes).unwrap()).unwrap();
+        let levels: Vec<u8> = (0..5 * 3 * 3).map(|i| (i * 37 % 256) as u8).collect();
+        std::fs::write(&path, png_of_rgb([5, 3], &levels).unwrap()).unwrap();
         let (size, pixels) = read_png(&path).unwrap();
-        assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
+        assert_eq!((size, pixels.as_flattened()), ([5, 3], &levels[..]));
         // A truncated file gives an error, or the complete picture if fewer than 16 bytes are
         // missing. The last 16 bytes are the checksum of the image data and the empty last chunk.
         let whole = std::fs::read(&path).unwrap();

@@ -10,11 +10,11 @@
 //! is written as soon as it is complete. The header is written again at the end if metadata have
 //! changed.
 
-use crate::film::bands::Bands;
-use crate::film::exr_header::Ordered;
-use crate::film::image_data::{ImageData, WriteSeek, replace_start};
-use crate::film::light_weights::{Replicates, Sums};
-use crate::film::metadata::padded;
+use crate::film::{Replicates, Sums};
+use crate::image_file::bands::Bands;
+use crate::image_file::exr_header::Ordered;
+use crate::image_file::image_data::{ImageData, WriteSeek, replace_start};
+use crate::image_file::metadata::padded;
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;
@@ -246,8 +246,9 @@ fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Display;
     use crate::film::testing::{fill, film, white};
-    use crate::film::{Depth, Display, ImageOutput, WholeFilm, read_exr};
+    use crate::image_file::{Depth, ImageOutput, WholeFilm, read_exr};
     use exr::meta::MetaData;
 
     #[test]

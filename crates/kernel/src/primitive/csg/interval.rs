@@ -1,24 +1,24 @@
-//! Intervals in which a line is inside of the parts of a compound solid (CSG): their sorted ends,
-//! and the transitions of the line between inside and outside.
+//! Intervals in which a line is inside the parts of a compound: their sorted ends, and the
+//! transitions of the line between inside and outside.
 
 use crate::lanes::SimdFloat;
-use crate::primitive::solid::Span;
+use crate::primitive::csg::solid::Span;
 
-/// Lower limit of the cosine of the angle between a line and a surface normal; smaller cosines
-/// count as this value. The tolerance of coincident faces is divided by the cosine. The limit keeps
-/// the tolerance finite for lines parallel to the surface.
+/// Lower limit of the cosine by which the tolerance of coincident faces is divided. It keeps the
+/// tolerance finite for lines parallel to the surface.
 const FLATTEST: f64 = 1e-9;
 
-/// End of an interval in which a line is inside of a solid. `t` is the distance of this end along
-/// the line. Two ends are taken as coincident if the distance between them is at most the smaller
-/// one of their two tolerances `tie`.
+/// End of an interval in which a line is inside a solid.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
+    /// Distance along the line.
     pub t: L,
+    /// Tolerance. Two ends coincide if the distance between them is at most the smaller one of
+    /// their tolerances.
     pub tie: L,
 }
 
-/// Interval of distances in which a line is inside of a part of a compound.
+/// Interval of distances in which a line is inside a part of a compound.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -32,15 +32,17 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Transition of the line of each lane through a surface. `before` and `after` are the lanes in
-/// which the line is inside of a solid before and after the surface. The solid is the compound, or
-/// an operand of its set operations. `tag` is the id of the part to which the surface belongs.
+/// Transition of the line of each lane through the surface of a compound, or of an operand of its
+/// set operations.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
+    /// Lanes in which the line is inside the solid before the surface.
     pub before: L::Mask,
+    /// Lanes in which the line is inside the solid after the surface.
     pub after: L::Mask,
     /// Distance along the line to the surface; undefined in lanes without a transition.
     pub t: L,
+    /// Id of the part to which the surface belongs.
     pub tag: L,
 }
 
@@ -49,11 +51,9 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines `self` and `other`, the transitions of two operands, into the transition of the
-    /// result of a set operation. `before` and `after` are the lanes in which the line is inside of
-    /// the result before and after the surface. In a lane in which `self` changes sides and ends on
-    /// the same side as the result, the surface is that of `self`. In other lanes it is that of
-    /// `other`.
+    /// Combines the transitions of two operands into that of the result, with the given `before`
+    /// and `after`. In a lane in which `self` changes sides and ends on the same side as the
+    /// result, the surface is that of `self`, in other lanes that of `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -92,9 +92,8 @@ pub fn with_scratch<const FEW: usize, T: Copy, R>(
     })
 }
 
-/// Returns the start and the end of the interval `span`. `tie` is the tolerance of coincident faces
-/// for a line perpendicular to the face. In lanes whose line misses the solid, start and end both
-/// have the largest finite distance, `L::MAX`.
+/// Returns the start and the end of `span`; both are `L::MAX` in lanes whose line misses the solid.
+/// `tie` is the tolerance for a line perpendicular to the face.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);

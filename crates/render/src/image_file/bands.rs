@@ -1,6 +1,6 @@
 //! Source of the samples of a picture file: one film, or one film for each band of rows.
 
-use crate::film::store::Film;
+use crate::film::Film;
 use std::io;
 
 /// Source of a picture's samples. A picture that does not fit into memory is rendered in bands of

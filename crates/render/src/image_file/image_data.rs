@@ -1,11 +1,11 @@
 //! Input of the picture encoders (PNG and OpenEXR) except for the samples.
 
-use crate::film::display::Display;
-use crate::film::light_weights::LightWeights;
+use crate::film::Display;
+use crate::film::LightWeights;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Size and settings of a picture file without its samples, which come from
-/// [`Bands`](crate::film::Bands).
+/// [`Bands`](crate::image_file::Bands).
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
     /// Width and height of the image in pixels.

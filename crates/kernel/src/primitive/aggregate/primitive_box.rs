@@ -4,7 +4,7 @@
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::form::Form;
+use crate::primitive::canonical::{Bounds, CanonicalShape};
 use glam::DVec3;
 
 /// Bounding box of one primitive.
@@ -20,33 +20,31 @@ pub struct PrimitiveBox<S> {
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// Sum of the magnitudes of the entries of each row of `rows`, one sum for each axis of object
-    /// space. It is the largest factor by which the map to object space enlarges a rounding error
-    /// on that axis.
+    /// Sum of the magnitudes of each row: the largest factor by which the map to object space
+    /// enlarges a rounding error on that axis.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
-/// Returns the lowest and the highest corner of a bounding box, moved outward by a margin. The
-/// margin is 4 times the largest coordinate times `epsilon`, the relative rounding error. It bounds
-/// the rounding errors of the box and of the primitive's own intersection test.
-pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
+/// Returns the corners of a bounding box, moved outward by 4 times the largest coordinate times
+/// `epsilon`, the relative rounding error. The margin covers the rounding errors of the box and of
+/// the primitive's own intersection test.
+pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
     [low - pad, high + pad]
 }
 
-/// Assumed largest distance between a side of a solid's bounding box and the part of the solid that
-/// touches this side, as a fraction of the box's largest coordinate. Double precision rounds the
-/// box and the solid differently; far from the origin of the scene file, the distance is therefore
-/// not 0.
+/// Largest distance between a side of a solid's bounding box and the solid, as a fraction of the
+/// largest coordinate. It is not 0 far from the origin of the scene file, because box and solid are
+/// rounded differently in double precision.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> PrimitiveBox<S> {
-    /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
-    /// object space, the box is in that space. Returns `None` for a form without finite bounds.
-    pub fn new(form: &Form, oriented: bool) -> Option<Self> {
+    /// Returns the bounding box of a canonical form; `None` without finite bounds. If `oriented` is
+    /// `true` and the form has an object space, the box is in that space.
+    pub fn new(form: &dyn CanonicalShape, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let made = |bounds, space| {
@@ -78,9 +76,8 @@ impl<S: Float> PrimitiveBox<S> {
                 SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
-                // Bound of the ray's rounding error at the distance of the primitive, in scene
-                // units. It covers the errors of the ray's origin, of its direction and of the
-                // box's centre.
+                // Bound of the rounding errors of the ray's origin, of its direction and of the
+                // box's centre, in scene units.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
                 let transform =

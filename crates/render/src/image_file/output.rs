@@ -1,9 +1,11 @@
 //! Output of picture files: choice of the format by the file's extension, and replacement of
 //! existing files.
 
-use crate::film::bands::Bands;
-use crate::film::image_data::{ImageData, WriteSeek};
-use crate::film::{exr, png};
+use crate::film::Film;
+use crate::film::file::FilmFileHeader;
+use crate::image_file::bands::{Bands, WholeFilm};
+use crate::image_file::image_data::{Depth, ImageData, WriteSeek};
+use crate::image_file::{exr_writer, png_writer};
 use std::ffi::OsStr;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -17,8 +19,8 @@ struct Format {
 
 /// Formats of the picture files that can be written.
 static FORMATS: [Format; 2] = [
-    Format { extension: "png", encode: png::encode },
-    Format { extension: "exr", encode: exr::encode },
+    Format { extension: "png", encode: png_writer::encode },
+    Format { extension: "exr", encode: exr_writer::encode },
 ];
 
 /// Picture file to be written: a path with the extension of a known format.
@@ -94,13 +96,35 @@ impl ImageOutput {
             out.flush()
         })
     }
+
+    /// Writes the picture of `film`, whose header is `header`. `depth` is the number of bits per
+    /// channel of a PNG.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written.
+    pub fn write_film(
+        &self,
+        header: &FilmFileHeader,
+        film: &Film,
+        depth: Depth,
+    ) -> Result<(), WriteError> {
+        let picture = ImageData {
+            size: [film.width(), film.height()].map(|n| n as u32),
+            mix: &header.weights,
+            group_names: &header.group_names,
+            display: header.display,
+            depth,
+        };
+        self.write(&picture, &mut WholeFilm { film, metadata: &header.metadata })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::testing::{fill, film, white};
-    use crate::film::{Depth, Display, FileMetadata, Film, LightWeights, WholeFilm};
+    use crate::film::{Display, LightWeights};
+    use crate::image_file::FileMetadata;
     use std::fs;
 
     #[test]

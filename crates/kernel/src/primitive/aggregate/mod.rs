@@ -1,0 +1,474 @@
+//! Aggregate: all primitives of a scene, compiled for rays: an array for each kind of primitive,
+//! and, if there are many, a BVH.
+
+mod batch;
+pub mod primitive_box;
+mod scene_bvh;
+
+pub use batch::PrimitiveId;
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::primitive::aggregate::batch::{LabelledBatch, PrimitiveBatch, compile};
+use crate::primitive::aggregate::primitive_box::PrimitiveBox;
+use crate::primitive::aggregate::scene_bvh::SceneBvh;
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::form::Form;
+use crate::primitive::mesh::instance::Meshes;
+use std::fmt;
+use std::ops::Range;
+
+/// Smallest number of primitives with finite bounds for which a BVH is built. For fewer primitives,
+/// a short list for each tile of the picture is faster.
+///
+/// Measured with spheres that fill a ball (`benches/acceleration.rs`): whole pictures with up to 95
+/// primitives render faster without a BVH. If rays are tested against all primitives instead of the
+/// list of a tile, the BVH is faster from about 50 primitives on for coherent packets, and from
+/// about 300 on for incoherent ones.
+pub const BVH_MIN_PRIMITIVES: usize = 96;
+
+/// Structure that an [`Aggregate`] uses to test rays against fewer primitives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AccelerationStructure {
+    /// No structure: primitives are tested one by one. The string is the name of such a list in the
+    /// inventory of the scene.
+    List(&'static str),
+    /// Bounding box of each primitive.
+    Boxes {
+        /// `true`: the boxes are in the object space of their primitives. `false`: the boxes are
+        /// axis-aligned in the scene.
+        oriented: bool,
+    },
+    /// BVH over all primitives with finite bounds.
+    Bvh,
+}
+
+impl AccelerationStructure {
+    /// Returns the faster structure by measurement, a BVH or a list: see [`BVH_MIN_PRIMITIVES`].
+    pub fn fastest(forms: &[Form]) -> Self {
+        let bounded = forms.iter().filter(|form| form.bounds().is_some()).count();
+        if bounded >= BVH_MIN_PRIMITIVES { Self::Bvh } else { Self::List("list") }
+    }
+}
+
+/// Batch of an aggregate. The numbers of its primitives in the aggregate are from `base` up to, but
+/// not including, `end`.
+struct BatchRange<L: SimdFloat> {
+    batch: PrimitiveBatch<L>,
+    base: u32,
+    end: u32,
+}
+
+/// All primitives of a scene, numbered, compiled for one SIMD type.
+pub struct Aggregate<L: SimdFloat> {
+    batches: Vec<BatchRange<L>>,
+    all: PrimitiveSet,
+    bvh: Option<SceneBvh>,
+    /// Primitives in the BVH, each as the index of its batch and its number in the batch.
+    in_bvh: Vec<(u32, u32)>,
+    /// Bounding box of each primitive; `None` for an infinite primitive. Empty if no boxes are
+    /// used.
+    boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
+    sources: Vec<PrimitiveId>,
+    counts: Vec<String>,
+}
+
+/// Subset of the primitives of an [`Aggregate`], to which ray queries are restricted.
+#[derive(Clone, Debug, Default)]
+pub struct PrimitiveSet {
+    /// Primitives that are tested one by one: the index of a batch, and a range of primitive
+    /// numbers in this batch.
+    ranges: Vec<(u32, Range<u32>)>,
+    /// `true` if the subset also includes all primitives of the BVH.
+    bvh: bool,
+}
+
+impl PrimitiveSet {
+    /// Returns `true` if the set contains no primitive.
+    pub fn is_empty(&self) -> bool {
+        self.ranges.is_empty() && !self.bvh
+    }
+}
+
+impl<L: SimdFloat> Aggregate<L> {
+    /// Compiles the canonical forms `forms`, with the fastest structure.
+    pub fn new(forms: &[Form]) -> Self {
+        Self::with_structure(forms, AccelerationStructure::fastest(forms))
+    }
+
+    /// Compiles the canonical forms `forms`, with or without a BVH.
+    pub fn with_tree(forms: &[Form], tree: bool) -> Self {
+        let list = AccelerationStructure::List("list");
+        Self::with_structure(forms, if tree { AccelerationStructure::Bvh } else { list })
+    }
+
+    /// Compiles the canonical forms `forms`.
+    pub fn with_structure(forms: &[Form], structure: AccelerationStructure) -> Self {
+        let (has_bvh, how_listed) = match structure {
+            AccelerationStructure::Bvh => (true, "list"),
+            AccelerationStructure::List(name) => (false, name),
+            AccelerationStructure::Boxes { oriented: true } => (false, "boxes of their own"),
+            AccelerationStructure::Boxes { oriented: false } => (false, "boxes"),
+        };
+        let mut out = Self {
+            batches: Vec::new(),
+            all: PrimitiveSet::default(),
+            bvh: None,
+            in_bvh: Vec::new(),
+            boxes: Vec::new(),
+            sources: Vec::new(),
+            counts: Vec::new(),
+        };
+        let mut bounds = Vec::new();
+        for LabelledBatch { batch, sources, label, infinite } in compile(forms) {
+            let in_bvh = has_bvh && !infinite;
+            let how = match (in_bvh, infinite) {
+                (true, _) => "tree",
+                (false, true) => "list",
+                (false, false) => how_listed,
+            };
+            out.counts.push(format!("{label} ({how})"));
+            let index = out.batches.len() as u32;
+            if in_bvh {
+                for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
+                    bounds.extend(forms[source.form].bounds());
+                    out.in_bvh.push((index, i as u32));
+                }
+            } else {
+                out.all.ranges.push((index, 0..sources.len() as u32));
+            }
+            let base = out.sources.len() as u32;
+            out.sources.extend(&sources);
+            out.batches.push(BatchRange { batch, base, end: out.sources.len() as u32 });
+        }
+        out.bvh = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
+        out.all.bvh = out.bvh.is_some();
+        if let AccelerationStructure::Boxes { oriented } = structure {
+            let box_of = |source: &PrimitiveId| PrimitiveBox::new(&*forms[source.form], oriented);
+            out.boxes = out.sources.iter().map(box_of).collect();
+        }
+        out
+    }
+
+    /// Returns a subset of the primitives: all primitives in the BVH, and each other primitive for
+    /// whose number `wanted` returns `true`.
+    pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
+        let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
+        for (index, range) in &self.all.ranges {
+            let base = self.batches[*index as usize].base;
+            for i in range.clone().filter(|i| wanted(base + i)) {
+                match ranges.last_mut() {
+                    Some((last, run)) if last == index && run.end == i => run.end += 1,
+                    _ => ranges.push((*index, i..i + 1)),
+                }
+            }
+        }
+        PrimitiveSet { ranges, bvh: self.all.bvh }
+    }
+
+    /// Returns the set of all primitives outside the BVH and of those with the numbers
+    /// `primitives`, which must be in the BVH. Rays are tested against each primitive of the set,
+    /// without traversal of the BVH.
+    pub fn select_indices(&self, primitives: &[u32]) -> PrimitiveSet {
+        let mut ranges = self.all.ranges.clone();
+        for primitive in primitives {
+            let index = self.batch_index(*primitive);
+            let i = primitive - self.batches[index].base;
+            ranges.push((index as u32, i..i + 1));
+        }
+        ranges.sort_unstable_by_key(|(index, range)| (*index, range.start));
+        PrimitiveSet { ranges, bvh: false }
+    }
+
+    /// Returns the numbers of the primitives in the BVH, in ascending order.
+    pub fn in_tree(&self) -> Vec<u32> {
+        let number = |(index, i): &(u32, u32)| self.batches[*index as usize].base + i;
+        self.in_bvh.iter().map(number).collect()
+    }
+
+    /// Returns `true` if the aggregate has a BVH.
+    pub fn has_tree(&self) -> bool {
+        self.bvh.is_some()
+    }
+
+    /// Returns `true` if there are neither a BVH nor bounding boxes of primitives.
+    pub fn has_no_tree(&self) -> bool {
+        self.bvh.is_none() && self.boxes.is_empty()
+    }
+
+    /// Returns the set of all primitives.
+    pub fn all(&self) -> &PrimitiveSet {
+        &self.all
+    }
+
+    /// Returns `true` if there are no primitives.
+    pub fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// Returns the origin of each primitive.
+    pub fn sources(&self) -> &[PrimitiveId] {
+        &self.sources
+    }
+
+    fn batch_index(&self, primitive: u32) -> usize {
+        self.batches.partition_point(|batch| batch.end <= primitive)
+    }
+
+    /// Returns the closest hit of each ray with the primitives of `set`. At equal distances the
+    /// primitive with the lowest number is hit, so that the result is independent of the order of
+    /// the BVH and of the other rays of the packet.
+    #[inline(always)]
+    pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
+        self.closest_masked(ray, set, L::mask(true))
+    }
+
+    /// Returns the result of [`Aggregate::closest`] in the lanes of `wanted`; other lanes are
+    /// undefined.
+    #[inline(always)]
+    pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+        if !self.boxes.is_empty() {
+            return self.closest_boxed(ray, set, no_hit(wanted));
+        }
+        let hit = self.closest_linear(ray, set, wanted);
+        match &self.bvh {
+            Some(bvh) if set.bvh => self.closest_bvh(bvh, ray, hit),
+            _ => hit,
+        }
+    }
+
+    /// Returns the result of [`Aggregate::closest_masked`] for those primitives of `set` that are
+    /// tested one by one, without BVH and bounding boxes.
+    #[inline(always)]
+    pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+        let mut hit = no_hit(wanted);
+        for (index, range) in &set.ranges {
+            let batch = &self.batches[*index as usize];
+            batch.batch.closest(indices(range), batch.base, ray, &mut hit);
+        }
+        hit
+    }
+
+    #[inline(never)]
+    fn closest_bvh(&self, bvh: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
+        bvh.traverse(ray, hit.t, |primitive, limit| {
+            let (index, i) = self.in_bvh[primitive];
+            let batch = &self.batches[index as usize];
+            // The limit is widened by rounding errors, so that hits at the distance of the current
+            // hit are found, too. Of two hits at the same distance, `merge` keeps the primitive
+            // with the lower number.
+            let mut new = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
+            batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut new);
+            // Inactive lanes have a negative limit; here they become misses.
+            new.t = L::select(new.t.gt(L::zero()), new.t, L::from_f64(L::MAX));
+            hit.merge(&new);
+            hit.t
+        });
+        hit
+    }
+
+    /// Iterates over the primitives of `set` that are tested one by one: the batch of each, its
+    /// number in the batch, and its bounding box.
+    #[inline(always)]
+    fn boxed<'a>(
+        &'a self,
+        set: &'a PrimitiveSet,
+    ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a PrimitiveBox<L::Scalar>>)> {
+        set.ranges.iter().flat_map(move |(index, range)| {
+            let batch = &self.batches[*index as usize];
+            range.clone().map(move |i| (batch, i, self.boxes[(batch.base + i) as usize].as_ref()))
+        })
+    }
+
+    #[inline(never)]
+    fn closest_boxed(&self, ray: &Ray<L>, set: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
+        for (batch, i, bounds) in self.boxed(set) {
+            if bounds.is_none_or(|bounds| bounds.meets(ray, hit.t).any()) {
+                batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut hit);
+            }
+        }
+        hit
+    }
+
+    #[inline(never)]
+    fn occluded_boxed(
+        &self,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        set: &PrimitiveSet,
+    ) -> L::Mask {
+        let mut occluded = L::mask(false);
+        for (batch, i, bounds) in self.boxed(set) {
+            let open = wanted.and_not(occluded);
+            let open = bounds.map_or(open, |bounds| open & bounds.meets(ray, limit));
+            if open.any() {
+                let new = batch.batch.occluded(indices(&(i..i + 1)), ray, limit, open);
+                occluded = occluded | (new & open);
+                if wanted.and_not(occluded).none() {
+                    break;
+                }
+            }
+        }
+        occluded
+    }
+
+    /// Returns the lanes of `wanted` whose ray hits any primitive of `set` at a distance between 0
+    /// and `limit`.
+    #[inline(always)]
+    pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, set: &PrimitiveSet) -> L::Mask {
+        if !self.boxes.is_empty() {
+            return self.occluded_boxed(ray, limit, wanted, set);
+        }
+        let occluded = self.occluded_linear(ray, limit, wanted, set);
+        match &self.bvh {
+            Some(bvh) if set.bvh && wanted.and_not(occluded).any() => {
+                self.occluded_bvh(bvh, ray, limit, wanted, occluded)
+            }
+            _ => occluded,
+        }
+    }
+
+    /// Returns the result of [`Aggregate::occluded`] for those primitives of `set` that are tested
+    /// one by one, without BVH and bounding boxes.
+    #[inline(always)]
+    pub fn occluded_linear(
+        &self,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        set: &PrimitiveSet,
+    ) -> L::Mask {
+        let mut occluded = L::mask(false);
+        for (index, range) in &set.ranges {
+            let open = wanted.and_not(occluded);
+            let batch = &self.batches[*index as usize].batch;
+            occluded = occluded | batch.occluded(indices(range), ray, limit, open);
+            if wanted.and_not(occluded).none() {
+                break;
+            }
+        }
+        occluded
+    }
+
+    /// Returns the lanes of `wanted` whose ray hits one given primitive of the BVH at a distance
+    /// between 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
+    #[inline(always)]
+    pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
+        let (index, i) = self.in_bvh[number as usize];
+        self.batches[index as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
+    }
+
+    #[inline(never)]
+    fn occluded_bvh(
+        &self,
+        bvh: &SceneBvh,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+        mut occluded: L::Mask,
+    ) -> L::Mask {
+        let limit_of = |occluded| L::select(wanted.and_not(occluded), limit, L::from_f64(-1.0));
+        bvh.traverse(ray, limit_of(occluded), |primitive, left| {
+            let open = left.gt(L::zero());
+            let new = self.occluded_by(primitive as u32, ray, left, open);
+            occluded = occluded | (new & open);
+            limit_of(occluded)
+        });
+        occluded
+    }
+
+    /// Returns the hits of the rays with `primitive` that are nearer than `limit`. If `primitive`
+    /// is the first part of a compound, these are the hits with the whole compound.
+    pub fn closest_to(&self, primitive: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
+        let batch = &self.batches[self.batch_index(primitive)];
+        let (i, mut hit) = ((primitive - batch.base) as usize, Hit::with_t_max(limit));
+        batch.batch.closest(i..i + 1, batch.base, ray, &mut hit);
+        hit
+    }
+
+    /// Returns the projection of `point` onto the surface of `primitive`, with the normal there.
+    /// `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
+    /// [`Hit::triangle`].
+    #[inline(always)]
+    pub fn surface(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
+        for batch in &self.batches {
+            if primitive < batch.end {
+                let i = (primitive - batch.base) as usize;
+                return batch.batch.surface(i, triangle_tag, point);
+            }
+        }
+        unreachable!("every primitive belongs to a batch")
+    }
+
+    /// Returns the mesh primitives and the number of the first one. The others have the following
+    /// numbers, which are the highest of the aggregate. Returns `None` if there are no meshes.
+    fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
+        let BatchRange { batch, base, .. } = self.batches.last()?;
+        let PrimitiveBatch::Mesh(meshes) = batch else { return None };
+        Some((meshes, *base))
+    }
+
+    /// Returns `true` if some primitive has interpolated normals; see
+    /// [`Aggregate::shading_normal`].
+    pub fn is_smooth(&self) -> bool {
+        self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
+    }
+
+    /// Returns `true` if some primitive has vertex or face colours; see [`Aggregate::color`].
+    pub fn is_colored(&self) -> bool {
+        self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
+    }
+
+    /// Returns the shading normal of `primitive` at a hit point. `triangle_tag` is
+    /// [`Hit::triangle`]. `at` is the hit point, and the geometric normal on the viewer's side.
+    /// `direction` is the direction of the rays. The angles of the shading normal to the geometric
+    /// normal and to the direction of the viewer are below 90 degrees.
+    pub fn shading_normal(
+        &self,
+        (primitive, triangle_tag): (u32, L),
+        at: (Vec3<L>, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
+        match self.meshes() {
+            Some((meshes, base)) if primitive >= base => {
+                meshes.shading_normal((primitive - base) as usize, triangle_tag, at, direction)
+            }
+            _ => at.1,
+        }
+    }
+
+    /// Returns the colour that the mesh file of `primitive` gives to the triangle `triangle_tag`.
+    /// Returns `None` if the primitive is not a mesh, or if the file has no colours.
+    pub fn color(&self, primitive: u32, triangle_tag: L) -> Option<Vec3<L>> {
+        let (meshes, base) = self.meshes()?;
+        (primitive >= base).then(|| meshes.color((primitive - base) as usize, triangle_tag))?
+    }
+
+    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`; `None`
+    /// if it defines none. `triangle_tag` is [`Hit::triangle`].
+    pub fn uv(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        let batch = &self.batches[self.batch_index(primitive)];
+        batch.batch.uv((primitive - batch.base) as usize, triangle_tag, point)
+    }
+}
+
+/// Returns a miss in every lane. Lanes outside `wanted` have a negative distance limit, so that
+/// they accept no hit.
+#[inline(always)]
+fn no_hit<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
+    Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
+}
+
+fn indices(range: &Range<u32>) -> Range<usize> {
+    range.start as usize..range.end as usize
+}
+
+impl<L: SimdFloat> fmt::Display for Aggregate<L> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.counts.is_empty() {
+            return f.write_str("no objects");
+        }
+        f.write_str(&self.counts.join(", "))
+    }
+}

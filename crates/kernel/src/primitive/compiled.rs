@@ -1,0 +1,50 @@
+//! Primitives compiled for the kernels of one SIMD type: what every kind implements.
+
+use crate::bvh::Ray;
+use crate::lanes::{SimdFloat, Vec3};
+
+/// Point on the surface of a primitive in each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint<L> {
+    /// Hit point, projected onto the surface as exactly as the precision of the lanes allows.
+    pub point: Vec3<L>,
+    /// Unit geometric normal, out of a solid or on the front of a flat shape.
+    pub normal: Vec3<L>,
+    /// Largest magnitude of the coordinates from which the point was computed. Its rounding error is
+    /// a few units in the last place of this value.
+    pub max_coordinate: L,
+}
+
+/// Texture coordinates at one point of a primitive, with their gradients.
+#[derive(Clone, Copy, Debug)]
+pub struct UvGradients<L> {
+    /// u to the right, v up.
+    pub uv: [L; 2],
+    /// Gradients of u and v along the surface, per unit of length in the space of the shape.
+    pub gradients: [Vec3<L>; 2],
+}
+
+impl<L: SimdFloat> SurfacePoint<L> {
+    /// Returns the distance from the surface at which secondary rays start: a few rounding errors
+    /// of [`SurfacePoint::max_coordinate`].
+    #[inline(always)]
+    pub fn ray_offset(&self) -> L {
+        self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
+    }
+}
+
+/// Primitive compiled for the kernels of one SIMD type.
+pub trait Primitive<L: SimdFloat> {
+    /// Returns the smallest distance at which each ray hits the primitive, and the lanes that hit
+    /// it; `None` if no lane hits. Only distances greater than 0 are hits.
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
+
+    /// Returns the projection of `point` onto the surface, with the normal there. `point` is the
+    /// computed hit point of a ray, with rounding errors.
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
+
+    /// Returns the texture coordinates of the primitive's own parametrisation; `None` without one.
+    fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
+        None
+    }
+}

@@ -1,0 +1,376 @@
+//! Compounds (constructive solid geometry): unions, intersections and differences of solids, by
+//! intervals along lines (Roth 1982, *Ray Casting for Modeling Solids*).
+//!
+//! Each part returns the spans in which a line is inside it. The sorted ends of all spans divide
+//! the line into pieces. Each piece is either inside or outside any given part, and therefore the
+//! compound. The line crosses the surface of the compound where an inner and an outer piece meet.
+//!
+//! Two ends coincide if the distance between them, measured perpendicular to the surface, is at
+//! most [`TIE`] rounding errors. There is no piece between them. A cut flush with a face therefore
+//! leaves no skin, and parts in contact leave no crack, although rounding errors put equal faces
+//! into a random order. Parts thinner than this distance disappear.
+
+mod interval;
+mod solid;
+mod tree;
+
+pub use solid::{Solid, SolidPrimitive, Span};
+pub use tree::{CsgSolid, CsgTree};
+
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::canonical::CanonicalShape;
+use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::csg::interval::{Event, Interval, Transition, events, insert, with_scratch};
+use crate::primitive::csg::solid::CompiledSolid;
+use crate::primitive::form::Form;
+use std::ops::Range;
+
+/// Distance within which surfaces of a compound's parts count as coincident. The unit is the
+/// rounding error of the largest coordinate. The distance covers two faces whose coordinates differ
+/// by four units in the last place, each hit with a few rounding errors.
+const TIE: f64 = 16.0;
+
+/// Instruction of a stack machine that computes whether a point is inside a compound. An entry of
+/// the stack is a mask of lanes.
+#[derive(Clone, Copy, Debug)]
+enum Op {
+    /// Pushes the lanes whose point is inside the part with this number.
+    Part(u32),
+    /// Replaces the top two entries by their union.
+    Or,
+    /// Replaces the top two entries by their intersection.
+    And,
+    /// Subtracts the top entry from the one below.
+    Minus,
+}
+
+struct Part<S> {
+    solid: CompiledSolid<S>,
+    /// `true` if the part is subtracted: the inside of its solid is outside the compound.
+    reversed: bool,
+    /// Range of the part's spans in the list of the spans of the compound.
+    spans: Range<usize>,
+}
+
+/// Compound compiled for ray intersection: a bounding sphere, and the ranges of its parts and
+/// instructions in the lists of [`Compounds`].
+struct Compound<S> {
+    center: [S; 3],
+    radius2: S,
+    reach: S,
+    parts: Range<usize>,
+    ops: Range<usize>,
+    /// Largest number of spans of one line in all parts.
+    spans: usize,
+    /// Largest number of entries on the stack of the instructions.
+    depth: usize,
+}
+
+/// All compounds of a scene, compiled for ray intersection. Every part counts as a primitive, so
+/// that a hit identifies the part.
+pub struct Compounds<S> {
+    compounds: Vec<Compound<S>>,
+    parts: Vec<Part<S>>,
+    ops: Vec<Op>,
+    /// For each part: the number of its compound if it is the first part, otherwise `None`.
+    first: Vec<Option<u32>>,
+}
+
+impl<S: Float> Compounds<S> {
+    /// Compiles the compounds among `forms`.
+    pub fn new(forms: &[Form]) -> Self {
+        let mut out =
+            Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
+        for form in forms {
+            if let Form::Csg(compound) = form {
+                out.add(compound);
+            }
+        }
+        out
+    }
+
+    fn add(&mut self, compound: &CsgSolid) {
+        let (first_part, first_op) = (self.parts.len(), self.ops.len());
+        let mut spans = 0;
+        for (i, part) in compound.parts.iter().enumerate() {
+            let solid = CompiledSolid::new(part);
+            let first = spans;
+            spans += solid.max_spans();
+            self.parts.push(Part { solid, reversed: false, spans: first..spans });
+            self.first.push((i == 0).then_some(self.compounds.len() as u32));
+        }
+        let depth = self.build(&compound.tree, first_part, false);
+        let (low, high) = compound.bounds().unwrap_or_default();
+        let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
+        let bounded = compound.parts.iter().filter(|part| part.bounds().is_some());
+        self.compounds.push(Compound {
+            center: (0.5 * (low + high)).to_array().map(S::from_f64),
+            radius2: S::from_f64(radius * radius),
+            reach: S::from_f64(bounded.map(|part| part.max_coordinate()).fold(0.0, f64::max)),
+            parts: first_part..self.parts.len(),
+            ops: first_op..self.ops.len(),
+            spans,
+            depth,
+        });
+    }
+
+    /// Appends the instructions that evaluate `tree` and returns the depth of the stack that they
+    /// need. `reversed` is `true` if the tree is subtracted from the compound.
+    fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
+        let (list, op) = match tree {
+            CsgTree::Part(i) => {
+                self.parts[first_part + i].reversed = reversed;
+                self.ops.push(Op::Part(*i as u32));
+                return 1;
+            }
+            CsgTree::Union(list) => (list, Op::Or),
+            CsgTree::Intersection(list) => (list, Op::And),
+            CsgTree::Difference(list) => (list, Op::Minus),
+        };
+        let mut depth = 1;
+        for (n, inner) in list.iter().enumerate() {
+            let cuts = matches!(op, Op::Minus) && n > 0;
+            let above = self.build(inner, first_part, reversed ^ cuts);
+            depth = depth.max(above + usize::from(n > 0));
+            if n > 0 {
+                self.ops.push(op);
+            }
+        }
+        depth
+    }
+
+    /// Replaces `hit` in the lanes of `wanted` whose ray hits `compound` nearer than `hit`. The id
+    /// of a part in `hit` is `base` plus the number of the part.
+    fn intersect<L: SimdFloat<Scalar = S>>(
+        &self,
+        compound: &Compound<S>,
+        base: u32,
+        ray: &Ray<L>,
+        wanted: L::Mask,
+        hit: &mut Hit<L>,
+    ) {
+        let from_center = ray.origin - Vec3::splat(compound.center);
+        let along = from_center.dot(ray.direction);
+        let across = ray.direction.mul_add(-along, from_center);
+        let radius2 = L::splat(compound.radius2);
+        // The bounding sphere is in front of the origin of the ray or contains it.
+        let ahead = along.le(L::zero()) | from_center.length_squared().le(radius2);
+        let near = wanted & across.length_squared().le(radius2) & ahead;
+        if near.none() {
+            return;
+        }
+        let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
+        let outside = Interval { enter: never, leave: always };
+        let end = Event { t: never, tie: L::zero() };
+        let parts = &self.parts[compound.parts.clone()];
+        let ops = &self.ops[compound.ops.clone()];
+        let first_id = base + compound.parts.start as u32;
+        with_scratch::<8, _, _>(compound.spans, outside, |spans| {
+            with_scratch::<16, _, _>(2 * compound.spans, end, |ends| {
+                let tie = ray.origin.max_abs().max(L::splat(compound.reach))
+                    * L::from_f64(TIE * L::EPSILON);
+                let mut count = 0;
+                for part in parts {
+                    let mut slots = spans[part.spans.clone()].iter_mut();
+                    part.solid.for_each_span(ray, |found| {
+                        let Some(span) = slots.next() else { return };
+                        *span = Interval {
+                            enter: L::select(found.meets, found.enter, never),
+                            leave: L::select(found.meets, found.leave, always),
+                        };
+                        for end in events(&found, tie) {
+                            insert(end, ends, count);
+                            count += 1;
+                        }
+                    });
+                }
+                let lines = Lines { parts, ops, depth: compound.depth, first_id, spans };
+                lines.sweep(&ends[..count], near, hit);
+            });
+        });
+    }
+
+    /// Replaces `hit` in the lanes whose ray hits a compound nearer than `hit`. Only compounds
+    /// whose first part is in `range` are tested. The id of a part is `base` plus its number.
+    #[inline(never)]
+    pub fn closest<L: SimdFloat<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        base: u32,
+        ray: &Ray<L>,
+        hit: &mut Hit<L>,
+    ) {
+        for compound in self.first[range].iter().flatten() {
+            self.intersect(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+        }
+    }
+
+    /// Returns the lanes of `wanted` whose ray hits a compound at a distance between 0 and `limit`.
+    /// Only compounds whose first part is in `range` are tested.
+    #[inline(never)]
+    pub fn occluded<L: SimdFloat<Scalar = S>>(
+        &self,
+        range: Range<usize>,
+        ray: &Ray<L>,
+        limit: L,
+        wanted: L::Mask,
+    ) -> L::Mask {
+        let mut occluded = L::mask(false);
+        for compound in self.first[range].iter().flatten() {
+            let open = wanted.and_not(occluded);
+            if open.none() {
+                break;
+            }
+            let mut hit = Hit::with_t_max(limit);
+            self.intersect(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
+            occluded = occluded | hit.t.lt(limit);
+        }
+        occluded
+    }
+
+    /// Returns the projection of `point` onto the surface of a part. The normal points out of the
+    /// compound.
+    #[inline(never)]
+    pub fn surface<L: SimdFloat<Scalar = S>>(
+        &self,
+        part: usize,
+        point: Vec3<L>,
+    ) -> SurfacePoint<L> {
+        let part = &self.parts[part];
+        let surface = part.solid.surface(point);
+        let normal = if part.reversed { -surface.normal } else { surface.normal };
+        SurfacePoint { normal, ..surface }
+    }
+
+    /// Returns the texture coordinates of a part at `point`; `None` if the part has none.
+    pub fn uv<L: SimdFloat<Scalar = S>>(
+        &self,
+        part: usize,
+        point: Vec3<L>,
+    ) -> Option<UvGradients<L>> {
+        self.parts[part].solid.uv(point)
+    }
+}
+
+/// Lines of a ray packet through one compound.
+struct Lines<'a, L: SimdFloat> {
+    parts: &'a [Part<L::Scalar>],
+    ops: &'a [Op],
+    depth: usize,
+    /// Id of the compound's first part.
+    first_id: u32,
+    /// Spans of all parts.
+    spans: &'a [Interval<L>],
+}
+
+impl<L: SimdFloat> Lines<'_, L> {
+    #[inline(always)]
+    fn spans_of(&self, part: u32) -> &[Interval<L>] {
+        &self.spans[self.parts[part as usize].spans.clone()]
+    }
+
+    /// Executes the instructions on a stack of values: `part` returns the value of a part, and
+    /// `join` combines two values.
+    #[inline(always)]
+    fn evaluate<T: Copy>(
+        &self,
+        empty: T,
+        part: impl Fn(u32) -> T,
+        join: impl Fn(Op, T, T) -> T,
+    ) -> T {
+        with_scratch::<8, _, _>(self.depth, empty, |stack| {
+            let mut top = 0;
+            for op in self.ops {
+                if let Op::Part(i) = op {
+                    stack[top] = part(*i);
+                    top += 1;
+                } else {
+                    top -= 1;
+                    stack[top - 1] = join(*op, stack[top - 1], stack[top]);
+                }
+            }
+            stack[0]
+        })
+    }
+
+    /// Returns the lanes in which the point at the distance `t` is inside the compound.
+    #[inline(always)]
+    fn inside(&self, t: L) -> L::Mask {
+        let part = |i| inside_any(self.spans_of(i), t);
+        self.evaluate(L::mask(false), part, |op, a, b| match op {
+            Op::Or => a | b,
+            Op::And => a & b,
+            Op::Part(_) | Op::Minus => a.and_not(b),
+        })
+    }
+
+    /// Returns the transition of each line through the compound's surface between the points at the
+    /// distances `before` and `after`.
+    fn change(&self, before: L, after: L) -> Transition<L> {
+        let no = L::mask(false);
+        let nothing = Transition { before: no, after: no, t: L::zero(), tag: L::from_id(0) };
+        let part = |i| {
+            let spans = self.spans_of(i);
+            let (was, is) = (inside_any(spans, before), inside_any(spans, after));
+            let mut t = spans[0].leave;
+            for span in spans {
+                t = L::select(span.at(before).and_not(is), span.leave, t);
+                t = L::select(span.at(after), span.enter, t);
+            }
+            Transition { before: was, after: is, t, tag: L::from_id(self.first_id + i) }
+        };
+        self.evaluate(nothing, part, |op, a, b| match op {
+            Op::Or => a.or(b),
+            Op::And => a.and(b),
+            Op::Part(_) | Op::Minus => a.and(b.inverted()),
+        })
+    }
+
+    /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this
+    /// surface is nearer than `hit`. Steps along each line through `ends`, the sorted ends of the
+    /// parts' spans.
+    ///
+    /// Two ends coincide only if the distance between them is at most the tolerance (`tie`) of each
+    /// end. The tolerance along the line is large at a face that the line grazes. If the tolerance
+    /// of one end were enough, the grazed face would absorb other faces. Coincident faces have
+    /// equal tolerances, because their angles to the line are equal.
+    #[inline(always)]
+    fn sweep(&self, ends: &[Event<L>], mut open: L::Mask, hit: &mut Hit<L>) {
+        let last = Event { t: L::from_f64(L::MAX), tie: L::zero() };
+        let mut state = L::mask(false);
+        let mut before = L::from_f64(-L::MAX);
+        for (i, end) in ends.iter().enumerate() {
+            let next = ends.get(i + 1).unwrap_or(&last);
+            let gap = open & (next.t - end.t).gt(end.tie.min(next.tie));
+            if gap.none() {
+                continue;
+            }
+            let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
+            let inside = self.inside(middle);
+            let changed = gap & (inside.and_not(state) | state.and_not(inside));
+            if changed.any() {
+                let seen = self.change(before, middle);
+                let ahead = changed & seen.t.gt(L::zero());
+                let nearer = ahead & seen.t.lt(hit.t);
+                hit.t = L::select(nearer, seen.t, hit.t);
+                hit.primitive = L::select(nearer, seen.tag, hit.primitive);
+                open = open.and_not(ahead);
+            }
+            // In these lanes all further surfaces are farther than the hit.
+            open = open.and_not(gap & next.t.gt(hit.t));
+            if open.none() {
+                return;
+            }
+            state = (inside & gap) | state.and_not(gap);
+            before = L::select(gap, middle, before);
+        }
+    }
+}
+
+/// Returns the lanes in which the distance `t` is inside at least one of `spans`.
+#[inline(always)]
+fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
+    let [first, others @ ..] = spans else { return L::mask(false) };
+    others.iter().fold(first.at(t), |inside, span| inside | span.at(t))
+}
