@@ -72,17 +72,9 @@ fn signal_saves_the_picture_so_far() {
 #[test]
 fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();
-    let args = [
-        "render",
-        "scene.toml",
-        "-o",
-        "a.png",
-        "--size",
-        "4096x4096",
-        "--uniform",
-        "--spp",
-        "9999",
-    ];
+    let args = "render scene.toml -o a.png --size 4096x4096 --uniform --spp 9999"
+        .split(' ')
+        .collect::<Vec<_>>();
     let child = spawn(&desk, &args);
     signal("INT", child.id());
     // The first signal must be delivered before the second is sent, because two pending SIGINTs

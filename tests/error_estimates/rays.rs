@@ -128,7 +128,7 @@ fn survey_of_rays() {
     let mut highest = 0.0f64;
     for number in numbers {
         let sample = scene(number);
-        let kind = KINDS[(number % 10) as usize];
+        let kind = KINDS.split('|').nth((number % 10) as usize).unwrap();
         let seeds = variable("ZERKALO_SEEDS", 4) * if kind == "one ball" { 48 } else { 1 };
         let seeds: Vec<u64> = (0..seeds).map(|i| number + 1 + 1000 * i).collect();
         let target = target_of(number);
