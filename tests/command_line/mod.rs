@@ -9,7 +9,7 @@ mod refusals;
 mod scale;
 mod shards;
 #[cfg(unix)]
-mod signals;
+pub mod signals;
 mod watch;
 
 use crate::harness::*;

@@ -43,7 +43,7 @@ pub fn wait_for_file(path: &Path) {
 /// Starts the program and waits until it handles SIGTERM and SIGINT: until it has threads that
 /// trace, which it starts after its handlers are complete. The system already reports a signal as
 /// caught (`SigCgt`) a moment before the handler knows what to do, and a signal is lost then.
-pub fn spawn(desk: &Desk, args: &[&str]) -> Child {
+pub(super) fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_status(child.id(), "Threads:", 10, |threads| threads > 1);

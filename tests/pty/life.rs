@@ -1,14 +1,10 @@
 //! Start and end of the program: the state of the terminal is changed and restored.
 
 use super::*;
+use crate::command_line::signals::signal;
 use std::io::Write;
 use std::process::{Command, Stdio};
 use zerkalo_terminal::{ENTER, LEAVE, Screen};
-
-pub fn signal(name: &str, id: u32) {
-    let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
-    assert!(sent.unwrap().success());
-}
 
 #[test]
 fn built_in_scene_opens_and_quits() {

@@ -9,7 +9,7 @@ mod limits;
 mod picture;
 mod stills;
 mod stopping;
-mod terminal;
+pub mod terminal;
 mod watch;
 
 use crate::harness::*;

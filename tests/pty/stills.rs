@@ -1,7 +1,7 @@
 //! Viewer of exported images. The terminal emulator ignores graphics protocols, so that tests
 //! decode the images from the program's output.
 
-use super::life::signal;
+use crate::command_line::signals::signal;
 use super::picture::Picture;
 use super::*;
 use crate::harness::*;

@@ -1,6 +1,6 @@
 //! Job control, rapid resizing, and recovery of unsaved edits.
 
-use super::life::signal;
+use crate::command_line::signals::signal;
 use super::*;
 use crate::harness::*;
 use std::os::unix::fs::PermissionsExt;
