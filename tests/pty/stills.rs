@@ -1,9 +1,9 @@
 //! Viewer of exported images. The terminal emulator ignores graphics protocols, so that tests
 //! decode the images from the program's output.
 
-use crate::command_line::signals::signal;
 use super::picture::Picture;
 use super::*;
+use crate::command_line::signals::signal;
 use crate::harness::*;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

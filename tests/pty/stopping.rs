@@ -1,7 +1,7 @@
 //! Job control, rapid resizing, and recovery of unsaved edits.
 
-use crate::command_line::signals::signal;
 use super::*;
+use crate::command_line::signals::signal;
 use crate::harness::*;
 use std::os::unix::fs::PermissionsExt;
 use zerkalo_terminal::{ENTER, LEAVE};
