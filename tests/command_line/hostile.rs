@@ -28,6 +28,10 @@ fn toml(text: &str) -> String {
     format!("\"{escaped}\"")
 }
 
+fn with_mesh(file: &str) -> String {
+    format!("{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh.file = \"{file}\"\n")
+}
+
 #[test]
 #[cfg(unix)]
 fn file_names_are_printed_without_control_characters() {
@@ -82,12 +86,7 @@ fn scene_texts_are_printed_without_control_characters() {
         ("materials", SCENE.replace("[materials.red]", &format!("[materials.{evil}]"))),
         ("a key", format!("{SCENE}\n[trace]\n{evil} = 1\n")),
         ("a word", format!("{SCENE}\n[trace]\nray_types = {evil}\n")),
-        (
-            "a mesh",
-            format!(
-                "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = {evil} }}\n"
-            ),
-        ),
+        ("a mesh", with_mesh("").replace("\"\"", &evil)),
         (
             "a view",
             format!("{SCENE}\n[cameras.{evil}]\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n"),
@@ -125,10 +124,7 @@ fn mesh_texts_are_printed_without_control_characters() {
         ),
     ] {
         fs::write(desk.path(name), text).unwrap();
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{name}");
         check(name, &run);
@@ -161,10 +157,7 @@ fn scenes_read_regular_files_only() {
     let made = Command::new("mkfifo").arg(desk.path("pipe.obj")).status();
     assert!(made.unwrap().success());
     for name in ["zero.obj", "folder.obj", "pipe.obj", "/dev/stdin", "/dev/zero"] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{name}: {}", run.out);
         assert!(run.err.contains("mesh.toml:"), "{name}: {}", run.err);
@@ -180,10 +173,7 @@ fn scenes_name_files_anywhere() {
     fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     std::os::unix::fs::symlink(&mesh, desk.path("scenes/link.obj")).unwrap();
     for name in ["../m.obj", "link.obj", mesh.to_str().unwrap()] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("scenes/mesh.toml"), scene).unwrap();
+        fs::write(desk.path("scenes/mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "scenes/mesh.toml"]);
         assert_eq!(run.status, 0, "{name}: {}", run.err);
     }
@@ -209,10 +199,7 @@ fn files_named_by_meshes_stay_in_their_folder() {
             "scene": 0
         });
         fs::write(desk.path("meshes/m.gltf"), gltf.to_string()).unwrap();
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"meshes/m.gltf\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh("meshes/m.gltf")).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{uri}: {}", run.out);
         assert!(run.err.contains("folder"), "{uri}: {}", run.err);
@@ -230,10 +217,7 @@ fn sizes_are_checked_before_allocation() {
     stl.extend(u32::MAX.to_le_bytes());
     fs::write(desk.path("m.stl"), stl).unwrap();
     for name in ["m.ply", "m.stl"] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         // The limit of 2 GB leaves memory for the message only if the mesh is refused early.
         let program = env!("CARGO_BIN_EXE_zerkalo");
         let mut command = Command::new("sh");
@@ -280,10 +264,8 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
     let mut scenes = vec!["spheres.toml".to_string()];
     for (name, bytes) in files {
         fs::write(desk.path(name), bytes).unwrap();
-        let object = "\n[[object]]\nmaterial = \"red\"\n";
-        let scene = format!("{SCENE}{object}shape.mesh = {{ file = \"{name}\" }}\n");
         scenes.push(format!("{name}.toml"));
-        fs::write(desk.path(&scenes[scenes.len() - 1]), scene).unwrap();
+        fs::write(desk.path(&scenes[scenes.len() - 1]), with_mesh(name)).unwrap();
     }
     for scene in &scenes {
         let mut fits = false;

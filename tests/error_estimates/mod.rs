@@ -35,16 +35,10 @@ fn closed_form(filter: Filter) -> Scene {
     let [x, y] = [EDGE_X + 20.0 * c, 20.0 * s];
     let text = format!(
         r#"
-[film]
-size = [{width}, {height}]
-[camera]
-eye = [0.1, 0.05, 1.5]
-target = [0.0, 0.0, 0.0]
-view_angle.vertical = 40.0
-[background]
-color = {SKY:?}
-[ambient]
-color = [1.0, 1.0, 1.0]
+film.size = [{width}, {height}]
+camera = {{ eye = [0.1, 0.05, 1.5], target = [0.0, 0.0, 0.0], view_angle.vertical = 40.0 }}
+background.color = {SKY:?}
+ambient.color = [1.0, 1.0, 1.0]
 [materials.mirror]
 ambient = 0.0
 diffuse = 0.0
