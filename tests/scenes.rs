@@ -186,29 +186,3 @@ fn deterministic_scenes_have_equal_replicates() {
         }
     }
 }
-
-#[test]
-fn auto_precision_is_double_for_extreme_proportions() {
-    let chosen = |scene: &Scene| match compiled(scene) {
-        AnyWorld::Single(_) => Precision::Single,
-        AnyWorld::Double(_) => Precision::Double,
-    };
-    for (name, scene) in all_shipped() {
-        assert_eq!(chosen(&scene), Precision::Single, "{name}");
-    }
-    // A floor of 10 x 10 around the origin and a ball on it. The largest coordinate is 5.
-    let with_ball = |radius: f64| {
-        parsed(&format!(
-            "[[object]]\n\
-             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [10.0, 10.0] }}\n\
-             [[object]]\n\
-             shape.sphere = {{ center = [0.0, {radius}, 0.0], radius = {radius} }}\n\
-             [camera]\neye = [0.0, 0.1, 1.0]\ntarget = [0.0, 0.0, 0.0]\n"
-        ))
-    };
-    // Single precision requires a diameter of the ball of at least 1/8192 of the largest
-    // coordinate.
-    let limit = 5.0 / 8192.0 / 2.0;
-    assert_eq!(chosen(&with_ball(1.01 * limit)), Precision::Single);
-    assert_eq!(chosen(&with_ball(0.99 * limit)), Precision::Double);
-}
