@@ -1,4 +1,5 @@
-//! Acceleration structures: every choice renders the same image, bit for bit.
+//! Acceleration structures: every choice renders the same image, bit for bit. `random_scenes` has
+//! further scenes.
 
 use crate::harness::*;
 
@@ -21,54 +22,6 @@ fn shipped_scenes_are_equal_under_every_acceleration() {
     }
 }
 
-/// Returns a scene with objects of every shape that allows transforms. The objects have all sizes
-/// and are rotated and stretched. They are around and behind the camera, which may be inside one of
-/// them.
-fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
-    let shapes = [
-        "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
-        "cube = { corner = [-0.5, -0.5, 0.5], edge = 1.0 }",
-        "cylinder = { base = [0.0, -0.5, 0.0], top = [0.0, 0.5, 0.0], radius = 0.3 }",
-        "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
-        "rectangle = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0], normal = [0.0, 0.0, 1.0] }",
-        "torus = { center = [0.0, 0.0, 0.0], axis = [0.0, 1.0, 0.2], ring = 0.4, tube = 0.1 }",
-        "mesh = { file = \"\" }",
-    ];
-    let far = if numbers.below(3) == 0 { 1e4 } else { 0.0 };
-    let [x, y, z] = (numbers.in_cube(3.0) + far).to_array();
-    let [a, b, c] = numbers.direction().to_array();
-    let near = if numbers.below(2) == 0 { 0.0 } else { 0.3 };
-    let angle = numbers.between(5.0, 140.0);
-    let mut text = format!(
-        "camera = {{ eye = [{x}, {y}, {z}], direction = [{a}, {b}, {c}], near = {near}, \
-         view_angle.vertical = {angle} }}\n\
-         light = [{{ name = \"a\", point = {{ position = [{}, {}, {}] }}, intensity = 30.0 }}, \
-         {{ name = \"b\", directional = {{ direction = [0.3, -1.0, 0.2] }}, intensity = 1.0 }}]\n\
-         [materials.matte]\ncolor = [0.7, 0.5, 0.3]\n\
-         [materials.mirror]\ndiffuse = 0.2\nreflection = 0.7\nroughness = 0.1\n\
-         [materials.glass]\ndiffuse = 0.1\ntransmission = 0.6\n",
-        far + 1.0,
-        far + 4.0,
-        far
-    );
-    for i in 0..count {
-        let material = ["matte", "mirror", "glass"][numbers.below(3)];
-        let shape = shapes[numbers.below(shapes.len())];
-        let mut size = || 10f64.powf(numbers.between(-1.5, 0.5));
-        let [sx, sy, sz] = if i % 2 == 0 { [size(), size(), size()] } else { [size(); 3] };
-        let [x, y, z] = (numbers.in_cube(5.0) + far).to_array();
-        let (rotation, tilt) = (numbers.between(0.0, 360.0), numbers.between(0.0, 360.0));
-        write!(
-            text,
-            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\ntransform = [\
-             {{ scale = [{sx}, {sy}, {sz}] }}, {{ rotate_x = {tilt} }}, {{ rotate_y = {rotation} }}, \
-             {{ translate = [{x}, {y}, {z}] }}]\n"
-        )
-        .unwrap();
-    }
-    parsed(&text)
-}
-
 /// Compares the acceleration structures on a pyramid whose coordinates are large compared to its
 /// size. At the pyramid's silhouette, the face that is closest to the rounded hit point may face
 /// away from the ray.
@@ -83,62 +36,6 @@ fn silhouette_edges_are_equal_under_every_acceleration() {
          { translate = [-3010.0, 1.0, 0.12647119695611247] }]\n\
          [[object]]\nshape.sphere = { center = [1.0, 0.5, 0.5], radius = 1.0 }\n";
     same("pyramid", &parsed(text), Precision::Single, 64);
-}
-
-/// Compares the acceleration structures on random objects, half of the time with planes around
-/// them, in small and elongated pictures. The rays of a single tile may cover more than a
-/// hemisphere of directions. Two thirds of the cameras have a lens, from tiny to larger than the
-/// scene, and are focused at any distance. Some cameras are inside of objects.
-fn check_crowds(seeds: std::ops::Range<u64>) {
-    for seed in seeds {
-        let mut numbers = Numbers::new(seed);
-        let count = [1, 3, 6, 24, 130][numbers.below(5)];
-        let mut scene = crowd(&mut numbers, count);
-        if numbers.below(2) == 0 {
-            // A floor and walls, some of them in front of the lens, some behind it.
-            let mut wall = || {
-                let [a, b, c] = numbers.direction().to_array();
-                let [x, y, z] = (DVec3::from(scene.camera.eye) + numbers.in_cube(4.0)).to_array();
-                format!(
-                    "[[object]]\nshape.plane = {{ point = [{x}, {y}, {z}], normal = [{a}, {b}, {c}] }}\n\
-                     [[object]]\nshape.rectangle = {{ center = [{x}, {y}, {z}], size = [3.0, 5.0], \
-                     normal = [{c}, {b}, {a}] }}\n"
-                )
-            };
-            let walls = parsed(&(wall() + &wall()));
-            scene.objects.extend(walls.objects);
-        }
-        if seed % 3 != 0 {
-            scene.camera.aperture = Some(Aperture::Radius(numbers.log_uniform(1e-3, 30.0)));
-            let focus = match numbers.below(3) {
-                0 => numbers.log_uniform(1e-3, 1e4),
-                _ => numbers.log_uniform(0.5, 10.0),
-            };
-            scene.camera.focus = Some(Focus::Distance(focus));
-        }
-        if seed % 2 == 0 {
-            let angle = [100.0, 140.0, 160.0, 175.0, 179.0][numbers.below(5)];
-            scene.camera.view_angle =
-                [ViewAngle::Vertical(angle), ViewAngle::Horizontal(angle)][numbers.below(2)];
-        }
-        let size =
-            [[41, 29], [20, 20], [57, 3], [100, 1], [1, 200], [1000, 1], [1, 1000], [1, 1], [3, 2]]
-                [numbers.below(9)];
-        let precision = if seed % 5 == 2 { Precision::Double } else { Precision::Single };
-        let name = format!("seed {seed}, {count} objects, {precision:?}");
-        same(&name, &sized(scene, size), precision, 4);
-    }
-}
-
-#[test]
-fn random_objects_are_equal_under_every_acceleration() {
-    check_crowds(0..150);
-}
-
-#[test]
-#[ignore = "long: thousands of scenes"]
-fn random_objects_are_equal_under_every_acceleration_in_many_scenes() {
-    check_crowds(1000..4000);
 }
 
 /// Returns a scene with objects of every kind on a coarse grid, so that some faces are coplanar

@@ -162,12 +162,6 @@ fn reported_truncation_bias_holds() {
     checked(0..400);
 }
 
-#[test]
-#[ignore = "takes minutes"]
-fn reported_truncation_bias_holds_in_many_scenes() {
-    checked(400..6000);
-}
-
 /// Checks that the depth bias of a single glass ball is reported without a bound. Bumps, and
 /// rounding at the silhouette, can keep light inside the ball for any number of reflections.
 #[test]

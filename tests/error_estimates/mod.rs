@@ -359,9 +359,3 @@ fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
 fn linear_target_is_met() {
     assert_linear_target_is_met([96, 72], 4);
 }
-
-#[test]
-#[ignore = "half a minute: cargo test --test engine error_estimates:: -- --ignored --nocapture"]
-fn linear_target_is_met_at_full_size() {
-    assert_linear_target_is_met([640, 480], 3);
-}

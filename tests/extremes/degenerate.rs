@@ -84,12 +84,6 @@ fn extreme_04_camera_inside() {
     check_all_inside(25_000);
 }
 
-#[test]
-#[ignore = "long: 100,000 rays in each solid"]
-fn extreme_04_camera_inside_at_length() {
-    check_all_inside(100_000);
-}
-
 fn check_all_inside(rays: usize) {
     let solids = forms().iter().filter(|f| is_solid(&f.1)).count();
     for (i, (name, form)) in forms().into_iter().enumerate() {

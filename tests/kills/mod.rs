@@ -22,8 +22,6 @@ use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
 const RUNS: usize = 100;
-/// Number of programs in the long form of the test.
-const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
@@ -293,12 +291,6 @@ fn recover(folder: &Path, kept: &str) -> Result<(), String> {
 fn random_ends_damage_no_file_and_lose_no_old_edit() {
     let only = std::env::var("ZERKALO_KILL").ok().map(|text| text.parse::<usize>().unwrap());
     check_runs(only.map_or_else(|| (0..RUNS).collect(), |number| vec![number]));
-}
-
-#[test]
-#[ignore = "long: 400 runs"]
-fn many_random_ends_damage_no_file_and_lose_no_old_edit() {
-    check_runs((0..MANY_RUNS).collect());
 }
 
 /// Executes the runs with the given numbers, several at a time. Panics if a run fails.

@@ -201,10 +201,7 @@ fn closed_form_11_a_slab_with_all_orders() {
 
 #[test]
 fn rough_glass_converges_to_clear_glass() {
-    let mut scene = parsed(
-        &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/rough-glass.toml")).unwrap(),
-    );
-    scene.film.size = [24, 16];
+    let scene = sized(shipped("rough-glass.toml"), [24, 16]);
     let with = |alpha: f64| {
         let mut scene = scene.clone();
         for material in scene.materials.values_mut().filter(|m| m.transmission > 0.0) {
@@ -271,17 +268,4 @@ fn camera_inside_glass_starts_in_its_medium() {
     // Rays from the centre of a bubble leave it straight and are in glass then.
     assert_eq!(look(41.8, 0.0, "", bubble), 1.0);
     assert_eq!(look(41.82, 0.0, "", bubble), 0.0);
-}
-
-#[test]
-fn glass_packets_equal_samples_traced_alone() {
-    for file in ["glass", "transmission", "water-glass"] {
-        let mut scene = parsed(
-            &std::fs::read_to_string(format!("{}scenes/{file}.toml", env!("ZERKALO_ROOT")))
-                .unwrap(),
-        );
-        scene.film.size = [24, 20];
-        assert!(samples::<Single>(&scene, 8) == lone_samples::<Single>(&scene, 8), "{file}");
-        assert!(samples::<Double>(&scene, 8) == lone_samples::<Double>(&scene, 8), "{file}");
-    }
 }

@@ -88,12 +88,7 @@ fn extreme_26_parallel_mirrors() {
 }
 
 fn physical() -> Scene {
-    let text =
-        std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room-physical.toml"))
-            .unwrap();
-    let mut scene = parsed(&text);
-    scene.film.size = [48, 36];
-    scene
+    sized(shipped("mirror-room-physical.toml"), [48, 36])
 }
 
 #[test]
@@ -107,8 +102,11 @@ fn packets_equal_samples_traced_alone() {
             (material.reflection, material.lobe) = (0.9, Lobe::Mirror);
         }
     }
-    for (name, scene) in [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)] {
-        assert!(samples::<Single>(&scene, 16) == lone_samples::<Single>(&scene, 16), "{name}");
-        assert!(samples::<Double>(&scene, 16) == lone_samples::<Double>(&scene, 16), "{name}");
+    let glass = ["glass.toml", "transmission.toml", "water-glass.toml"]
+        .map(|file| (file, sized(shipped(file), [24, 20])));
+    let others = [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)];
+    for (name, scene) in others.into_iter().chain(glass) {
+        assert!(samples::<Single>(&scene, 8) == lone_samples::<Single>(&scene, 8), "{name}");
+        assert!(samples::<Double>(&scene, 8) == lone_samples::<Double>(&scene, 8), "{name}");
     }
 }

@@ -110,14 +110,6 @@ fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
 }
 
 #[test]
-#[ignore = "long"]
-fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery-glass.toml");
-    let text = fs::read_to_string(path).unwrap().replace("size = [960, 540]", "size = [400, 300]");
-    kill_at_random_moments(20, &text, 2);
-}
-
-#[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();
     // The render must take a few seconds to reach its noise target.

@@ -35,7 +35,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
 
 #[test]
 fn accelerations() {
-    compare("accelerations", 0..40, same_bytes);
+    compare("accelerations", 0..80, same_bytes);
 }
 
 #[test]

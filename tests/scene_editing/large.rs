@@ -79,12 +79,3 @@ fn check_growth(fewest: usize, limit: f64) {
 fn edits_of_many_objects_are_written_in_linear_time() {
     check_growth(1_000, 8_f64.sqrt());
 }
-
-/// Checks that the time of an edit is proportional to the number of objects, up to 100,000. Run
-/// with `cargo test --test program scene_editing::large -- --ignored --nocapture`.
-#[test]
-#[ignore = "takes a minute, and needs an idle machine"]
-#[cfg(target_os = "linux")]
-fn edits_of_100_000_objects_are_written_in_linear_time() {
-    check_growth(25_000, 2.3);
-}
