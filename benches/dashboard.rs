@@ -11,7 +11,9 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
-use zerkalo_scene::BUILT_IN;
+
+/// Text of `scenes/mirror-room.toml`.
+const MIRROR_ROOM: &str = include_str!("../scenes/mirror-room.toml");
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
@@ -33,7 +35,7 @@ fn main() {
     }
     let folder = TempDir::new().unwrap();
     let room = folder.path().join("room.toml");
-    fs::write(&room, BUILT_IN).unwrap();
+    fs::write(&room, MIRROR_ROOM).unwrap();
     // Single presses, while the picture converges.
     let single = press_keys(folder.path(), 40, Duration::from_millis(250));
     report("single keys, 640x480, to picture", &single, true);
@@ -44,7 +46,7 @@ fn main() {
         println!("{:44} {:6.1} ms", "last key of those to its picture", last.milliseconds);
     }
     println!("{:44} {:6.2} %", "one core when converged", idle_percent(folder.path()));
-    fs::write(&room, BUILT_IN.replace("size = [640, 480]", "size = [3840, 2160]")).unwrap();
+    fs::write(&room, MIRROR_ROOM.replace("size = [640, 480]", "size = [3840, 2160]")).unwrap();
     let large = press_keys(folder.path(), 40, Duration::from_millis(250));
     report("single keys, 3840x2160, to screen", &large, false);
     report("single keys, 3840x2160, to picture", &large, true);

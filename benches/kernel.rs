@@ -10,9 +10,6 @@
 //! `cargo bench -p zerkalo-benches --bench kernel`. Throughput is in lanes per second, so that
 //! results for SIMD types of different widths are comparable.
 
-#[path = "../tests/common/shape_examples.rs"]
-mod shape_examples;
-
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use std::hint::black_box;
@@ -89,7 +86,7 @@ fn intersect<L: SimdFloat>(c: &mut Criterion, kind: &str, form: &Form) {
 }
 
 fn kinds(c: &mut Criterion) {
-    for (key, example) in shape_examples::EXAMPLES {
+    for (key, example) in zerkalo_scene::shape::EXAMPLES {
         let text = format!("[[object]]\n{example}\n");
         let Ok(scene) = Scene::parse(&text, key) else { continue };
         let form = scene.objects[0].shape.form();

@@ -7,12 +7,9 @@
 
 #[path = "common/mod.rs"]
 mod common;
-#[path = "../tests/common/shape_examples.rs"]
-mod shape_examples;
 
 use common::{Random, ball, in_turns, towards};
 use glam::DAffine3;
-use shape_examples::EXAMPLES;
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -25,6 +22,7 @@ use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo_render::pass::{self, PassContext};
 use zerkalo_render::wave::{Job, Wave};
+use zerkalo_scene::shape::EXAMPLES;
 use zerkalo_scene::{Document, Scene};
 use zerkalo_world::World;
 

@@ -14,7 +14,7 @@ use zerkalo_render::Options;
 use zerkalo_render::film::{Display, LinearImage, Thumbnail};
 use zerkalo_render::schedule::{Criterion, Settings, Stop};
 use zerkalo_render::session::{Session, Snapshot, View};
-use zerkalo_scene::{Scene, built_in};
+use zerkalo_scene::Scene;
 use zerkalo_world as world;
 
 const RASTER: [usize; 2] = [160, 90];
@@ -46,7 +46,8 @@ fn figures(size: [u32; 2]) {
     };
     let mut session = Session::new(threads, options, settings).unwrap();
     session.set_view(View { raster: Some(RASTER), probe: Some([9, 9]) });
-    let mut scene = built_in();
+    let text = include_str!("../scenes/mirror-room.toml");
+    let mut scene = Scene::parse(text, "mirror-room.toml").unwrap();
     scene.film.size = size;
     println!("{}x{}, {threads} threads, raster {}x{}", size[0], size[1], RASTER[0], RASTER[1]);
 
@@ -130,8 +131,8 @@ fn tasks(session: &Session, count: usize) -> Vec<Duration> {
         session.take();
         let (answer, result) = channel();
         let start = Instant::now();
-        session.submit(move |film| {
-            answer.send(film.map(|(_, report)| report.samples)).expect("the bench waits");
+        session.submit(move |picture| {
+            answer.send(picture.map(|p| p.report.samples)).expect("the bench waits");
         });
         assert!(result.recv().unwrap().is_some());
         start.elapsed()

@@ -27,8 +27,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
 use tunnel::Tunnel;
-use zerkalo_scene::BUILT_IN;
 use zerkalo_terminal::cells::Oklab;
+
+/// Text of `scenes/mirror-room.toml`.
+const MIRROR_ROOM: &str = include_str!("../../scenes/mirror-room.toml");
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
@@ -51,7 +53,7 @@ fn main() {
     let keys = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(KEYS);
     let part = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
     let folder = TempDir::new().unwrap();
-    fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
+    fs::write(folder.path().join("room.toml"), MIRROR_ROOM).unwrap();
     let has_tunnel = arguments.iter().any(|argument| argument == "--tunnel");
     println!(
         "{:50} {:>7} {:>7} {:>7} {:>5}  rate reported while and after the picture converges",

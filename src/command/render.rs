@@ -4,9 +4,10 @@ use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
-use crate::command::signals::Signals;
 use crate::command::stats::Stats;
-use crate::command::{Failure, print_line, read_scene, shard, warn, warn_of_precision};
+use crate::command::{
+    Failure, handle_signals, print_line, read_scene, shard, warn, warn_of_precision,
+};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,12 +21,12 @@ use zerkalo_render::{Checkpoint, Options, RegionRender};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, WriteError, check_writable};
 use zerkalo_scene::process_memory::resident_memory;
+use zerkalo_terminal::Signals;
 
-/// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
-/// of an 8-bit file.
+/// Default noise target: half a quantisation step of an 8-bit file.
 const DEFAULT_NOISE_CODES: f64 = 0.5;
 
-/// Interval at which signals and progress are polled during a render.
+/// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
@@ -38,7 +39,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let warnings = document.warnings().to_vec();
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
-    // An output file that cannot be written is reported before the render starts.
+    // Reported before the render starts.
     output.check_writable()?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
@@ -50,7 +51,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let division = args.memory.map(|cap| Division::new(&scene, args, cap)).transpose()?;
 
     let size = scene.film.size;
@@ -122,7 +123,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// Inputs of a render to a picture file: arguments, scene, output, signals.
+/// Inputs of a render to a picture file.
 struct Job<'a> {
     args: &'a RenderArgs,
     scene: Scene,
@@ -130,23 +131,20 @@ struct Job<'a> {
     output: &'a ImageOutput,
     provenance: Provenance,
     signals: Signals,
-    /// Time at which the program started.
     started: Instant,
 }
 
-/// Results of a render whose picture has been written, for the printed summary and `--stats`.
+/// Results of a render whose picture has been written.
 struct Rendered {
     report: Report,
     end: End,
     precision: &'static str,
-    /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
-    /// sentence states an upper bound of the light that the picture loses by this limit.
+    /// Upper bounds of the light that the picture loses by each limit of the scene, in sentences.
     biased: Vec<String>,
-    /// Time from the start of the program to the start of compiling the scene. It includes the time
-    /// of reading the scene file.
+    /// Time from the start of the program to the compilation of the scene.
     set_after: Duration,
     write_seconds: f64,
-    /// Path of the last checkpoint, or the error of writing it; `None` without `--checkpoint`.
+    /// Path of the last checkpoint, or the error of writing it.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -165,12 +163,12 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         CheckpointWriter::new(path, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // An error of writing the checkpoint is kept until the picture has been written.
+    // The picture is written first.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
+    let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
-        let written = state.write(report, &provenance, display, depth, &output);
+        let written = state.write(report, &provenance, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
     });
     let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;
@@ -179,7 +177,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }
 
-/// Renders a picture in regions of `rows` rows, and writes the rows as they finish.
+/// Renders a picture in regions of `rows` rows, written as they finish.
 fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let set_after = started.elapsed();
@@ -217,17 +215,15 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     }
 }
 
-/// Reason for the end of a render: a stop criterion or a signal.
+/// Reason for the end of a render.
 #[derive(Clone, Copy)]
 enum End {
-    /// A stop criterion of the render, such as a noise target, was reached.
     Done(StoppedBy),
-    /// A signal ended the render early. The value is the exit status of the program.
+    /// Signal with this exit status.
     Signal(u8),
 }
 
-/// Shows the progress of the render until it ends or a signal arrives. Returns the reason for the
-/// end.
+/// Shows the progress of the render until it ends.
 fn watch(
     session: &Session,
     signals: &Signals,
@@ -252,16 +248,15 @@ fn watch(
     end
 }
 
-/// Reads the checkpoint that `--resume` names. Returns `None` without this option, or if
-/// `--checkpoint` names the same file and the file does not exist yet.
+/// Reads the checkpoint of `--resume`. Returns `None` if `--checkpoint` names the same file and it
+/// does not exist yet.
 fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     let is_new = |path: &PathBuf| args.checkpoint.as_ref() == Some(path) && !path.exists();
     let path = args.resume.as_ref().filter(|path| !is_new(path));
     Ok(path.map(|path| Checkpoint::read(path)).transpose()?)
 }
 
-/// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
-/// of the checkpoint.
+/// Continues `checkpoint`. Prints a note if the lights differ.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
@@ -284,8 +279,7 @@ fn check_checkpoint_path(path: &Path, args: &RenderArgs) -> Result<(), Failure> 
     CheckpointWriter::check(path, args.resume.as_deref())
 }
 
-/// Returns `scene` with the acceleration structure and the size from the command line, if they are
-/// given.
+/// Returns `scene` with the settings of the command line.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;

@@ -1,21 +1,19 @@
 //! Texts derived from the command table: hint line, help and docs/keys.md.
 
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::commands::{COMMANDS, Command, Hint, HintLine};
+use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
+use crate::dashboard::{KeyContext, Model, Overlay};
 
-/// Line of the dashboard's help: a heading, or a command with its keys.
+/// Line of the help.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HelpLine {
-    /// Heading of a chapter of the help.
+    /// Heading of a chapter.
     Heading(&'static str),
-    /// Keys of a command with the contexts in which they work, and the label of the command.
+    /// Keys with the contexts in which they work, and the command's label.
     Keys(String, &'static str),
 }
 
-/// Returns the state of the dashboard that determines the key hints in the hint line. Returns
-/// `None` while an exported image covers the whole screen, because no hint line is visible then.
+/// Returns the state that selects the hints. Returns `None` under an exported image, which leaves
+/// no room for a hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
@@ -37,7 +35,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     })
 }
 
-/// Returns the hints for the state `line`, sorted by their positions in the hint line.
+/// Returns the hints for the state `line`, sorted by position.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     let mut hints: Vec<_> = COMMANDS
         .iter()
@@ -48,28 +46,25 @@ fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     hints
 }
 
-/// Returns the hints for the model's state, sorted by their positions in the hint line.
+/// Returns the hints for the model's state, sorted by position.
 pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Returns the lines of the help about all commands. If `watching` is `true`, commands that cannot
-/// run in `zerkalo watch` are omitted.
-pub fn help(watching: bool) -> Vec<HelpLine> {
-    let line = |command: &Command| {
-        let keys = match watching {
-            true => command.watch_keys(str::to_string),
-            false => command.all_keys(str::to_string),
-        };
-        HelpLine::Keys(if keys.is_empty() { ":".to_string() } else { keys }, command.label)
-    };
+/// Returns the lines of the help: all commands, or those that can run in `zerkalo watch`.
+pub fn help(model: &Model) -> Vec<HelpLine> {
     let mut lines = Vec::new();
-    for command in COMMANDS.iter().filter(|command| command.while_watching || !watching) {
+    for command in COMMANDS.iter().filter(|command| command.is_listed(model)) {
         let heading = HelpLine::Heading(command.chapter);
         if !lines.contains(&heading) {
             lines.push(heading);
         }
-        lines.push(line(command));
+        let keys = match model.watch {
+            Some(_) => command.watch_keys(str::to_string),
+            None => command.all_keys(str::to_string),
+        };
+        let keys = if keys.is_empty() { ":".to_string() } else { keys };
+        lines.push(HelpLine::Keys(keys, command.label));
     }
     lines
 }
@@ -104,13 +99,10 @@ mod tests {
 
     #[test]
     fn help_lists_every_command() {
-        let lines = help(false);
+        let lines = help(&Model::default());
         let rows = lines.iter().filter(|line| matches!(line, HelpLine::Keys(..))).count();
         assert_eq!(rows, COMMANDS.len());
         let chapters = COMMANDS.chunk_by(|a, b| a.chapter == b.chapter);
         assert_eq!(lines.len() - rows, chapters.count(), "the commands of a chapter are together");
-        let watching = help(true);
-        assert!(watching.len() < lines.len() / 2, "{watching:?}");
-        assert!(watching.contains(&HelpLine::Keys("q Ctrl-c".into(), "quit")), "{watching:?}");
     }
 }

@@ -1,8 +1,18 @@
-//! Simulated reports of the renderer for tests.
+//! Scenes and simulated reports of the renderer for tests.
 
 use zerkalo_render::film::{Mse, Noise};
 use zerkalo_render::schedule::Spp;
 use zerkalo_render::session::{QUALITIES, Report, State};
+use zerkalo_scene::Scene;
+
+/// Text of the scene that `zerkalo new` writes.
+pub const STARTER: &str = include_str!("../command/starter.toml");
+
+/// Returns the scene `scenes/mirror-room.toml`.
+pub fn mirror_room() -> Scene {
+    let text = include_str!("../../scenes/mirror-room.toml");
+    Scene::parse(text, "mirror-room.toml").unwrap_or_else(|e| panic!("{e}"))
+}
 
 /// Creates a report of the renderer after `spp` samples in each of ten thousand pixels.
 /// `generation` is the number of the scene's version, and `noise_levels` the estimated noise in

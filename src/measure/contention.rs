@@ -6,14 +6,12 @@ use std::collections::HashMap;
 use std::fs;
 use std::time::Duration;
 
-/// Run-queue delay of each thread of this program since the start of the thread. The keys are the
-/// system's thread ids.
+/// Run-queue delay of each thread, by its system's id, since its start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunQueueDelay(HashMap<String, Duration>);
 
 impl RunQueueDelay {
-    /// Reads the delays of all threads until now. Returns `None` on systems that do not report
-    /// them.
+    /// Reads the delays of all threads. Returns `None` on systems that do not report them.
     pub fn now() -> Option<Self> {
         let mut all = HashMap::new();
         for task in fs::read_dir("/proc/self/task").ok()?.flatten() {
@@ -24,8 +22,7 @@ impl RunQueueDelay {
         (!all.is_empty()).then_some(Self(all))
     }
 
-    /// Returns the seconds that all threads together have waited between the times at which
-    /// `before` and `self` were read.
+    /// Returns the seconds that all threads together have waited since `before`.
     pub fn seconds_since(&self, before: &Self) -> f64 {
         let since = |(thread, now): (&String, &Duration)| {
             now.saturating_sub(before.0.get(thread).copied().unwrap_or_default())
@@ -34,9 +31,7 @@ impl RunQueueDelay {
     }
 }
 
-/// Parses the delay of a thread from the text of its file `schedstat`. The delay is the second of
-/// three numbers: nanoseconds run, nanoseconds waited, number of times scheduled. Returns `None` if
-/// this number is missing.
+/// Parses a file `schedstat`: nanoseconds run, nanoseconds waited, number of times scheduled.
 fn parse_delay(schedstat: &str) -> Option<Duration> {
     schedstat.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)
 }

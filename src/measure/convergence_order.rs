@@ -1,19 +1,17 @@
-//! Order of convergence of a render: the slope of log error against log samples.
+//! Order of convergence: the slope of log error against log samples.
 
-/// Slope of a least-squares line through points (samples, error) in log-log coordinates, with its
-/// standard error.
+/// Slope of a least-squares line in log-log coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
-    /// Value of the slope, d log(error) / d log(samples): -0.5 for independent random samples.
+    /// d log(error) / d log(samples): -0.5 for independent random samples.
     pub value: f64,
-    /// Standard error of the slope, from the residuals of the fitted line.
+    /// Standard error, from the residuals of the line.
     pub standard_error: f64,
 }
 
 impl Slope {
-    /// Fits a line to the logarithms of `points`, pairs (samples, error). Points with a number that
-    /// is not positive are ignored. Returns `None` if fewer than three points remain or all have
-    /// the same number of samples.
+    /// Fits a line to pairs (samples, error) that are positive. Returns `None` for fewer than
+    /// three, or if all have the same number of samples.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()

@@ -1,5 +1,5 @@
-//! Error curve: the error of a render at increasing numbers of samples, until it reaches the target
-//! noise. Each variant of the render settings has its own curve.
+//! Error curve: the error of a variant at increasing numbers of samples, until it reaches the
+//! target noise.
 
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
@@ -7,46 +7,43 @@ use crate::measure::reference_image::{Errors, Reference};
 use std::io;
 use zerkalo_render::SyncRender;
 
-/// Point of an error curve: the error of a render after some samples, against a reference picture.
+/// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Number of steps of the render before this point of the curve. A step is one call of the
-    /// render's `step`.
+    /// Number of calls of [`SyncRender::step`] before this point.
     pub step: usize,
-    /// Number of samples of the picture at this point, summed over all pixels.
+    /// Number of samples, over all pixels.
     pub samples: u64,
-    /// Mean number of samples per pixel at this point of the curve.
+    /// Mean number of samples per pixel.
     pub spp: f64,
-    /// Seconds of tracing until this point, one number for each repetition of the render.
+    /// Seconds of tracing in each repetition.
     pub seconds: Vec<f64>,
-    /// Error that the render estimates without a reference, from the difference between the two
-    /// halves of its samples, in 8-bit levels. `None` before the first estimate.
+    /// Error in 8-bit levels that the render estimates from its replicates. `None` before the first
+    /// estimate.
     pub estimated_levels: Option<f64>,
-    /// Errors of the picture at this point against the reference picture.
+    /// Errors against the reference picture.
     pub errors: Errors,
 }
 
-/// Conditions that end an error curve: a target error or a time limit, whichever is reached first.
+/// Target error and time limit of an error curve.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Error at which the curve ends, in 8-bit levels.
+    /// Target error in 8-bit levels.
     pub levels: f64,
-    /// Seconds of tracing after which the curve ends in any case.
+    /// Time limit in seconds of tracing.
     pub seconds: f64,
-    /// `true` if `levels` is compared with the estimated error instead of the true one. This is for
-    /// renders with biased settings, whose true error does not converge to 0.
+    /// `true` if the estimated error is compared with the target: the true error of biased settings
+    /// does not converge to 0.
     pub use_estimate: bool,
 }
 
-/// Ratio of the estimated errors at consecutive points of the curve. The next point is recorded
-/// when the render's own estimate of its error has fallen to this share of the estimate at the
-/// latest point. The number is about 2^(-1/4): the curve has four points while the error halves.
+/// Share to which the estimated error falls from one point to the next, about 2^(-1/4): four points
+/// while the error halves.
 const POINT_RATIO: f64 = 0.84;
 
 /// Returns the share of the processors' time that other programs used while `threads` threads ran
-/// for `seconds`. `before` has the run-queue delays at the start of this time. Returns `None` if
-/// the share is unknown. It is unknown if there are more threads than processors, because these
-/// threads then wait for each other.
+/// for `seconds` since `before`. Returns `None` if it is unknown, as with more threads than
+/// processors, which wait for each other.
 fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;

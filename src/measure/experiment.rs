@@ -14,34 +14,29 @@ use zerkalo_world::{self as world, AnyWorld, Precision};
 /// Setting of the renderer that an experiment varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Experiment {
-    /// Experiment without a change: a render with the default settings.
     Default,
-    /// Experiment with adaptive sampling against uniform sampling.
+    /// Adaptive or uniform sampling.
     Adaptivity,
-    /// Experiment with single precision against double precision.
+    /// Single or double precision.
     Precision,
-    /// Experiment with different numbers of threads.
     Threads,
-    /// Experiment with Sobol points against independent random numbers.
+    /// Sobol points or independent random numbers.
     Sampler,
-    /// Experiment with the cone lobe of glossy reflection against its cheap approximation, the
-    /// square lobe.
+    /// Cone lobe of glossy reflection, or the square lobe, its cheap approximation.
     Lobe,
-    /// Experiment with fewer types of rays: only camera rays, or camera and shadow rays.
+    /// Only camera rays, or camera and shadow rays.
     Level,
-    /// Experiment with different limits of the number of reflections of a path.
+    /// Largest number of reflections of a path.
     Depth,
-    /// Experiment with different throughputs below which a path ends.
+    /// Throughput below which a path ends.
     MinWeight,
-    /// Experiment with different limits of the number of samples per pixel in tiles with glossy
-    /// lobes.
+    /// Largest number of samples per pixel in glossy tiles.
     RaysPerPixel,
-    /// Experiment with different acceleration structures.
     Acceleration,
 }
 
 impl Experiment {
-    /// All experiments, each with its name on the command line and its title.
+    /// All experiments, each with its name on the command line and its title in tables and plots.
     pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (Self::Default, "default", "Default settings"),
         (Self::Adaptivity, "adaptivity", "Adaptive against uniform sampling"),
@@ -56,25 +51,21 @@ impl Experiment {
         (Self::Acceleration, "acceleration", "Acceleration structures"),
     ];
 
-    /// Returns the experiment's name on the command line.
     pub fn name(self) -> &'static str {
         self.words()[0]
     }
 
-    /// Returns the experiment's title in tables and plots.
     pub fn title(self) -> &'static str {
         self.words()[1]
     }
 
-    /// Returns the name and the title, from [`Self::ALL`].
     fn words(self) -> [&'static str; 2] {
         let found = Self::ALL.iter().find(|(experiment, ..)| *experiment == self);
         found.map_or([""; 2], |(_, name, title)| [name, title])
     }
 
-    /// Returns the name that tables give to the default value of the varied setting, such as
-    /// `adaptive, default`. `single` is `true` if the default is single precision; `threads` is the
-    /// default number of threads.
+    /// Returns the name of the setting's default in tables, such as `adaptive, default`. `single`
+    /// is `true` for single precision; `threads` is the default number of threads.
     pub fn default_name(self, single: bool, threads: usize) -> String {
         let name = match self {
             Self::Adaptivity => "adaptive".to_string(),
@@ -87,8 +78,7 @@ impl Experiment {
         format!("{name}, default")
     }
 
-    /// Returns `true` if the pictures of all variants of the experiment have the same expectation,
-    /// so that they differ in noise only. A variant is a render with one setting changed.
+    /// Returns `true` if the pictures of all variants differ in noise only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -106,13 +96,6 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // The names that earlier versions of the program used are accepted, too.
-        let text = match text {
-            "level" => "ray-types",
-            "depth" => "max-depth",
-            "min-weight" => "min-throughput",
-            current => current,
-        };
         let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
         found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
             let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
@@ -121,58 +104,45 @@ impl FromStr for Experiment {
     }
 }
 
-/// Scene and settings of one render of an experiment.
+/// One render of an experiment.
 #[derive(Clone)]
 pub struct Variant {
-    /// Experiment, that is, the setting that differs from the default.
     pub experiment: Experiment,
-    /// Name of the value of the varied setting, such as `uniform` or `depth 4`.
+    /// Value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
-    /// Scene with the settings of this variant.
     pub scene: Arc<Scene>,
-    /// Options of scene compilation and of sampling.
     pub options: Options,
-    /// `true` if the samples of the render are allocated adaptively.
     pub adaptive: bool,
-    /// Number of threads that trace rays.
     pub threads: usize,
 }
 
 impl Variant {
-    /// Creates a render of this variant. It ends by itself only when every tile has reached its
-    /// largest number of samples.
-    ///
-    /// # Errors
-    /// Returns the error of the system if a thread cannot be started.
+    /// Creates a render of this variant, which ends by itself only when every tile is full. Returns
+    /// the error of the system if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
 }
 
-/// Plan of a measurement (not of a render): experiments, noise targets, duration.
+/// Plan of a measurement.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Noise targets in 8-bit levels, descending.
     pub targets: Vec<f64>,
-    /// Experiments to run; each changes one setting of the render.
     pub experiments: Vec<Experiment>,
-    /// Smallest number of timed renders of each variant (the default settings, or one changed
-    /// setting).
+    /// Smallest number of timed renders of each variant.
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
     /// Number of tracing threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Random seed of the measured renders.
     pub seed: u64,
-    /// Exposure and tone curve of the picture whose displayed error is measured.
     pub display: Display,
 }
 
 impl Plan {
-    /// Returns the variants to measure: the default settings, followed by the changed settings of
-    /// each experiment. Settings that are equal to the default in this scene are left out.
+    /// Returns the default settings, then the changed settings of each experiment that differ from
+    /// the default in this scene.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let mut all = vec![self.default_of(scene)];
         for experiment in &self.experiments {
@@ -181,7 +151,6 @@ impl Plan {
         all
     }
 
-    /// Returns the variant of `scene` in which no setting is changed.
     pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
         Variant {
             experiment: Experiment::Default,
@@ -216,8 +185,7 @@ impl Plan {
             Experiment::Default => Vec::new(),
             Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
             Experiment::Precision => {
-                // The variant has the precision that the setting `auto` does not choose for this
-                // scene.
+                // The precision that `auto` does not choose for this scene.
                 let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
                     AnyWorld::Single(_) => ("double", Precision::Double),
                     AnyWorld::Double(_) => ("single", Precision::Single),
@@ -227,8 +195,6 @@ impl Plan {
                 vec![variant]
             }
             Experiment::Threads => {
-                // The counts are the powers of two below `self.threads`. This number itself is the
-                // default, which has its own variant.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let variant = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
@@ -290,7 +256,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use zerkalo_scene::built_in;
+    use zerkalo_scene::Scene;
 
     fn names(experiment: Experiment, threads: usize) -> Vec<String> {
         let plan = Plan {
@@ -302,7 +268,8 @@ mod tests {
             seed: 0,
             display: Display::default(),
         };
-        let all = plan.variants(&Arc::new(built_in()));
+        let text = include_str!("../../scenes/mirror-room.toml");
+        let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
         assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }

@@ -6,6 +6,8 @@
 //! machine affects all of them alike. Repetitions in which other programs used the processors are
 //! left out.
 
+#![allow(missing_docs, reason = "fields and functions whose names say it")]
+
 mod contention;
 mod convergence_order;
 mod error_curve;

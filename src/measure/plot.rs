@@ -18,13 +18,7 @@ const FONT: &[u8] = include_bytes!("font/light.ttf");
 const PANEL: (i32, i32) = (440, 374);
 /// Height of the heading above all panels, in pixels.
 const HEAD: i32 = 64;
-
-/// Margins between the edges of a panel and its coordinate area, in pixels: left, right, top,
-/// bottom.
-const FRAME: [i32; 4] = [58, 22, 96, 50];
-
-/// Factor by which each axis of the plot extends beyond the smallest and the largest number shown
-/// on it.
+/// Factor by which each axis extends beyond the smallest and the largest number shown on it.
 const MARGIN: f64 = 1.15;
 
 /// Colours of curves, distinguishable with any colour vision (Okabe and Ito 2008).
@@ -41,16 +35,7 @@ const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(226, 226, 226);
 const TARGET: RGBColor = RGBColor(150, 150, 150);
 
-/// Error curve of a render with one variant of the settings, in a panel of the plot.
-struct Line<'a> {
-    name: &'a str,
-    color: RGBColor,
-    /// Points of the curve (seconds, RMSE in 8-bit levels).
-    points: Vec<(f64, f64)>,
-}
-
 type Drawn = Result<(), Box<dyn Error>>;
-type Canvas<B> = DrawingArea<B, Shift>;
 
 /// Returns the width and height of the plot of a measurement, in pixels.
 pub fn size(measurement: &Measurement) -> (u32, u32) {
@@ -59,20 +44,14 @@ pub fn size(measurement: &Measurement) -> (u32, u32) {
 }
 
 /// Draws the plot of error against time as SVG.
-///
-/// # Errors
-/// Returns the error of the drawing library.
 pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
     draw(SVGBackend::with_string(&mut text, size(measurement)), measurement, title)?;
     Ok(text)
 }
 
-/// Draws the plot of error against time as an RGB image of 8 bits per channel, row by row. Its
-/// width and height are those of [`size`].
-///
-/// # Errors
-/// Returns the error of the drawing library.
+/// Draws the plot of error against time as an RGB image of 8 bits per channel and of [`size`], row
+/// by row.
 pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn Error>> {
     let (width, height) = size(measurement);
     let mut bytes = vec![0; width as usize * height as usize * 3];
@@ -80,8 +59,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
     Ok(bytes)
 }
 
-/// Returns the panels of the plot, each as an experiment and its variants. Every panel shows the
-/// default settings, too. They have a panel of their own only if there are no experiments.
+/// Returns the experiments with their variants, each of which has a panel that also shows the
+/// default settings. They have a panel of their own only if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
@@ -116,49 +95,32 @@ fn points(measured: &Measured) -> Vec<(f64, f64)> {
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// Logarithmic axis of a plot, which maps numbers to pixel coordinates.
-struct Axis {
-    numbers: Range<f64>,
-    pixels: (i32, i32),
+/// Returns the range of an axis that shows `values`.
+fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
+    if low.is_finite() { low / MARGIN..high * MARGIN } else { 0.1..10.0 }
 }
 
-impl Axis {
-    fn new(values: impl Iterator<Item = f64>, pixels: (i32, i32)) -> Self {
-        let (low, high) = values.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
-        let numbers = if low.is_finite() { low / MARGIN..high * MARGIN } else { 0.1..10.0 };
-        Self { numbers, pixels }
-    }
-
-    fn at(&self, value: f64) -> i32 {
-        let share =
-            (value / self.numbers.start).ln() / (self.numbers.end / self.numbers.start).ln();
-        self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
-    }
-
-    /// Returns the tick marks of the axis: round numbers in its range, each with its label. The
-    /// numbers are 1, 2 and 5 times each power of ten. If more than nine of these are in the range,
-    /// only the powers of ten are returned.
-    fn ticks(&self) -> Vec<(f64, String)> {
-        let Range { start, end } = self.numbers;
-        let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;
-        let multiples = |steps: &'static [u32]| {
-            powers.clone().flat_map(move |k| steps.iter().map(move |m| (*m, k)))
-        };
-        let number = |(m, k): (u32, i32)| f64::from(m) * 10f64.powi(k);
-        let inside = |tick: &(u32, i32)| (start..=end).contains(&number(*tick));
-        let label = |tick: (u32, i32)| {
-            (number(tick), format!("{:.*}", (-tick.1).max(0) as usize, number(tick)))
-        };
-        let mut ticks: Vec<_> = multiples(&[1, 2, 5]).filter(inside).collect();
-        if ticks.len() > 9 {
-            ticks = multiples(&[1]).filter(inside).collect();
-        }
-        ticks.into_iter().map(label).collect()
-    }
+/// Returns the tick marks of a logarithmic axis: 1, 2 and 5 times each power of ten, or only the
+/// powers of ten if there are more than nine of these. The axes of `plotters` have none between two
+/// powers of ten.
+fn ticks(range: &Range<f64>) -> Vec<f64> {
+    let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
+    let multiples = |steps: &[f64]| -> Vec<f64> {
+        let ticks = powers.clone().flat_map(|k| steps.iter().map(move |m| m * 10f64.powi(k)));
+        ticks.filter(|tick| range.contains(tick)).collect()
+    };
+    let ticks = multiples(&[1.0, 2.0, 5.0]);
+    if ticks.len() > 9 { multiples(&[1.0]) } else { ticks }
 }
 
-fn text<'a>(size: u32, color: RGBColor, h: HPos, v: VPos) -> TextStyle<'a> {
-    ("sans-serif", size).into_font().color(&color).pos(Pos::new(h, v))
+/// Formats a tick mark without the digits of its rounding error.
+fn label(tick: &f64) -> String {
+    format!("{tick:.*}", (-tick.log10().floor()).max(0.0) as usize)
+}
+
+fn text<'a>(size: u32, color: RGBColor) -> TextStyle<'a> {
+    ("sans-serif", size).into_font().color(&color)
 }
 
 fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -> Drawn
@@ -169,113 +131,80 @@ where
     let _ = register_font("sans-serif", FontStyle::Normal, FONT);
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;
-    root.draw_text(title, &text(20, INK, HPos::Left, VPos::Top), (24, 14))?;
+    let (head, body) = root.split_vertically(HEAD);
+    head.draw_text(title, &text(20, INK), (24, 14))?;
     let words = "Error against time: lower and further left is better";
-    root.draw_text(words, &text(14, DEFAULT, HPos::Left, VPos::Top), (24, 40))?;
+    head.draw_text(words, &text(14, DEFAULT), (24, 40))?;
     let panels = panels(measurement);
-    let (cols, _) = grid(panels.len());
-    for (i, (experiment, variants)) in (0..).zip(&panels) {
-        let corner = (i % cols * PANEL.0, HEAD + i / cols * PANEL.1);
-        panel(&root, corner, measurement, *experiment, variants)?;
+    let (cols, rows) = grid(panels.len());
+    let areas = body.split_evenly((rows as usize, cols as usize));
+    for (area, (experiment, variants)) in areas.iter().zip(&panels) {
+        panel(area, measurement, *experiment, variants)?;
     }
     root.present()?;
     Ok(())
 }
 
-/// Draws the plot panel of one experiment: the curves of the default settings and of `variants`.
-/// `corner` is the upper left corner of the panel.
-fn panel<'a, B: DrawingBackend>(
-    root: &Canvas<B>,
-    corner: (i32, i32),
-    measurement: &'a Measurement,
+/// Draws the panel of one experiment: the curves of the default settings and of `variants`.
+fn panel<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    measurement: &Measurement,
     experiment: Experiment,
-    variants: &[&'a Measured],
+    variants: &[&Measured],
 ) -> Drawn
 where
     B::ErrorType: 'static,
 {
-    let [left, right, top, bottom] = FRAME;
-    let (x0, x1) = (corner.0 + left, corner.0 + PANEL.0 - right);
-    let (y0, y1) = (corner.1 + PANEL.1 - bottom, corner.1 + top);
-    let colors = std::iter::once(&DEFAULT).chain(COLORS.iter().cycle());
     let all = measurement.measured.first().into_iter().chain(variants.iter().copied());
-    let line = |(measured, color): (&'a Measured, &RGBColor)| Line {
-        name: &measured.name,
-        color: *color,
-        points: points(measured),
-    };
-    let lines: Vec<Line> = all.zip(colors).map(line).collect();
-    let numbers = || lines.iter().flat_map(|line| line.points.iter().copied());
-    let seconds = Axis::new(numbers().map(|p| p.0), (x0, x1));
-    let levels = Axis::new(numbers().map(|p| p.1), (y0, y1));
-
-    let heading = text(15, INK, HPos::Left, VPos::Top);
-    root.draw_text(experiment.title(), &heading, (x0 - 34, corner.1 + 8))?;
-    legend(root, (x0 - 34, corner.1 + 38), x1, &lines)?;
-    let path = |from, to, color: &RGBColor| PathElement::new([from, to], color.stroke_width(1));
-    for (tick, label) in seconds.ticks() {
-        let x = seconds.at(tick);
-        root.draw(&path((x, y0), (x, y1), &GRID))?;
-        root.draw_text(&label, &text(13, INK, HPos::Center, VPos::Top), (x, y0 + 6))?;
-    }
-    for (tick, label) in levels.ticks() {
-        let y = levels.at(tick);
-        root.draw(&path((x0, y), (x1, y), &GRID))?;
-        root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
-    }
-    // Curves fall from the upper left, so there is room below them for the labels of targets at the
-    // left edge.
-    let small = text(12, TARGET, HPos::Left, VPos::Bottom);
-    for target in measurement.targets.iter().filter(|t| levels.numbers.contains(t)) {
-        let y = levels.at(*target);
-        for x in (x0..x1).step_by(8) {
-            root.draw(&path((x, y), ((x + 4).min(x1), y), &TARGET))?;
-        }
+    let curves: Vec<(&str, Vec<(f64, f64)>)> =
+        all.map(|measured| (measured.name.as_str(), points(measured))).collect();
+    let numbers = || curves.iter().flat_map(|(_, points)| points);
+    let (seconds, levels) = (range(numbers().map(|p| p.0)), range(numbers().map(|p| p.1)));
+    let mut chart = ChartBuilder::on(area)
+        .caption(experiment.title(), text(15, INK))
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(52)
+        .build_cartesian_2d(
+            seconds.clone().log_scale().with_key_points(ticks(&seconds)),
+            levels.clone().log_scale().with_key_points(ticks(&levels)),
+        )?;
+    chart
+        .configure_mesh()
+        .bold_line_style(GRID)
+        .axis_style(INK)
+        .label_style(text(13, INK))
+        .axis_desc_style(text(13, DEFAULT))
+        .x_desc("seconds of tracing")
+        .y_desc("RMSE as displayed, 8-bit levels")
+        .x_label_formatter(&label)
+        .y_label_formatter(&label)
+        .draw()?;
+    for target in measurement.targets.iter().filter(|target| levels.contains(target)) {
+        let line = [(seconds.start, *target), (seconds.end, *target)];
+        chart.draw_series(DashedLineSeries::new(line, 4, 4, TARGET.into()))?;
         let unit = if *target == 1.0 { "level" } else { "levels" };
-        root.draw_text(&format!("{target} {unit}"), &small, (x0 + 4, y - 2))?;
+        // Curves fall from the upper left, so there is room below them at the left edge.
+        let small = text(12, TARGET).pos(Pos::new(HPos::Left, VPos::Bottom));
+        let name = Text::new(format!(" {target} {unit}"), line[0], small);
+        chart.draw_series(std::iter::once(name))?;
     }
-    root.draw(&path((x0, y0), (x1, y0), &INK))?;
-    root.draw(&path((x0, y0), (x0, y1), &INK))?;
-    let axis = text(13, DEFAULT, HPos::Right, VPos::Top);
-    root.draw_text("seconds of tracing", &axis, (x1, y0 + 26))?;
-    let axis = text(13, DEFAULT, HPos::Left, VPos::Top);
-    root.draw_text("RMSE as displayed, 8-bit levels", &axis, (x0 - 34, y1 - 26))?;
-    for Line { color, points, .. } in &lines {
-        let vertices: Vec<(i32, i32)> =
-            points.iter().map(|(s, e)| (seconds.at(*s), levels.at(*e))).collect();
-        let width = if *color == DEFAULT { 4 } else { 2 };
-        root.draw(&PathElement::new(vertices.clone(), color.stroke_width(width)))?;
-        for point in vertices {
-            root.draw(&Circle::new(point, 3, color.filled()))?;
-        }
+    let colors = std::iter::once(&DEFAULT).chain(COLORS.iter().cycle());
+    for ((name, points), color) in curves.into_iter().zip(colors) {
+        let style = color.stroke_width(if *color == DEFAULT { 4 } else { 2 });
+        let dots = points.clone().into_iter().map(|point| Circle::new(point, 3, color.filled()));
+        chart.draw_series(dots)?;
+        chart
+            .draw_series(LineSeries::new(points, style))?
+            .label(name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
     }
-    Ok(())
-}
-
-/// Draws the legend of a plot panel: a line in the colour of each curve, followed by the name of
-/// the curve. The first row starts at `corner`. Rows are wrapped at the x coordinate `end`.
-fn legend<B: DrawingBackend>(
-    root: &Canvas<B>,
-    corner: (i32, i32),
-    end: i32,
-    lines: &[Line],
-) -> Drawn
-where
-    B::ErrorType: 'static,
-{
-    const SWATCH: i32 = 18;
-    let style = text(13, INK, HPos::Left, VPos::Center);
-    let (mut x, mut y) = corner;
-    for Line { name, color, .. } in lines {
-        let width = SWATCH + 5 + root.estimate_text_size(name, &style)?.0 as i32;
-        if x + width > end && x > corner.0 {
-            (x, y) = (corner.0, y + 17);
-        }
-        let stroke = color.stroke_width(if *color == DEFAULT { 4 } else { 2 });
-        root.draw(&PathElement::new([(x, y), (x + SWATCH, y)], stroke))?;
-        root.draw_text(name, &style, (x + SWATCH + 5, y))?;
-        x += width + 14;
-    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperRight)
+        .background_style(WHITE.mix(0.8))
+        .label_font(text(13, INK))
+        .draw()?;
     Ok(())
 }
 
@@ -285,20 +214,11 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_at_most_nine() {
-        let labels = |numbers| {
-            let axis = Axis { numbers, pixels: (0, 100) };
-            axis.ticks().into_iter().map(|(_, label)| label).collect::<Vec<_>>()
-        };
+        let labels = |range| ticks(&range).iter().map(label).collect::<Vec<_>>();
         assert_eq!(labels(0.13..2.4), ["0.2", "0.5", "1", "2"]);
         assert_eq!(labels(0.001..2e4).first().unwrap(), "0.001");
         assert_eq!(labels(0.001..2e4).last().unwrap(), "10000");
         assert!(labels(0.001..2e4).len() <= 9);
-    }
-
-    #[test]
-    fn axis_maps_logarithms_evenly() {
-        let axis = Axis { numbers: 0.01..100.0, pixels: (100, 500) };
-        assert_eq!([0.01, 1.0, 10.0, 100.0].map(|v| axis.at(v)), [100, 300, 400, 500]);
     }
 
     #[test]

@@ -2,9 +2,8 @@
 
 use zerkalo_render::film::{Display, Film, LightWeights, Replicates};
 
-/// Number that is added to the squared reference value in the denominator of the relative error, so
-/// that the error stays bounded at dark pixels. The relative error is relMSE = mean((x - r)^2 /
-/// (r^2 + 0.01)), with x the value of a pixel in a picture and r its value in the reference.
+/// Number that keeps the relative error of dark pixels bounded: relMSE = mean((x - r)^2 / (r^2 +
+/// 0.01)), with x a value in the picture and r in the reference.
 const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Reference picture, with an estimate of its own error.
@@ -12,18 +11,16 @@ pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     levels: Vec<[f64; 3]>,
-    /// Half the difference between the reference's two replicates (halves of its samples) in each
-    /// pixel, in 8-bit levels. Its root mean square is an estimate of the error of the reference.
-    /// Empty if the reference counts as exact.
+    /// Half the difference between the replicates in each pixel, in 8-bit levels. Empty if the
+    /// reference counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
-    /// Variance of the reference's mean brightness, which is the mean over all its pixels and
-    /// channels.
+    /// Variance of the mean over all pixels and channels.
     mean_variance: f64,
     display: Display,
 }
 
-/// Mean squared errors of a picture over its pixels and channels.
+/// Mean squared errors over pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
@@ -31,42 +28,36 @@ struct Squares {
     relative: f64,
 }
 
-/// Errors of a picture against a reference picture.
+/// Errors of a picture against a reference, over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Root mean square error (RMSE) over pixels and channels, in linear radiance.
+    /// RMSE in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error over the pixels and channels of the displayed picture, in unrounded
-    /// 8-bit levels.
+    /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels,
-    /// with x the value of a pixel in the picture and r its value in the reference.
+    /// Relative mean squared error, see [`RELATIVE_FLOOR`].
     pub rel_mse: f64,
-    /// Relative uncertainty of `rmse_levels`, from 0 to 1, because of the error of the reference. It
-    /// is the standard deviation of `rmse_levels` over different references as noisy as this one,
-    /// divided by `rmse_levels`.
+    /// Relative uncertainty of `rmse_levels`, 0..=1: its standard deviation over references as
+    /// noisy as this one.
     pub spread: f64,
 }
 
-/// Bias of a picture: the difference between its expectation and that of the reference picture.
+/// Difference between the expectation of a picture and that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
-    /// Difference between the mean brightness of the picture and that of the reference, divided by
-    /// the standard error of this difference.
+    /// Difference between the mean brightnesses, divided by its standard error.
     pub z: f64,
-    /// Root mean square of the differences between the pixels of the picture and those of the
-    /// reference, in 8-bit levels. The mean square that the noise of both pictures causes is
-    /// subtracted before the root is taken.
+    /// Root mean square of the differences between the pixels, less that of the noise of both
+    /// pictures, in 8-bit levels.
     pub levels: f64,
-    /// Smallest value of [`Self::levels`] that is significant, in 8-bit levels: its square is two
-    /// standard errors of the mean squared difference.
+    /// Smallest significant value of [`Self::levels`]: its square is two standard errors of the
+    /// mean squared difference.
     pub least_levels: f64,
 }
 
 impl Bias {
-    /// Returns `true` if the picture differs from the reference by more than noise can explain: in
-    /// the mean brightness by more than four standard errors, or in the pixels by more than
-    /// [`Self::least_levels`].
+    /// Returns `true` if the pictures differ by more than noise can explain: in the mean brightness
+    /// by more than four standard errors, or in the pixels by more than [`Self::least_levels`].
     pub fn is_seen(&self) -> bool {
         self.levels > self.least_levels || self.z.abs() > 4.0
     }
@@ -102,8 +93,6 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
     (own, mean_variance / (values * values))
 }
 
-/// Returns the pixels of replicate A and those of replicate B (halves of the samples) of `film`,
-/// both row by row.
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
     [Replicates::A, Replicates::B].map(|replicates| {
         let mut all = Vec::with_capacity(film.width() * film.height());
@@ -117,16 +106,14 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 }
 
 impl Reference {
-    /// Creates a reference from the picture of `film`. The film's two replicates (halves of the
-    /// samples) must hold equal numbers of samples; the error of the reference itself is estimated
-    /// from their difference.
+    /// Creates a reference from the picture of `film`, whose replicates must hold equal numbers of
+    /// samples.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
     }
 
-    /// Creates a reference from the mean of two independent pictures `a` and `b`, whose pixels are
-    /// stored row by row.
+    /// Creates a reference from the mean of two independent pictures, row by row.
     pub fn of_replicates(
         size: [usize; 2],
         a: &[[f64; 3]],
@@ -140,7 +127,6 @@ impl Reference {
         Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
     }
 
-    /// Creates a reference from a picture that is taken as exact.
     pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         Self::new(size, pixels, Squares::default(), 0.0, *display)
     }
@@ -156,25 +142,23 @@ impl Reference {
         Self { size, pixels, levels, halves: Vec::new(), own, mean_variance, display }
     }
 
-    /// Returns the noise of the reference picture in 8-bit levels: its estimated root mean square
-    /// error against the exact picture, over all pixels and channels.
+    /// Returns the RMSE of the reference itself, estimated from its replicates, in 8-bit levels.
     pub fn noise_levels(&self) -> f64 {
         self.own.levels.sqrt()
     }
 
-    /// Returns the noise of the reference picture in linear radiance: its estimated root mean square
-    /// error against the exact picture, over all pixels and channels.
+    /// Returns the RMSE of the reference itself in linear radiance.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }
 
-    /// Returns the errors of the picture of `film`. They are computed from its mean squared
-    /// differences from the reference, minus the mean squared error of the reference itself.
+    /// Returns the errors of `film`: its mean squared differences, less the mean squared error of
+    /// the reference.
     pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
         self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
     }
 
-    /// Returns the errors of a picture. `fill(y, row)` writes row `y` of the picture to `row`.
+    /// Returns the errors of a picture whose rows `fill(y, row)` writes.
     fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
         let mut sum = Squares::default();
         let mut crossed = 0.0;
@@ -197,9 +181,8 @@ impl Reference {
         let values = (3 * self.pixels.len()) as f64;
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
         let levels = remaining(sum.levels, self.own.levels);
-        // The standard error of the sum of squares is twice `crossed.sqrt()`. The relative error of
-        // the RMSE, the root of the mean square, is half the relative error of the sum. The two
-        // factors cancel.
+        // The standard error of the sum of squares is twice `crossed.sqrt()`; the relative error of
+        // its root is half of that of the sum.
         let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
@@ -209,8 +192,6 @@ impl Reference {
         }
     }
 
-    /// Returns the bias of `film`: the difference between its expectation and that of the
-    /// reference.
     pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);
@@ -240,8 +221,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns half the difference between two colours as displayed, in 8-bit levels. `a` and `b` are
-/// the linear colours of the same pixel in two independent pictures.
+/// Returns half the difference between two displayed colours, in 8-bit levels.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.levels(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
@@ -263,8 +243,8 @@ mod tests {
         (0..count).map(pixel).collect()
     }
 
-    /// Checks the estimated error of a reference. Its two replicates (halves of the samples) have
-    /// noise of standard deviation s, so that their mean has the error s / sqrt 2.
+    /// Checks the estimated error of a reference. Its two replicates have noise of standard
+    /// deviation s, so that their mean has the error s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);

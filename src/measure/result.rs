@@ -1,4 +1,4 @@
-//! Results of a measurement of render times and errors.
+//! Results of a measurement.
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
@@ -6,124 +6,113 @@ use crate::measure::experiment::Experiment;
 use crate::measure::reference_image::Bias;
 use serde::Serialize;
 
-/// Time at which a render reached a noise target. The names of the fields are also the keys of JSON
-/// files.
+/// Time at which a render reached a noise target. The fields are keys of JSON files.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeToTarget {
-    /// Noise target: RMSE of the displayed picture in 8-bit levels.
+    /// Noise target in 8-bit levels.
     pub levels: f64,
-    /// Seconds of tracing until the noise target: the median over the repetitions of the render.
+    /// Median seconds of tracing over the repetitions.
     pub seconds: f64,
-    /// Relative spread of the seconds over the repetitions of the render, see [`spread`].
+    /// Value of [`spread`] over the repetitions.
     pub spread: f64,
-    /// Mean number of samples per pixel when the noise target is reached.
+    /// Mean number of samples per pixel.
     pub spp: f64,
-    /// `true` if the first point of the curve had reached the target already. `seconds` is then an
-    /// upper bound.
+    /// `true` if the first point of the curve had reached the target: `seconds` is an upper bound.
     pub at_most: bool,
 }
 
-/// Extrapolated time to a noise target that the default settings did not reach in the measurement.
-/// The names of the fields are also the keys of JSON files.
+/// Extrapolated time to a noise target that the default settings did not reach. The fields are keys
+/// of JSON files.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Expected {
-    /// Noise target that was not reached, in 8-bit levels.
     pub levels: f64,
-    /// Lower estimate of the time to the target in seconds, extrapolated from the convergence so
-    /// far.
+    /// Lower estimate of the seconds.
     pub seconds_low: f64,
-    /// Upper estimate of the time to the target in seconds.
+    /// Upper estimate of the seconds.
     pub seconds_high: f64,
 }
 
-/// Results of one variant of the settings in a measurement.
+/// Results of one variant of the settings.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Experiment, that is, the setting that differs from the default.
     pub experiment: Experiment,
     /// Value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
-    /// Number of threads that trace rays.
     pub threads: usize,
-    /// Points of the error curve (error after some samples), in ascending order of sample count.
+    /// Error curve, in ascending order of sample count.
     pub points: Vec<Point>,
-    /// Share of the processors' time that other programs used, for each repetition of the render.
-    /// `None` if unknown.
+    /// Share of the processors' time that other programs used in each repetition. `None` if
+    /// unknown.
     pub stolen: Vec<Option<f64>>,
-    /// Bias of the picture at the end of the error curve, relative to the reference picture. `None`
-    /// for settings whose pictures have the same expectation as with default settings.
+    /// Bias at the end of the error curve, for settings that change the expectation of the picture.
     pub bias: Option<Bias>,
 }
 
-/// Results of a measurement: all variants of the settings on one scene.
+/// Results of all variants of the settings on one scene.
 pub struct Measurement {
-    /// Width and height of the film in pixels.
     pub size: [u32; 2],
-    /// Samples per pixel of the reference picture. 0 if it was read from a file.
+    /// Samples per pixel of the reference; 0 if it was read from a file.
     pub reference_spp: f64,
-    /// Error of the reference picture itself, in 8-bit levels.
+    /// Error of the reference itself, in 8-bit levels.
     pub reference_levels: f64,
-    /// Error of the reference picture itself, in linear radiance.
+    /// Error of the reference itself, in linear radiance.
     pub reference_linear: f64,
-    /// Seconds of tracing that the reference picture took.
     pub reference_seconds: f64,
-    /// Noise at which settings are compared, in 8-bit levels. The default settings reached this
-    /// noise.
+    /// Noise at which settings are compared, in 8-bit levels, which the default settings reached.
     pub compared_at: f64,
     /// Noise targets in 8-bit levels, in descending order.
     pub targets: Vec<f64>,
-    /// Noise targets that the default settings did not reach in time, with extrapolated times.
+    /// Noise targets that the default settings did not reach in time.
     pub expected: Vec<Expected>,
-    /// Requested experiments that were not run, because no variant of them differs from the default
-    /// settings in this scene.
+    /// Experiments without a variant that differs from the default settings in this scene.
     pub idle: Vec<Experiment>,
-    /// Results of the renders with each variant of the settings, the default first.
+    /// Results of the variants, the default first.
     pub measured: Vec<Measured>,
 }
 
-/// Reliability of the times in a measurement.
+/// Reliability of the reported times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steadiness {
-    /// Smallest number of repetitions over which the median of a reported time was taken.
+    /// Smallest number of repetitions behind a reported time.
     pub repetitions: usize,
-    /// Largest relative spread of a reported time over the repetitions of its render.
+    /// Largest relative spread of a reported time.
     pub spread: f64,
-    /// Largest share of the processors' time that other programs used in a repetition from which
-    /// times are reported. `None` if unknown.
+    /// Largest share of the processors' time that other programs used. `None` if unknown.
     pub stolen: Option<f64>,
 }
 
-/// Largest share of the processors' time that other programs may use in a repetition that counts as
-/// undisturbed.
+/// Largest share of the processors' time that other programs use in an undisturbed repetition.
 const MAX_STOLEN: f64 = 0.05;
-/// Smallest number of repetitions from which a result is computed. Repetitions that other programs
-/// disturbed are left out. If fewer than this number remain, the least disturbed of those left out
-/// are included.
+/// Smallest number of repetitions from which a result is computed: the least disturbed ones, if
+/// fewer are undisturbed.
 const MIN_COUNTED: usize = 5;
-/// Largest relative uncertainty of a measured error that the reference picture may cause. Points of
-/// the error curve with a larger uncertainty are ignored.
+/// Largest relative uncertainty of a measured error by the error of the reference. Points with a
+/// larger one are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Half the width of the confidence interval of a median by the sign test. The unit is sqrt(n) / 2
-/// ranks for n values, the standard deviation of the number of values above the true median. This
-/// number is within 1.4 standard deviations of its mean in about four of five cases. The factor
-/// sqrt 2 is for the difference of two medians.
+/// Half the width of the confidence interval of a median by the sign test, in units of sqrt(n) / 2
+/// ranks, the standard deviation of the number of values above the true median: 1.4 of them cover
+/// four of five cases; sqrt 2 is for the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
-/// Returns the median of `values`; for an even number of values, the mean of the two in the middle.
-/// Returns NaN if there are no values.
+/// Returns the median of `values`, NaN without any.
 pub fn median(values: &[f64]) -> f64 {
-    quantile(values, 0.5)
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => sorted[n / 2],
+        n => sorted[n / 2 - 1] + 0.5 * (sorted[n / 2] - sorted[n / 2 - 1]),
+    }
 }
 
-/// Returns the relative spread of the median of `values`. In about four of five cases, the median
-/// of another measurement on the same machine differs from the median of `values` by at most this
-/// fraction.
+/// Returns the relative spread of the median of `values`. The median of another measurement on the
+/// same machine differs by at most this fraction in about four of five cases.
 ///
-/// For five and more values it is half the width of the confidence interval of the median by the
-/// sign test (Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile),
-/// divided by the median. The interval is widened by sqrt 2 for the comparison of two medians. For
-/// fewer than five values it is their range divided by the median; for fewer than two it is 0.
+/// It is half the width of the confidence interval of the median by the sign test (Conover,
+/// *Practical Nonparametric Statistics*), widened by sqrt 2 for the comparison of two medians, and
+/// divided by the median. For fewer than five values it is their range divided by the median; for
+/// fewer than two it is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -137,18 +126,9 @@ pub fn spread(values: &[f64]) -> f64 {
     share * (sorted[values.len() - 1 - left_out] - sorted[left_out]) / middle
 }
 
-fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let position = q * last as f64;
-    let (low, part) = (position as usize, position.fract());
-    sorted[low] + part * (sorted[(low + 1).min(last)] - sorted[low])
-}
-
 impl Measured {
-    /// Returns the indices of the repetitions that count: all that other programs did not disturb.
-    /// If these are fewer than [`MIN_COUNTED`], the [`MIN_COUNTED`] least disturbed ones count.
+    /// Returns the repetitions that count: the undisturbed ones, at least [`MIN_COUNTED`] of the
+    /// least disturbed.
     fn counted(&self) -> Vec<usize> {
         let stolen = |i: &usize| self.stolen[*i].unwrap_or(0.0);
         let mut all: Vec<usize> = (0..self.stolen.len()).collect();
@@ -158,22 +138,18 @@ impl Measured {
         all
     }
 
-    /// Returns the seconds of tracing until `point` of the error curve: one number for each
-    /// repetition that counts. Repetitions that other programs disturbed count only if too few
-    /// others exist.
+    /// Returns the seconds of tracing until `point` in each repetition that counts.
     pub fn seconds(&self, point: &Point) -> Vec<f64> {
         self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
     }
 
-    /// Returns the largest share of the processors' time that other programs used, over the
-    /// repetitions that count. Returns `None` if unknown.
     fn max_stolen(&self) -> Option<f64> {
         self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
-    /// Returns the time at which the true error fell to `levels` 8-bit levels. It is interpolated
-    /// between points of the error curve in log-log coordinates. Returns `None` if the error stayed
-    /// larger. Points with an uncertain error are ignored, see `MAX_SPREAD`.
+    /// Returns the time at which the true error fell to `levels` 8-bit levels, interpolated in
+    /// log-log coordinates. Returns `None` if it stayed larger. Points with an uncertain error are
+    /// ignored.
     pub fn time_to(&self, levels: f64) -> Option<TimeToTarget> {
         self.interpolated_time(levels, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
@@ -181,9 +157,8 @@ impl Measured {
         })
     }
 
-    /// Returns the time at which the error fell to `levels` 8-bit levels. The error is the render's
-    /// own estimate for biased variants, whose true error does not converge to 0, and the true
-    /// error for unbiased ones. Returns `None` if the error stayed larger.
+    /// Returns the time at which the error fell to `levels` 8-bit levels: the render's own estimate
+    /// for biased variants, whose true error does not converge to 0, and the true error otherwise.
     pub fn true_time_to(&self, levels: f64) -> Option<TimeToTarget> {
         match self.bias {
             Some(_) => {
@@ -202,8 +177,7 @@ impl Measured {
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
-            // The interpolation needs the logarithms of both errors; errors of 0 and infinity have
-            // none.
+            // The interpolation needs the logarithms of both errors.
             Some(from) if error(to) > 0.0 && error(from).is_finite() => {
                 ((error(from) / levels).ln() / (error(from) / error(to)).ln(), from)
             }
@@ -231,10 +205,8 @@ impl Measured {
         Some((median(&speeds), spread(&speeds)))
     }
 
-    /// Returns the order of convergence: the slope of the logarithm of the linear RMSE against the
-    /// logarithm of the sample count, over the points of the error curve. The first quarter of the
-    /// points is left out, because these have too few samples for a power law. Returns `None` if
-    /// too few points remain.
+    /// Returns the order of convergence of the linear RMSE. The first quarter of the points has too
+    /// few samples for a power law. Returns `None` if too few points remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =
@@ -242,9 +214,8 @@ impl Measured {
         Slope::fit(&points)
     }
 
-    /// Returns the efficiency of the render at the end of its error curve: 1 / (linear MSE x
-    /// seconds). The seconds are the median over the repetitions. Returns `None` if the error or
-    /// the time is 0, or if the curve has no points.
+    /// Returns 1 / (linear MSE x seconds) at the end of the error curve. Returns `None` if this is
+    /// infinite.
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
         let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
@@ -253,8 +224,8 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Returns the reliability of the reported times. These are the times of the default settings
-    /// to each noise target, and the times of all variants to the noise at which they are compared.
+    /// Returns the reliability of the times of the default settings to each target, and of all
+    /// variants to the noise at which they are compared.
     pub fn steadiness(&self) -> Steadiness {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
@@ -272,8 +243,8 @@ impl Measurement {
         all
     }
 
-    /// Returns the largest of the relative uncertainties that the error of the reference picture
-    /// causes in the reported errors.
+    /// Returns the largest relative uncertainty that the error of the reference causes in the
+    /// reported errors.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);

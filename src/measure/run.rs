@@ -1,5 +1,5 @@
-//! Course of a measurement: renders the reference picture, follows the error curve of every variant
-//! of the settings, and repeats the renders for the medians of the times.
+//! Course of a measurement: renders the reference, follows the error curve of every variant, and
+//! repeats the renders for the medians of the times.
 
 use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
@@ -11,48 +11,41 @@ use std::time::Instant;
 use zerkalo_render::SyncRender;
 use zerkalo_scene::Scene;
 
-/// Progress of a measurement, which consists of timed renders.
+/// Progress of a measurement.
 pub struct Progress<'a> {
-    /// Name of the timed render that is in progress: `reference`, or the name of a variant of the
-    /// settings.
+    /// Render in progress: `reference`, or the name of a variant.
     pub step: &'a str,
-    /// Number of the measurement's renders that have ended.
+    /// Number of renders that have ended.
     pub done: usize,
-    /// Expected number of renders of the whole measurement.
+    /// Expected number of renders.
     pub total: usize,
 }
 
-/// Seconds of tracing before the measurement starts, so that clock rates and caches are steady.
+/// Seconds of tracing before the measurement, until clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Noise at which the render of the reference picture ends, as a share of the smallest noise to be
-/// measured: the smallest target, or [`COMPARED_AT`] if this is smaller. The squared error of the
-/// reference is then 9 % of the squared smallest noise.
+/// Noise of the reference, as a share of the smallest noise to be measured (a target or
+/// [`COMPARED_AT`]): its squared error is 9 % of that noise squared.
 const REFERENCE_SHARE: f64 = 0.3;
-/// Largest duration of rendering the reference, as a share of the whole measurement's time.
+/// Largest duration of the reference, as a share of the whole measurement.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest duration of the first render with the default settings, as a share of the whole
-/// measurement's time.
+/// Largest duration of the first render, as a share of the whole measurement.
 const DEFAULT_TIME: f64 = 0.12;
 /// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
-/// Longest duration of a render with a changed setting. The unit is the time in which the default
-/// settings reached the noise at which settings are compared.
+/// Longest duration of a render with a changed setting, in units of the time in which the default
+/// settings reach the noise at which settings are compared.
 const MAX_SLOWDOWN: f64 = 5.0;
-/// Largest relative spread of the repeated times of a render that counts as steady.
+/// Largest relative spread of steady times.
 const STEADY: f64 = 0.05;
-/// Largest number of rounds of a measurement with steady times, unless its plan requests more. A
-/// round repeats the render of each variant once.
+/// Largest number of rounds with steady times, unless the plan requests more. A round repeats the
+/// render of each variant once.
 const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of rounds of a measurement whose times vary too much, unless its plan requests
-/// more. A round repeats the render of each variant once.
+/// Largest number of rounds, unless the plan requests more.
 const MAX_ROUNDS: usize = 31;
 
-/// Measures `scene`, which must be valid. `reference` is the reference picture; if it is `None`, a
-/// reference is rendered with another random seed than the measured pictures. `report` receives the
-/// progress; if it returns `false`, the measurement ends early with the results so far.
-///
-/// # Errors
-/// Returns the error of the system if a thread cannot be started.
+/// Measures `scene`, which must be valid. Without a `reference`, one is rendered with another
+/// random seed. `report` receives the progress; if it returns `false`, the measurement ends with
+/// the results so far. Returns the error of the system if a thread cannot be started.
 pub fn measure(
     scene: &Arc<Scene>,
     plan: &Plan,
@@ -111,9 +104,8 @@ pub fn measure(
         measured.push(result);
     }
 
-    // The repetitions of all variants are interleaved: each round repeats every variant once. There
-    // are at least `plan.repetitions` rounds, and further ones until times are steady or time is
-    // up.
+    // There are at least `plan.repetitions` rounds, and further ones until times are steady or time
+    // is up.
     let mut round = 1;
     let mut round_seconds = 0.0;
     while keep_going {
@@ -150,17 +142,18 @@ pub fn measure(
     })
 }
 
-/// Returns the extrapolated times at which the noise of `render` falls to `levels` 8-bit levels: a
-/// lower and an upper estimate. Returns `None` if they cannot be extrapolated.
+/// Returns the extrapolated time to `levels` 8-bit levels. Returns `None` if it cannot be
+/// extrapolated.
 fn extrapolate(render: &SyncRender, levels: f64) -> Option<Expected> {
-    let (seconds_low, seconds_high) = render.seconds_to_noise(levels)?;
-    Some(Expected { levels, seconds_low, seconds_high })
+    let (low, high) = render.schedule.seconds_to_noise(levels, render.seconds)?;
+    let seconds = render.seconds;
+    Some(Expected { levels, seconds_low: seconds + low, seconds_high: seconds + high })
 }
 
-/// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the powers of
-/// two from 0.5 to 8, and the targets that are at least [`COMPARED_AT`]. The result is the smallest
-/// candidate that the default settings reached within `seconds`; otherwise the largest candidate
-/// that they reached; otherwise the error at the end of their error curve.
+/// Returns the noise in 8-bit levels at which settings are compared: the smallest level that the
+/// default settings reached within `seconds`, or else the largest that they reached, or else their
+/// final error. Levels are the powers of two from 0.5 to 8, and the targets from [`COMPARED_AT`]
+/// on.
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|level| *level >= COMPARED_AT);
@@ -172,9 +165,8 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     in_time.or_else(any).map_or_else(end, |c| c.levels)
 }
 
-/// Returns `true` if the times at which the repetitions reached the noise `levels` have a relative
-/// spread of at most [`STEADY`]. If the noise was not reached, the times until the last point of
-/// the error curve are compared instead.
+/// Returns `true` if the times to the noise `levels`, or else to the end of the curve, have a
+/// relative spread of at most [`STEADY`].
 fn is_steady(measured: &Measured, levels: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY
@@ -187,8 +179,8 @@ struct RenderedReference {
     seconds: f64,
 }
 
-/// Renders a reference picture, with another random seed than the measured pictures, until its
-/// noise is at most `levels` 8-bit levels or `seconds` have passed.
+/// Renders a reference with another random seed, until its noise is at most `levels` 8-bit levels
+/// or `seconds` have passed.
 fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<RenderedReference> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -40,8 +40,8 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
             ValueType::Table(inner)
             | ValueType::OneOf(inner)
             | ValueType::ListOf(inner)
-            | ValueType::Tables(inner)
             | ValueType::Named(inner) => directions(inner, depth + 1, out),
+            ValueType::Tables(inner) => directions(inner(), depth + 1, out),
             _ => {}
         }
     }

@@ -170,7 +170,7 @@ fn extreme_02_sphere_as_ground() {
         let lines: Vec<Line> = pixels
             .iter()
             .map(|at| {
-                let (o, d) =
+                let Ray { origin: o, direction: d } =
                     view.rays(Vec3::<f64>::splat(view.pixel_corner_direction(*at)), (0.5, 0.5));
                 (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z))
             })

@@ -30,12 +30,12 @@ fn a7_material() {
             agrees(&close_up(&original), &close_up(tested), 128)
         },
         &[
-            ("another colour", &|s| material(s, "matt").color = Color([0.7, 0.2, 0.15])),
+            ("another colour", &|s| material(s, "diffuse").color = Color([0.7, 0.2, 0.15])),
             ("no specularity", &|s| material(s, "shiny").specular = 0.0),
             ("no reflection", &|s| material(s, "reflecting").reflection = 0.0),
             ("a reflection coefficient of 0.8", &|s| material(s, "reflecting").reflection = 0.8),
             ("no roughness", &|s| material(s, "blurred").roughness = 0.0),
-            ("materials exchanged", &|s| object(s, "matt").material = "shiny".into()),
+            ("materials exchanged", &|s| object(s, "diffuse").material = "shiny".into()),
         ],
     );
 }
@@ -50,10 +50,9 @@ fn a8_point_light() {
         &[
             ("falling off with distance", &|s| warm(s).falloff = Falloff::InverseSquare),
             ("a directional light", &|s| {
-                warm(s).point = None;
-                warm(s).directional = Some(Directional { direction: [2.2, -2.0, -1.2] });
+                warm(s).kind = Directional::along([2.2, -2.0, -1.2]).into();
             }),
-            ("another place", &|s| warm(s).point = Some(Point { position: [-2.2, 2.1, 1.2] })),
+            ("another place", &|s| warm(s).kind = Point { position: [-2.2, 2.1, 1.2] }.into()),
             ("half the intensity", &|s| warm(s).intensity *= 0.5),
             ("white", &|s| warm(s).color = Color::WHITE),
             ("without shadows", &|s| s.trace.ray_types = RayTypes::Primary),
@@ -198,11 +197,10 @@ fn c3_ambient_and_directional_light() {
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[0].on = false),
             ("a distant point light", &|s| {
-                s.lights[0].directional = None;
-                s.lights[0].point = Some(Point { position: [-100.0, 100.0, 50.0] });
+                s.lights[0].kind = Point { position: [-100.0, 100.0, 50.0] }.into();
             }),
             ("from another side", &|s| {
-                s.lights[0].directional = Some(Directional { direction: [1.0, -1.0, 0.5] });
+                s.lights[0].kind = Directional::along([1.0, -1.0, 0.5]).into();
             }),
         ],
     );
@@ -223,14 +221,17 @@ fn d2_spot_light() {
         &mut scene.lights[1]
     }
     fn cone(scene: &mut Scene) -> &mut Spot {
-        middle(scene).spot.as_mut().expect("a spot light")
+        match &mut middle(scene).kind {
+            LightKind::Spot(spot) => spot,
+            kind => panic!("a {} light has no cone", kind.key()),
+        }
     }
     exact(
         "spot-light.toml",
         &[
             ("a point light", &|s| {
                 let position = cone(s).position;
-                (middle(s).spot, middle(s).point) = (None, Some(Point { position }));
+                middle(s).kind = Point { position }.into();
             }),
             ("another axis", &|s| cone(s).direction = [0.1, -1.0, -0.5]),
             ("another inner angle", &|s| cone(s).inner_angle = 15.0),

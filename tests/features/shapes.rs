@@ -97,9 +97,9 @@ fn b4_canonical_objects() {
 fn b5_tapered_cylinder() {
     shapes(
         "shape-tapered-cylinder.toml",
-        "s of 1 | squeezed | unit_cylinder = { s = 1 }\n\
-         s of 0 | squeezed | unit_cylinder = { s = 0 }\n\
-         widening for narrowing | squeezed | unit_cylinder = { s = 1.4 }\n\
+        "s of 1 | squeezed | unit_frustum = { s = 1 }\n\
+         s of 0 | squeezed | unit_frustum = { s = 0 }\n\
+         widening for narrowing | squeezed | unit_frustum = { s = 1.4 }\n\
          a sphere | cylinder | sphere = { center = [-1.5, 0.5, 0], radius = 0.35 }\n\
          a cylinder for a cone | cone | cylinder = { base = [-0.6, 0, 0.1], top = [-0.6, 1.2, 0.1], radius = 0.4 }\n\
          upside down | widening | tapered_cylinder = { base = [1.2, 0, -0.3], top = [1.2, 0.8, -0.3], base_radius = 0.4, top_radius = 0.15 }",

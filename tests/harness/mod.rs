@@ -7,8 +7,6 @@ mod rays;
 mod renders;
 mod report;
 mod samples;
-#[path = "../common/shape_examples.rs"]
-mod shape_examples;
 mod statistics;
 mod tables;
 mod verdict;
@@ -19,7 +17,6 @@ pub use rays::*;
 pub use renders::*;
 pub use report::*;
 pub use samples::*;
-pub use shape_examples::*;
 pub use statistics::*;
 pub use tables::*;
 pub use verdict::*;
@@ -54,15 +51,18 @@ pub use zerkalo_scene::asset::Assets;
 pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
 pub use zerkalo_scene::disk::Existing;
 pub use zerkalo_scene::edit::Target;
-pub use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
-pub use zerkalo_scene::material::{
-    Bsdf, Fresnel, Highlight, Lobe, Masking, Material, ReflectionLobe,
+pub use zerkalo_scene::light::{
+    Directional, Falloff, Light, LightKind, Point, RectangleLight, Spot,
 };
-pub use zerkalo_scene::shape::{CsgOperand, Cuboid, Cylinder, Shape, ShapeDesc};
+pub use zerkalo_scene::material::{
+    Bsdf, BsdfQuery, BsdfValue, Fresnel, Highlight, InterfaceQuery, Lobe, Masking, Material,
+    ReflectionLobe,
+};
+pub use zerkalo_scene::shape::{CsgOperand, Cuboid, Cylinder, EXAMPLES, Shape, ShapeDesc};
 pub use zerkalo_scene::value::{Color, Field, TomlValue, ValueType};
 pub use zerkalo_scene::{
-    Acceleration, AssetResolver, BUILT_IN, BelowHorizon, Document, FIELDS, Filter, Object,
-    RayTypes, Scale, Scene, TransformOp, edit,
+    Acceleration, AssetResolver, BelowHorizon, Document, FIELDS, Filter, Object, RayTypes, Scale,
+    Scene, TransformOp, edit,
 };
 pub use zerkalo_world as world;
 pub use zerkalo_world::{AnyWorld, FirstHit, MAX_GROUPS, Options, Precision, Radiance, World};

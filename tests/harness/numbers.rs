@@ -1,6 +1,9 @@
 //! Random numbers for tests: a fixed seed gives the same numbers everywhere.
 use super::*;
 
+/// Text of `scenes/mirror-room.toml`.
+pub const MIRROR_ROOM: &str = include_str!("../../scenes/mirror-room.toml");
+
 /// Name of scenes that come from no file. Paths in them are relative to the workspace.
 pub const NAME: &str = concat!(env!("ZERKALO_ROOT"), "test");
 

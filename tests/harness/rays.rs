@@ -140,7 +140,7 @@ impl Traced {
         let sampler = Sampler::new(settings, world.camera_dimensions());
         let mut out = Vec::with_capacity(lines.len());
         let points = sampler.block(0, L::WIDTH);
-        let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+        let mut radiance = Radiance::black();
         for (ray, count) in packets::<L>(lines) {
             let draws = points.for_pixel(sampler.key((0, 0), 0));
             world.trace(&mut Path::new(ray), None, &draws, L::mask(true), &mut radiance);

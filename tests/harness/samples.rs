@@ -74,9 +74,8 @@ pub fn trace_packet<L: SimdFloat>(
     let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
     let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let (origin, direction) = world.camera().rays(corner, jitter);
-    let mut path = Path::new(Ray { origin, direction });
-    let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+    let mut path = Path::new(world.camera().rays(corner, jitter));
+    let mut radiance = Radiance::black();
     world.trace(&mut path, None, &draws, active, &mut radiance);
     let groups = &radiance.groups[..world.groups()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();

@@ -57,7 +57,7 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
             }
             (ValueType::Tables(fields), Value::Array(list)) => {
                 for (i, value) in list.iter().enumerate() {
-                    inner(fields, value, &child_path(&path, &i.to_string()));
+                    inner(fields(), value, &child_path(&path, &i.to_string()));
                 }
             }
             (ValueType::Named(fields), Value::Table(named)) => {

@@ -139,7 +139,7 @@ fn light_changes_keep_samples() {
     assert_eq!(names, ["ambient", "background", "sun", "light 2"]);
     // A moved light needs new samples.
     let mut moved = newer;
-    moved.lights[0].point.as_mut().unwrap().position[0] = 1.0;
+    moved.lights[0].position_mut().unwrap()[0] = 1.0;
     assert_eq!(after.lighting.unwrap().mix(&moved), None);
     session.set_stop(spp_stop(16));
     let generation = session.set_scene(Arc::new(moved));
@@ -233,7 +233,7 @@ fn submitted_tasks_always_run_without_waiting() {
     let (answer, answers) = channel();
     let samples = |session: &Session| {
         let answer = answer.clone();
-        session.submit(move |film| answer.send(film.map(|(_, r)| r.generation)).unwrap());
+        session.submit(move |picture| answer.send(picture.map(|p| p.report.generation)).unwrap());
     };
     samples(&session);
     assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), None);
@@ -247,13 +247,10 @@ fn submitted_tasks_always_run_without_waiting() {
     session.set_stop(spp_stop(16));
     let end = resting(&session, generation);
     let (keep, kept) = channel();
-    session.submit(move |film| {
-        keep.send(
-            film.map(|(r, _)| {
-                (LinearImage::of_film(&r.film, &r.mix), r.film.pixel(50, 40, &r.mix))
-            }),
-        )
-        .unwrap();
+    session.submit(move |picture| {
+        let kept =
+            picture.map(|p| (LinearImage::of_film(p.film, p.mix), p.film.pixel(50, 40, p.mix)));
+        keep.send(kept).unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
     for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {

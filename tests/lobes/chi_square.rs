@@ -173,9 +173,7 @@ fn framed(axis: Vector) -> [Vector; 3] {
 /// `material`. The last value is the fraction outside of all bins.
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     let finish = Bsdf::<f64>::new(material, true);
-    let (_, spread) = finish.reflection.unwrap();
-    let incident = Vec3::<f64>::of(combine(&[(-1.0, chart.view)]));
-    let n = Vec3::of(chart.n);
+    let at = (combine(&[(-1.0, chart.view)]), chart.n);
     let [w, h] = GRID.map(|g| g * FINE);
     let mut shares = vec![0.0; GRID[0] * GRID[1] + 1];
     let flow = |p: f64, q: f64| {
@@ -184,12 +182,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
             return 0.0;
         }
         let density = match chart.through {
-            None => finish.density(&spread, incident, n, Vec3::of(d)).unwrap(),
-            Some(sides) => {
-                let transmission = finish.transmission.unwrap();
-                let at = (incident, n);
-                finish.transmission_density(&transmission, &sides.media(), at, Vec3::of(d))
-            }
+            None => finish.pdf(&query::<f64>(at, false), Vec3::of(d)),
+            Some(sides) => finish.transmission_pdf(&sides.query::<f64>(at, false), Vec3::of(d)),
         };
         density * solid_angle / (w * h) as f64
     };
@@ -225,7 +219,7 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
-    let (_, spread) = Bsdf::<f64>::new(material, true).reflection.unwrap();
+    let spread = Bsdf::<f64>::new(material, true).lobe;
     let chart = Chart::new(view, n, spread, through);
     let shares = expected(&chart, material);
     (chart, shares)

@@ -46,11 +46,11 @@ fn transparent_surfaces_have_declared_properties() {
             for (n_i, n_t) in [(1.0, material.ior), (material.ior, 1.0)] {
                 let incident = Vec3::new(sin, 0.0, -cos);
                 let there = Interface::new(incident, n, n_i, n_t);
-                let split = there.split(&transmission, n_i == 1.0);
+                let split = there.split(&transmission, n_i == 1.0, false);
                 lost = lost.max((split.reflected + split.transmitted + split.tir - 1.0).abs());
                 if !there.tir {
                     let back = Interface::new(-there.refracted, -n, n_t, n_i);
-                    let back = back.split(&transmission, n_i != 1.0);
+                    let back = back.split(&transmission, n_i != 1.0, false);
                     lopsided = lopsided.max((back.reflected - split.reflected).abs());
                 }
             }
@@ -80,8 +80,8 @@ fn pairs() -> Vec<(Vector, Vector)> {
 fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
-    let (nl, nv) = (dot(n, l), dot(n, v));
-    finish.highlight(Vec3::of(n), Vec3::of(v), Vec3::of(l), nl, nv).x / nl
+    let query = query::<f64>((combine(&[(-1.0, v)]), n), false);
+    finish.highlight(&query, Vec3::of(l)).x / dot(n, l)
 }
 
 /// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: the weight of
@@ -90,16 +90,14 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
-    let (strength, spread) = finish.reflection.unwrap();
-    match spread {
+    match finish.lobe {
         ReflectionLobe::Mirror => unreachable!(),
         // The test of weight x density below shows that this lobe and the highlight have the same
         // f.
         ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
         _ => {
-            let incident = Vec3::<f64>::of(combine(&[(-1.0, v)]));
-            let density = finish.density(&spread, incident, Vec3::of(n), Vec3::of(l)).unwrap();
-            strength * density / dot(n, l)
+            let query = query::<f64>((combine(&[(-1.0, v)]), n), false);
+            finish.reflection.unwrap() * finish.pdf(&query, Vec3::of(l)) / dot(n, l)
         }
     }
 }
@@ -254,7 +252,6 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                 material.fresnel = Some(Fresnel::Exact);
                 material.f0 = Some(Color([0.9, 0.5, 0.04]));
                 let finish = Bsdf::<f64>::new(&material, true);
-                let (_, spread) = finish.reflection.unwrap();
                 let v = at_angle(n, degrees.to_radians(), 2.0);
                 let incident = combine(&[(-1.0, v)]);
                 let draws = Draws::sobol(3);
@@ -262,9 +259,9 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                     if weight == [0.0; 3] {
                         return;
                     }
-                    let (vn, vd) = (Vec3::<f64>::of(n), Vec3::of(d));
-                    let density = finish.density(&spread, Vec3::of(incident), vn, vd).unwrap();
-                    let shine = finish.highlight(vn, Vec3::of(v), vd, dot(n, d), dot(n, v));
+                    let query = query::<f64>((incident, n), false);
+                    let density = finish.pdf(&query, Vec3::of(d));
+                    let shine = finish.highlight(&query, Vec3::of(d));
                     for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
                         // The first term is the error of exp(-tan^2 / alpha^2), because the slope
                         // comes from rounded directions. The second is the error of the cosine
@@ -299,17 +296,14 @@ fn value_over_density_is_the_weight_of_the_sample() {
             material.fresnel = Some(Fresnel::Exact);
             material.f0 = Some(Color([0.9, 0.5, 0.04]));
             let finish = Bsdf::<f64>::new(&material, true);
-            let (strength, spread) = finish.reflection.unwrap();
             let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
             let draws = Draws::sobol(5);
             each_reflection::<f64>(&material, (incident, n), fold, draws, 400, |d, weight| {
                 if weight == [0.0; 3] {
                     return;
                 }
-                let (incident, normal) = (Vec3::<f64>::of(incident), Vec3::of(n));
-                let direction = Vec3::of(d);
-                let (value, density) =
-                    finish.evaluate_lobe(strength, &spread, incident, normal, direction, fold);
+                let query = query::<f64>((incident, n), fold);
+                let BsdfValue { value, density } = finish.eval(&query, Vec3::of(d));
                 for (w, value) in weight.into_iter().zip(vector(value)) {
                     let error = (value / density / w - 1.0).abs();
                     assert!(error < 1e-9, "{lobe:?} {masking:?} {degrees} {fold}: {error:e}");

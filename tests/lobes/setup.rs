@@ -2,7 +2,6 @@
 
 use crate::harness::*;
 use zerkalo_kernel::sampling::CameraDimensions;
-use zerkalo_scene::material::InterfaceMedia;
 
 pub type Vector = [f64; 3];
 
@@ -66,12 +65,17 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
 /// Returns `true` if the lobe is a microfacet distribution. Only these have masking.
 pub fn has_facets(lobe: Lobe) -> bool {
     let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
-    matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
+    matches!(finish.lobe, ReflectionLobe::MicrofacetDistribution(_))
 }
 
 pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     let maskings = |lobe| if has_facets(lobe) { &Masking::ALL[..] } else { &Masking::ALL[..1] };
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
+}
+
+/// Returns the query for a ray with the direction `incident` at a surface with the normal `n`.
+pub fn query<L: SimdFloat>((incident, n): (Vector, Vector), fold: bool) -> BsdfQuery<L> {
+    BsdfQuery { incident: Vec3::of(incident), normal: Vec3::of(n), fold }
 }
 
 /// Source of the random numbers for sampled reflections: kind, seed and pixel.
@@ -116,14 +120,13 @@ fn reflect<L: SimdFloat>(
     take: &mut dyn FnMut(Vector, Vector),
 ) {
     let finish = Bsdf::<L::Scalar>::new(material, true);
-    let (strength, spread) = finish.reflection.unwrap();
-    let (incident, n) = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
+    let query = query::<L>((incident, n), fold);
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
     let sampler = Sampler::<L>::new(settings, CameraDimensions { pixel: false, lens: false });
     for first in (0..count).step_by(L::WIDTH) {
         let key = sampler.key(numbers.pixel, 0);
         let uv = sampler.block(first, L::WIDTH).for_pixel(key).lobe_2d(0);
-        let r = finish.sample(strength, &spread, incident, n, uv, fold);
+        let r = finish.sample(&query, uv);
         for lane in 0..L::WIDTH {
             take(r.direction.lane(lane).map(Float::to_f64), r.weight.lane(lane).map(Float::to_f64));
         }
@@ -152,12 +155,15 @@ pub struct Sides {
 }
 
 impl Sides {
-    pub fn media<L: SimdFloat>(self) -> InterfaceMedia<L> {
-        InterfaceMedia {
+    /// Returns the query for a ray with the direction `incident` at a surface with the normal `n`.
+    pub fn query<L: SimdFloat>(self, at: (Vector, Vector), fold: bool) -> InterfaceQuery<L> {
+        InterfaceQuery {
+            rays: query(at, fold),
             n_i: L::from_f64(self.n_i),
             n_t: L::from_f64(self.n_t),
             outer: L::mask(self.n_i <= self.n_t),
             thin: L::mask(self.thin),
+            reflecting: L::mask(true),
         }
     }
 }
@@ -194,15 +200,13 @@ fn cross<L: SimdFloat>(
     take: &mut dyn FnMut(Crossing),
 ) {
     let finish = Bsdf::<L::Scalar>::new(material, true);
-    let transmission = finish.transmission.unwrap();
-    let directions = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
+    let query = sides.query::<L>((incident, n), fold);
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
     let sampler = Sampler::<L>::new(settings, CameraDimensions { pixel: false, lens: false });
     for first in (0..count).step_by(L::WIDTH) {
         let key = sampler.key(numbers.pixel, 0);
         let uv = sampler.block(first, L::WIDTH).for_pixel(key).lobe_2d(0);
-        let how = (L::mask(true), fold);
-        let s = finish.sample_interface(&transmission, &sides.media(), directions, uv, how);
+        let s = finish.sample_interface(&query, uv);
         for lane in 0..L::WIDTH {
             let of = |v: Vec3<L>| v.lane(lane).map(Float::to_f64);
             take(Crossing {

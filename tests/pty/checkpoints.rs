@@ -105,7 +105,7 @@ fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: u
 
 #[test]
 fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
-    let text = zerkalo_scene::BUILT_IN.replace("size = [640, 480]", "size = [320, 240]");
+    let text = MIRROR_ROOM.replace("size = [640, 480]", "size = [320, 240]");
     kill_at_random_moments(4, &text, 1);
 }
 

@@ -21,7 +21,7 @@ fn edits_change_the_picture_and_undo_reverts_them() {
     terminal.wait_until_gone("nsaved");
     terminal.send("uuq");
     assert_eq!(terminal.end().0, 0);
-    assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), BUILT_IN);
+    assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), MIRROR_ROOM);
 }
 
 #[test]
@@ -37,8 +37,8 @@ fn saving_changes_one_line_only() {
     assert_eq!(terminal.end().0, 0);
     let saved = fs::read_to_string(fixture.path("room.toml")).unwrap();
     let changed: Vec<_> =
-        BUILT_IN.lines().zip(saved.lines()).filter(|(before, after)| before != after).collect();
-    assert_eq!(BUILT_IN.lines().count(), saved.lines().count());
+        MIRROR_ROOM.lines().zip(saved.lines()).filter(|(before, after)| before != after).collect();
+    assert_eq!(MIRROR_ROOM.lines().count(), saved.lines().count());
     assert!(
         matches!(changed[..], [(before, after)] if before.starts_with("roughness = ")
             && after.starts_with("roughness = ")),
@@ -53,13 +53,13 @@ fn external_changes_are_shown_and_faulty_file_can_be_fixed() {
     let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     terminal.wait_for_text("cannot be read");
     assert_eq!(terminal.screen(picture_cells), 0);
-    fs::write(fixture.path("room.toml"), BUILT_IN).unwrap();
+    fs::write(fixture.path("room.toml"), MIRROR_ROOM).unwrap();
     let wait_for_cells = |what: &str, expected: std::ops::Range<usize>| {
         terminal.wait_for(what, |s| expected.contains(&picture_cells(s)).then_some(()));
     };
     wait_for_cells("a picture as wide as its film", 2000..3000);
     // With another aspect ratio of the film, the shown picture is narrower.
-    let narrow = BUILT_IN.replace("size = [640, 480]", "size = [120, 480]");
+    let narrow = MIRROR_ROOM.replace("size = [640, 480]", "size = [120, 480]");
     fs::write(fixture.path("room.toml"), narrow).unwrap();
     wait_for_cells("a narrower picture", 300..1000);
     terminal.send("q");

@@ -11,7 +11,7 @@ const EVIL: &str = "\u{1b}]52;c;cm0=\u{7}\u{9b}32m\u{202e}x";
 fn names_with_control_sequences_are_escaped() {
     let fixture = Fixture::new();
     let escaped: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
-    let scene = BUILT_IN
+    let scene = MIRROR_ROOM
         .replace("\"ball\"", &format!("\"ball{escaped}\""))
         .replace("name = \"lamp\"", &format!("name = \"{escaped}\""))
         + &format!("\n[cameras.\"{escaped}\"]\neye = [0.0, 1.0, 3.0]\ntarget = [0.0, 0.0, 0.0]\n");

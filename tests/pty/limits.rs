@@ -8,7 +8,7 @@ use crate::harness::*;
 #[cfg(target_os = "linux")]
 fn film_that_does_not_fit_is_refused_in_the_dashboard() {
     let fixture = Fixture::new();
-    let scene = BUILT_IN.replace("size = [640, 480]", "size = [16384, 4096]");
+    let scene = MIRROR_ROOM.replace("size = [640, 480]", "size = [16384, 4096]");
     fs::write(fixture.path("large.toml"), scene).unwrap();
     let script = "ulimit -v 1500000; exec \"$0\" large.toml --threads 2";
     let mut terminal = Terminal::start(&Start {

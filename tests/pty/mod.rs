@@ -30,7 +30,7 @@ impl Fixture {
     /// Creates a folder with the built-in scene as `room.toml`.
     fn with_room() -> Self {
         let fixture = Self::new();
-        fs::write(fixture.path("room.toml"), zerkalo_scene::BUILT_IN).unwrap();
+        fs::write(fixture.path("room.toml"), MIRROR_ROOM).unwrap();
         fixture
     }
 

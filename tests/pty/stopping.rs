@@ -123,7 +123,7 @@ fn unsaved_edits_are_recovered_by_the_next_start() {
     assert_eq!(status, 143);
     let message = "unsaved edits are kept in ";
     assert!(bytes.find(message) > bytes.rfind(LEAVE), "{bytes:?}");
-    assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), BUILT_IN);
+    assert_eq!(fs::read_to_string(fixture.path("room.toml")).unwrap(), MIRROR_ROOM);
 
     let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     terminal.wait_for_text("ended unexpectedly a moment ago");
@@ -134,8 +134,8 @@ fn unsaved_edits_are_recovered_by_the_next_start() {
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
     let saved = fs::read_to_string(fixture.path("room.toml")).unwrap();
-    assert_ne!(saved, BUILT_IN);
-    assert_eq!(saved.lines().count(), BUILT_IN.lines().count());
+    assert_ne!(saved, MIRROR_ROOM);
+    assert_eq!(saved.lines().count(), MIRROR_ROOM.lines().count());
     assert!(!fixture.path(".room.toml.unsaved").exists());
     // A missing scene file can be restored from the recovery file.
     fs::rename(fixture.path("room.toml"), fixture.path(".room.toml.unsaved")).unwrap();

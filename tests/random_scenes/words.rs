@@ -71,7 +71,8 @@ fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, key_value: KeyValue
             Value::Array(steps.map(Value::Table).collect())
         }
         ValueType::Tables(fields) => {
-            let tables = (0..2 + numbers.below(2)).map(|_| table(numbers, fields, odds, key_value));
+            let tables =
+                (0..2 + numbers.below(2)).map(|_| table(numbers, fields(), odds, key_value));
             Value::Array(tables.map(Value::Table).collect())
         }
         ValueType::Named(_) => Value::Table(Table::new()),

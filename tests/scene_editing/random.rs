@@ -168,13 +168,14 @@ fn light() -> impl Strategy<Value = Light> {
     (name(), point(), direction(), color(), 0.0..100.0f64, any::<(bool, bool, bool)>()).prop_map(
         |(name, position, direction, color, intensity, (is_point, inverse, on))| Light {
             name,
-            point: is_point.then_some(Point { position }),
-            directional: (!is_point).then_some(Directional { direction }),
             color,
             intensity,
             falloff: if is_point && inverse { Falloff::InverseSquare } else { Falloff::None },
             on,
-            ..Light::default()
+            ..Light::new(match is_point {
+                true => LightKind::from(Point { position }),
+                false => Directional::along(direction).into(),
+            })
         },
     )
 }

@@ -80,12 +80,12 @@ and every key with a default may be left out. Unknown keys are errors.
   new samples, to 0 and back. Beyond eight lights and emissive materials the last ones share a group.
   Sixteen point lights or more share one group. Spots do if their cones have together the solid angle
   of 16 hemispheres or more.
-- Matt surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
+- Diffuse surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
   boxes, cubes, prisms, pyramids and meshes of up to 65536 triangles from points sampled on them, as
   that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,
   sphere scaled to an ellipsoid, larger mesh) is found only by rays that hit them: the camera's,
   reflected, transmitted, and those of diffuse bounces. It makes no highlights, and without
-  `max_diffuse_depth` it does not light matt surfaces; `zerkalo check` reports this.
+  `max_diffuse_depth` it does not light diffuse surfaces; `zerkalo check` reports this.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part. White leaves
   it unchanged: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,
@@ -106,7 +106,7 @@ and every key with a default may be left out. Unknown keys are errors.
   are read, so that no device or pipe blocks; their content goes into the picture and into messages
   only. A file that a mesh file names in turn lies in the folder of that mesh file or below: such a
   name has no `..`, is not absolute, and is no URL.
-- An environment light is infinitely far away in all directions. It adds to the background, lights matt
+- An environment light is infinitely far away in all directions. It adds to the background, lights diffuse
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle
   is +x. Values of Radiance and OpenEXR files are radiances (negative values are
@@ -114,15 +114,9 @@ and every key with a default may be left out. Unknown keys are errors.
 - A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
   cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
   the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.
-- A light with falloff `none` gives a white matt surface that faces it the radiance `intensity` at any
+- A light with falloff `none` gives a white diffuse surface that faces it the radiance `intensity` at any
   distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.
-
-- Files of earlier versions open, too. `zerkalo check` reports the first renamed word, and saving
-  writes the current words. `index` became `ior`, `reflectance` `f0`, `depth` `max_depth`,
-  `min_weight` `min_throughput`, `level` `ray_types`, `horizon` `below_horizon`, `unit_cylinder`
-  `unit_frustum`, `[views.NAME]` `[cameras.NAME]`, filter `center` `point`; accelerations `projected`,
-  `object`, `world` and `hierarchy` became `screen-bounds`, `obb`, `aabb` and `bvh`.
 
 `zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
@@ -132,7 +126,7 @@ pub fn format_manual() -> String {
     for field in FIELDS {
         let (title, fields): (String, &[Field]) = match field.takes {
             ValueType::Table(fields) => (format!("[{}]", field.name), fields),
-            ValueType::Tables(fields) => (format!("[[{}]]", field.name), fields),
+            ValueType::Tables(fields) => (format!("[[{}]]", field.name), fields()),
             ValueType::Named(fields) => (format!("[{}.NAME]", field.name), fields),
             _ => continue,
         };

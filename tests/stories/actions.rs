@@ -200,13 +200,13 @@ fn object_stories() -> Vec<Story> {
         selected("move nearer, fine", BALL, "m Up Shift-Down", |_, d| ball(d)[2] < 0.0),
         selected("raise, fine", BALL, "m PageDown Shift-PageUp", |_, d| ball(d)[1] < 1.0),
         selected("lower, fine", BALL, "m PageUp Shift-PageDown", |_, d| ball(d)[1] > 1.0),
-        selected("turn the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
-        selected("turn left", GLASS, "r Left", |_, d| normal(d)[0] < -0.2),
-        selected("turn right", GLASS, "r Right", |_, d| normal(d)[0] > 0.2),
-        selected("turn left, fine", GLASS, "r Shift-Left", |_, d| {
+        selected("rotate the selection", GLASS, "r", |_, d| d.model.mode == Mode::Rotate),
+        selected("rotate left", GLASS, "r Left", |_, d| normal(d)[0] < -0.2),
+        selected("rotate right", GLASS, "r Right", |_, d| normal(d)[0] > 0.2),
+        selected("rotate left, fine", GLASS, "r Shift-Left", |_, d| {
             (-0.02..-0.01).contains(&normal(d)[0])
         }),
-        selected("turn right, fine", GLASS, "r Shift-Right", |_, d| {
+        selected("rotate right, fine", GLASS, "r Shift-Right", |_, d| {
             (0.01..0.02).contains(&normal(d)[0])
         }),
         selected("snap the selection to ground", BALL, "g", |_, d| ball(d) == [0.0, 0.5, 0.0]),

@@ -6,7 +6,7 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::update;
-use zerkalo_scene::{SaveError, built_in};
+use zerkalo_scene::SaveError;
 
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);
@@ -163,9 +163,9 @@ fn error_in_changed_file_keeps_scene() {
 
 #[test]
 fn built_in_scene_opens_without_file() {
-    let text = zerkalo_scene::BUILT_IN;
+    let text = MIRROR_ROOM;
     let mut model = start(None, text);
-    assert_eq!(**model.scene(), built_in());
+    assert_eq!(**model.scene(), Scene::parse(text, "mirror-room.toml").unwrap());
     let raster = model.layout().unwrap().raster;
     let effects = update(&mut model, Message::Resize([120, 36]), Duration::ZERO);
     assert!(matches!(effects[..], [Effect::View(new)] if new.raster != Some(raster)));

@@ -124,7 +124,7 @@ fn random_events_keep_model_valid() {
     let physical = include_str!("../../scenes/mirror-room-physical.toml");
     let mut fired = HashSet::new();
     play("room", ROOM, 1, &mut fired);
-    play("built in", BUILT_IN, 2, &mut fired);
+    play("built in", MIRROR_ROOM, 2, &mut fired);
     play("physical", physical, 3, &mut fired);
     let labels: Vec<_> = COMMANDS.iter().map(|c| c.label).filter(|label| *label != QUIT).collect();
     let missed: Vec<_> = labels.iter().filter(|label| !fired.contains(*label)).collect();

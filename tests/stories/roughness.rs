@@ -34,7 +34,7 @@ fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
 
 #[test]
 fn roughness_changes_only_pixels_of_the_mirror() {
-    let mut desk = Desk::new(BUILT_IN);
+    let mut desk = Desk::new(MIRROR_ROOM);
     let smooth = desk.scene().clone();
     // The roughness grows from 0.04 to about 0.1. Such a small blur leaves the centres of shadows
     // unchanged, because they are evenly lit.

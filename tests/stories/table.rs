@@ -1,6 +1,7 @@
 //! Consistency of the command table.
 
 use crate::harness::*;
+use crate::stories::watch;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo_terminal::event::Key;
 
@@ -61,9 +62,10 @@ fn keys_manual() -> String {
             page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
         }
     }
+    let watching = watch::watching(1);
     page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
              | keys | action |\n|---|---|\n";
-    for command in COMMANDS.iter().filter(|command| command.while_watching) {
+    for command in COMMANDS.iter().filter(|command| command.is_listed(&watching.model)) {
         page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
     }
     page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";

@@ -33,8 +33,8 @@ fn report(shards: Vec<WatchedShards>) -> WatchReport {
     }
 }
 
-fn watching(rows: usize) -> Desk {
-    let mut desk = Desk::new(BUILT_IN);
+pub fn watching(rows: usize) -> Desk {
+    let mut desk = Desk::new(MIRROR_ROOM);
     let rows = (0..rows).map(|number| shard(number, WatchedState::Running)).collect();
     desk.send(Message::Watched(Box::new(report(rows))));
     desk.effects.clear();
@@ -90,7 +90,7 @@ fn every_key_edits_and_renders_nothing() {
 
 #[test]
 fn help_and_palette_have_the_keys_that_work() {
-    let listed: Vec<_> = help(true)
+    let listed: Vec<_> = help(&watching(3).model)
         .into_iter()
         .filter_map(|line| match line {
             HelpLine::Keys(keys, label) => Some((keys, label)),

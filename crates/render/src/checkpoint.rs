@@ -25,7 +25,6 @@ use zerkalo_world::{self as world, AnyWorld};
 
 const SCENE: Tag = *b"SCEN";
 const SCHEDULE: Tag = *b"SCHD";
-/// Tag of the checkpoint's chunk with the seconds of rendering.
 const CLOCK: Tag = *b"TIME";
 
 /// Version of this program. Another version may trace different samples.
@@ -37,19 +36,18 @@ const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// preceded by its length (u32): the program's version, the sampler's name, the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleInputs {
-    /// Hash of the contents of meshes and images, see [`Scene::contents_hash`]. `None` if the scene
-    /// has neither.
+    /// Value of [`Scene::contents_hash`].
     pub contents_hash: Option<u64>,
     /// Version of the program that traced the samples.
     pub program: String,
-    /// Name of the kind of random numbers, see [`SamplerKind::name`].
+    /// Value of [`SamplerKind::name`].
     pub sampler: String,
-    /// Scene for which the samples were traced, as text of a scene file.
+    /// Scene as text of a scene file.
     pub scene: String,
 }
 
 impl SampleInputs {
-    /// Creates the inputs of the samples that this version of the program traces for `scene`.
+    /// Creates the inputs of the samples that this program traces for `scene`.
     pub fn new(scene: &Scene, sampler: SamplerKind) -> Self {
         Self {
             contents_hash: scene.contents_hash(),
@@ -59,8 +57,7 @@ impl SampleInputs {
         }
     }
 
-    /// Encodes the inputs of the render's samples as a chunk of a film file. Returns the tag of the
-    /// chunk and its contents.
+    /// Encodes the inputs as a chunk of a film file.
     pub fn encode(&self) -> (Tag, Vec<u8>) {
         let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
         for text in [&self.program, &self.sampler, &self.scene] {
@@ -70,9 +67,8 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if samples that were traced with these inputs are valid for `scene`. The
-    /// lights of `scene` may differ from those of [`Self::scene`] in colour and intensity if the
-    /// film stores their light separately.
+    /// Returns `true` if samples with these inputs are valid for `scene`, whose lights may differ
+    /// in colour and intensity if the film stores their light separately.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
@@ -84,8 +80,8 @@ impl SampleInputs {
                 .can_reuse(&compiled, scene)
     }
 
-    /// Reads the inputs of the samples from the header of a film file. Returns `None` if the header
-    /// has none, or damaged ones.
+    /// Reads the inputs from the header of a film file. Returns `None` if it has none, or damaged
+    /// ones.
     pub fn of(header: &FilmFileHeader) -> Option<Self> {
         let mut fields = Fields::new(header.chunks.get(&SCENE)?);
         let hash = fields.u64()?;
@@ -99,8 +95,7 @@ impl SampleInputs {
 pub struct EncodedCheckpoint(Vec<Vec<u8>>);
 
 impl EncodedCheckpoint {
-    /// Encodes the state of a render as a checkpoint, on the threads of `pool`. `report` is the
-    /// latest report on this render.
+    /// Encodes a render on the threads of `pool`. `report` is the latest report on it.
     pub(super) fn new(
         state: &RenderState,
         schedule: &Schedule,
@@ -110,7 +105,7 @@ impl EncodedCheckpoint {
     ) -> Self {
         let film = &state.film;
         let compiled = state.lighting().compiled();
-        let mut header = film_header(state, report, provenance, state.display());
+        let mut header = film_header(state, report, provenance);
         header.chunks.extend([
             SampleInputs::new(compiled, provenance.sampler).encode(),
             (SCHEDULE, schedule.encode()),
@@ -125,13 +120,8 @@ impl EncodedCheckpoint {
         Self(pieces)
     }
 
-    /// Writes the checkpoint to the file at `path`. If there is a file at `path` already,
-    /// `existing` decides: the file is replaced once the new one is complete, or the function
-    /// fails.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written, or if it exists and must not be replaced. An existing
-    /// file is then unchanged.
+    /// Writes the checkpoint to the file at `path`, in one step. `existing` decides if a file there
+    /// may be replaced. After an error an existing file is unchanged.
     pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
         write_film_file(path, &self.0, existing)
     }
@@ -141,47 +131,25 @@ impl EncodedCheckpoint {
 #[derive(Debug)]
 pub struct Checkpoint {
     path: PathBuf,
-    /// Header of the checkpoint's film file: all contents except for the film.
+    /// Contents of the checkpoint's file except for the film.
     pub header: FilmFileHeader,
-    /// Inputs of the samples: scene, sampler, program version.
     pub inputs: SampleInputs,
     film: Film,
 }
 
-/// State of a render that was restored from a checkpoint.
+/// Render that was restored from a checkpoint.
 pub(super) struct Resumed {
     pub state: RenderState,
-    schedule: Vec<u8>,
-    path: PathBuf,
-    /// Seconds that the render had taken when the checkpoint was written: the sum over all runs of
-    /// the program that continued it.
+    pub schedule: Schedule,
+    /// Seconds of rendering until the checkpoint, over all runs of the program.
     pub seconds: f64,
-    /// `true` if the light weights or the display transform of the resumed render differ from those
-    /// of the checkpoint.
+    /// `true` if light weights or display transform differ from those of the checkpoint.
     pub is_relit: bool,
 }
 
-impl Resumed {
-    /// Restores the schedule of the checkpoint's render, with new settings.
-    ///
-    /// # Errors
-    /// Fails if the state of the schedule does not belong to the film.
-    pub fn schedule(&self, settings: Settings) -> Result<Schedule, ReadError> {
-        let film = &self.state.film;
-        let counts: Vec<_> = (0..film.tile_count()).map(|tile| film.counts(tile)).collect();
-        let mut schedule = self.state.schedule(settings);
-        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| {
-            let what = "the state of its schedule does not belong to its samples";
-            ReadError::new(&self.path, what, "copy it again, or use an older one")
-        })
-    }
-}
-
 impl Checkpoint {
-    /// Reads the checkpoint at `path`.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read, is no checkpoint, or is damaged.
+    /// Reads the checkpoint at `path`. Fails if the file cannot be read, is no checkpoint, or is
+    /// damaged.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let (header, film) = FilmReader::open(path)?.read()?;
         let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
@@ -199,15 +167,13 @@ impl Checkpoint {
         SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Compiles the checkpoint's scene and restores its render. The picture is then that of
-    /// `scene`, whose lights may differ from those of the checkpoint's scene.
-    ///
-    /// # Errors
-    /// Fails if the samples of the checkpoint are not those of `scene` and `options`.
+    /// Compiles the checkpoint's scene and restores its render, as a picture of `scene`. Fails if
+    /// the samples are not those of `scene` and `options`.
     pub(super) fn resume(
         self,
         scene: &Arc<Scene>,
         options: &Options,
+        settings: Settings,
     ) -> Result<Resumed, ReadError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
@@ -240,19 +206,18 @@ impl Checkpoint {
         }
         let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
         let seconds = seconds_of(&self.header);
-        let mut chunks = self.header.chunks;
+        let encoded = self.header.chunks.get(&SCHEDULE).map_or(&[][..], Vec::as_slice);
+        let counts: Vec<_> = (0..self.film.tile_count()).map(|i| self.film.counts(i)).collect();
+        let mut schedule = state.schedule(settings);
+        schedule.restore(encoded, &counts).ok_or_else(|| {
+            let what = "the state of its schedule does not belong to its samples";
+            self.error(what, "copy it again, or use an older one")
+        })?;
         state.film = self.film;
-        Ok(Resumed {
-            state,
-            schedule: chunks.remove(&SCHEDULE).unwrap_or_default(),
-            path: self.path,
-            seconds,
-            is_relit,
-        })
+        Ok(Resumed { state, schedule, seconds, is_relit })
     }
 
-    /// Checks that size, seed, sampler and program version are those of a render of `scene` with
-    /// `options`.
+    /// Checks size, seed, sampler and program version.
     fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
         let film = &self.header.film;
         let [width, height] = scene.film.size.map(|n| n as usize);
@@ -283,7 +248,7 @@ impl Checkpoint {
     }
 }
 
-/// Returns the seconds that the render in a film file had taken; 0 if they are missing or invalid.
+/// Returns the seconds of rendering in a film file; 0 if they are missing or invalid.
 pub(super) fn seconds_of(header: &FilmFileHeader) -> f64 {
     let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
     seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite()).unwrap_or(0.0)

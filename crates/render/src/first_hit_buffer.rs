@@ -1,29 +1,25 @@
-//! First-hit buffer: the first hits of camera rays, one ray for each cell of the grid in which the
-//! dashboard shows the picture.
+//! First-hit buffer: the first hits of camera rays for the dashboard's views of objects, normals
+//! and distances.
 
 use rayon::prelude::*;
 use zerkalo_world::FirstHit;
 
-/// Number of camera rays that a thread traces at a time for the first-hit buffer.
+/// Number of camera rays that a thread traces at a time.
 const CHUNK: usize = 512;
 
 /// First hits of the camera rays through the centres of the cells of a grid over the whole picture.
-/// The dashboard shows objects, normals and distances from this buffer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstHitBuffer {
-    /// Number of columns of the grid of cells, one camera ray per cell.
     pub columns: usize,
-    /// Number of rows of the grid of cells, one camera ray per cell.
     pub rows: usize,
-    /// First hit of each cell of the grid, `[row][column]`.
+    /// First hits, `[row][column]`.
     texels: Vec<FirstHit>,
 }
 
 impl FirstHitBuffer {
     /// Traces the buffer of a grid of `columns` x `rows` cells over a film of `width` x `height`
-    /// pixels: one camera ray through the centre of each cell. `first_hits` receives points of the
-    /// film in pixels, and writes the first hits of the camera rays through them (see
-    /// [`AnyWorld::first_hit`](zerkalo_world::AnyWorld::first_hit)).
+    /// pixels. `first_hits` gets points of the film in pixels, and writes the first hits of the
+    /// camera rays through them (see [`AnyWorld::first_hit`](zerkalo_world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],
@@ -46,8 +42,7 @@ impl FirstHitBuffer {
         Self { columns, rows, texels }
     }
 
-    /// Returns the first hit in the cell at `column` and `row` of the grid. Returns `None` if the
-    /// cell is outside of the grid.
+    /// Returns the first hit in a cell. Returns `None` outside the grid.
     pub fn at(&self, column: usize, row: usize) -> Option<&FirstHit> {
         if column >= self.columns {
             return None;

@@ -9,11 +9,10 @@ use std::sync::atomic::Ordering;
 use zerkalo_kernel::lanes::SimdFloat;
 use zerkalo_world::{AnyWorld, Counts, TileTracer, World};
 
-/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A (the first of two
-/// halves of the samples). The first stage traces every 8th pixel in x and y. Three further stages
-/// trace the pixels between, with steps of 4, 2 and 1. Each stage covers all tiles. Calls
-/// `on_stage` with the film after every stage except the last. If the pass is cancelled, it
-/// completes its first stage, starts no jobs of later stages, and returns `None`.
+/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A: first every 8th
+/// pixel in x and y, then in three stages the pixels between, with steps of 4, 2 and 1. Calls
+/// `on_stage` with the film after every stage except the last. A cancelled pass completes its first
+/// stage, starts no jobs of later ones, and returns `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -27,13 +26,10 @@ pub fn run(
     }
 }
 
-/// Number of adjacent tiles in a strip. In stages of the first pass that add only few pixels to
-/// each tile, the tiles of a strip share ray packets.
+/// Number of adjacent tiles that share packets in stages with few pixels for each tile.
 const STRIP_TILES: usize = 8;
 
-/// Largest step \[pixels\] at which one tile has enough pixels to fill ray packets. A stage of the
-/// first pass traces every n-th pixel in x and y, with n the step. In stages with larger steps,
-/// adjacent tiles share packets.
+/// Largest step \[pixels\] of a stage in which one tile has enough pixels to fill packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(
@@ -78,20 +74,17 @@ fn trace_first_pass<L: SimdFloat>(
     Some(WaveReport { reports: counts.into_iter().map(report).collect() })
 }
 
-/// Pixel of a strip of adjacent tiles.
 struct StripPixel {
-    /// Index of the tile in its strip of adjacent tiles.
+    /// Index of the tile in its strip.
     tile: usize,
-    /// Number of the pixel in its tile; pixels are numbered row by row.
+    /// Number of the pixel in its tile, row by row.
     pixel: usize,
-    /// Column and row of the pixel in the picture.
     position: (u32, u32),
 }
 
-/// Returns the pixels that a stage of the first pass adds to `tiles`. A lattice with the step n
-/// holds every n-th pixel of the picture in x and y. The stage adds the pixels of the lattice with
-/// the step `step` that are not in the lattice with the step `previous_step` (0: no earlier
-/// lattice). `tiles` has each tile with the column and row of its first pixel.
+/// Returns the pixels of `tiles` that a stage adds: those of the lattice with the step `step` in x
+/// and y that are not in the lattice with the step `previous_step` (0: none). `tiles` has the first
+/// pixel of each tile.
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -109,11 +102,8 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the first sample of the pixels that one stage of the first pass adds. A lattice with
-    /// the step n holds every n-th pixel in x and y. `steps` has two steps: that of the previous
-    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share ray
-    /// packets if the stage adds only few pixels to each. `counts` receives the ray counts of the
-    /// tiles.
+    /// Traces the pixels that one stage adds to adjacent tiles. `steps` are those of the previous
+    /// stage (0: none) and of this one.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
@@ -135,9 +125,7 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Traces the first sample of each of `pixels` with `tracer`, which was created for these
-    /// pixels, and adds the sample to the pixel's tile. `counts` receives the ray counts of
-    /// `tiles`.
+    /// Traces the first sample of each of `pixels` with `tracer`, which was created for them.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],
@@ -165,9 +153,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 }
             }
         });
-        // The rays of shared packets are divided among the tiles in proportion to the pixels of
-        // each tile, because the reported cost must not depend on the packet width. Only packets of
-        // a single tile report random choices (`glossy`).
+        // The rays of shared packets are divided in proportion to the pixels of each tile, because
+        // the cost must not depend on the packet width. Only packets of a single tile report random
+        // choices.
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

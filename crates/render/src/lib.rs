@@ -1,6 +1,8 @@
 //! Progressive rendering: the schedule of samples, the passes that trace them, and the session that
 //! runs both in the background.
 
+#![allow(missing_docs, reason = "fields and functions whose names say it")]
+
 pub mod film;
 pub mod image_file;
 

@@ -10,22 +10,18 @@ use zerkalo_scene::process_memory::{
 
 /// Memory for a linear copy of the picture, in addition to the film \[bytes per pixel\].
 const COPY_BYTES: u64 = 16;
-/// Memory \[bytes\] of each tile in addition to the film's sums: the tile itself, its entry in the
-/// schedule, and its noise estimate.
+/// Memory \[bytes\] of a tile in addition to its sums: its entry in the schedule and its estimate.
 const TILE_BYTES: u64 = 512;
 
-/// Returns the memory that a render of `size` pixels with `groups` light groups needs \[bytes\].
+/// Returns the memory \[bytes\] that a render needs.
 pub fn needed(size: [u32; 2], groups: usize) -> u64 {
     let [width, height] = size.map(u64::from);
     let tiles = width.div_ceil(TILE as u64) * height.div_ceil(TILE as u64);
     Film::memory_bytes(size, groups) + COPY_BYTES * width * height + TILE_BYTES * tiles
 }
 
-/// Checks that a render of `size` pixels with `groups` light groups fits into the available memory.
-/// `reusable` is the memory \[bytes\] of an earlier film, which the new film takes over.
-///
-/// # Errors
-/// Returns a message with the needed and the available memory and a remedy.
+/// Checks that a render fits into the available memory, and otherwise returns a message with a
+/// remedy. `reusable` is the memory \[bytes\] of an earlier film, which the new film takes over.
 pub fn check(size: [u32; 2], groups: usize, reusable: u64) -> Result<(), String> {
     let Some(available) = available_memory() else { return Ok(()) };
     let bytes = available.bytes.saturating_add(reusable);
@@ -54,8 +50,8 @@ fn compare(size: [u32; 2], groups: usize, available: Available) -> Result<(), St
     ))
 }
 
-/// Returns the error message for a film whose allocation fails, although enough memory is available
-/// in total.
+/// Returns the message for a film whose allocation fails although enough memory is available in
+/// total.
 pub fn refused(size: [u32; 2], groups: usize) -> String {
     let [width, height] = size;
     format!(
@@ -65,41 +61,35 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
     )
 }
 
-/// Memory \[bytes\] of each tile of a picture region in addition to the film's sums: the tile
-/// itself, its entry in the schedule with the latest estimates, its jobs and their reports.
+/// Memory \[bytes\] of a tile of a region in addition to its sums: its entry in the schedule, its
+/// estimates, jobs and reports.
 const REGION_TILE_BYTES: u64 = 1024;
-/// Memory for each tile of a picture that is rendered in regions: its error estimate, and its entry
-/// in the list from which percentiles of the errors are computed \[bytes\].
+/// Memory \[bytes\] of a tile of a picture in regions: its estimate, and its entry in the list for
+/// percentiles.
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
-/// Memory while a row of OpenEXR tiles is encoded \[bytes per pixel column and layer\]. The layers
+/// Memory \[bytes per pixel column and layer\] while a row of OpenEXR tiles is encoded. The layers
 /// are the picture, its two replicates, and the light groups.
 const ROW_BYTES: u64 = 256;
 /// Memory of the program's buffers and allocator, in addition to scene and film \[bytes\].
 const PROGRAM_BYTES: u64 = 3 << 20;
 /// Memory of one tracing thread for its stack and its paths \[bytes\].
 const THREAD_BYTES: u64 = 1 << 20;
-/// Assumed memory of program and scene on systems that do not report the memory of a process
-/// \[bytes\].
+/// Assumed memory of program and scene \[bytes\] on systems that do not report it.
 const UNKNOWN_RESIDENT: ResidentMemory = ResidentMemory { now: 64 << 20, peak: 64 << 20 };
 
-/// Regions into which a picture is divided: bands of rows that are rendered one after another.
+/// Bands of rows into which a picture is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Regions {
     /// Number of rows of each region except the last; a multiple of [`TILE`].
     pub rows: u32,
-    /// Number of regions of the picture.
     pub count: u32,
     /// Expected peak of the memory of this process \[bytes\].
     pub bytes: u64,
 }
 
-/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions for which
-/// the memory of this process is at most `cap` bytes. The process holds the program, the scene
-/// (which is compiled already) and one region at a time.
-///
-/// # Errors
-/// Returns the smallest possible `cap` in bytes if not even regions of one row of tiles fit, or if
-/// the process has already used more memory than `cap`.
+/// Divides a picture into the fewest regions for which this process, with the program, the compiled
+/// scene and one region at a time, has at most `cap` bytes. If not even one row of tiles fits, or
+/// the process has used more already, returns the smallest possible `cap`.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }
@@ -131,8 +121,7 @@ fn divide_from(
     })
 }
 
-/// Rounds the width or height of a picture down to a multiple of 16, for messages. A number of 1024
-/// or more is rounded down to a multiple of 128. The result is at least 1.
+/// Rounds a side down to a multiple of 16, or of 128 from 1024 on, for messages; at least 1.
 fn round_down(side: u32) -> u32 {
     match side {
         0..16 => 1,

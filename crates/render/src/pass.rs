@@ -1,6 +1,5 @@
-//! Pass: traces the jobs of one wave and adds their samples to the film. A wave is a set of jobs
-//! that run concurrently, each with samples of one tile. The pass returns when all jobs are done or
-//! cancelled.
+//! Pass: traces the jobs of one wave and adds their samples to the film. The pass returns when all
+//! jobs are done or cancelled.
 
 use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::wave::{Job, JobReport, Wave, WaveReport};
@@ -14,20 +13,17 @@ use zerkalo_world::{
 
 const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
 
-/// Inputs that all jobs of a tracing pass share.
+/// Inputs that all jobs of a pass share.
 #[derive(Clone, Copy)]
 pub struct PassContext<'a> {
-    /// Random seed and kind of random numbers.
     pub sampling: &'a SampleSettings,
-    /// Thread pool that traces the jobs.
     pub pool: &'a rayon::ThreadPool,
-    /// Flag that cancels the pass: once it is `true`, no further job starts.
+    /// Once it is `true`, no further job starts.
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` (a set of jobs that run concurrently) and adds their samples to
-/// `film`. If `wave.estimate` is `true`, `estimator` computes the error of each tile. The report
-/// has an entry for each job, which is `None` if the job was cancelled.
+/// Traces the jobs of `wave` and adds their samples to `film`. `estimator` computes the errors of
+/// tiles if `wave.estimate` is set.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -63,8 +59,8 @@ pub fn run_typed<L: SimdFloat>(
         let error = if wave.estimate { estimator.tile(tile) } else { None };
         Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
     };
-    // If the wave has a single job and the pool a single thread, the calling thread traces the job.
-    // This saves a switch of threads.
+    // The calling thread traces a single job, if the pool has a single thread: no switch of
+    // threads.
     let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
         slots.into_iter().zip(&wave.jobs).map(trace).collect()
     } else {
@@ -73,15 +69,13 @@ pub fn run_typed<L: SimdFloat>(
     WaveReport { reports }
 }
 
-/// Renderer of tiles: traces samples and adds their radiance to the film's integer sums.
 pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
-    /// Scale of each light group: the number of the film's integer steps per unit of radiance.
+    /// Scale of each light group: integer steps of the film per unit of radiance.
     scales: &'a [f64],
-    /// Largest radiance of one sample that the film can hold, for each light group: 2^49 of the
-    /// film's integer steps.
+    /// Largest radiance of one sample that the film can hold, for each light group: 2^49 steps.
     limits: [L; MAX_GROUPS],
-    /// Indices of the pixels of a tile that is entirely inside the picture, see [`pixels_of`].
+    /// Pixels of a tile that is entirely inside the picture, see [`pixels_of`].
     whole_tile: Vec<u8>,
 }
 
@@ -99,11 +93,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of `job` in the replicate (half of the samples) with the number
-    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the number
-    /// of rays, and a flag that is `true` if a path made a random choice. A packet has `WIDTH`
-    /// lanes. It holds `WIDTH` samples of one pixel if its first sample index is a multiple of
-    /// `WIDTH` and at least `WIDTH` samples remain. Otherwise it holds samples of several pixels.
+    /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. A
+    /// packet holds `WIDTH` samples of one pixel if its first index is a multiple of `WIDTH` and so
+    /// many samples remain; otherwise it holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -150,9 +142,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         tracer.counts()
     }
 
-    /// Traces the samples `first..first + COUNT` of the pixels `pixels` and adds them to `tile`.
-    /// Each packet holds samples of several pixels. Samples that the film cannot hold are recorded
-    /// in `rejected`.
+    /// Traces the samples `first..first + COUNT` of `pixels` in packets of several pixels.
     #[inline(never)]
     fn trace_shared<const COUNT: usize>(
         &self,
@@ -173,7 +163,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     }
 
     /// Sums the radiance of each light group over all lanes, in integer steps of the film. Calls
-    /// `add(group, sums)` with the sums of red, green and blue.
+    /// `add(group, sums)` with red, green and blue.
     #[inline(always)]
     fn sum(&self, radiance: &Radiance<L>, mut add: impl FnMut(usize, [i64; 3])) {
         for (group, scale) in self.scales.iter().enumerate() {
@@ -182,9 +172,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Sums the radiance of each light group over the lanes of each pixel, in integer steps of the
-    /// film. Each of `pixels` has `COUNT` consecutive lanes. Calls `add(pixel, group, sums)` with
-    /// the sums of red, green and blue.
+    /// Sums the radiance of each light group over the `COUNT` consecutive lanes of each pixel, in
+    /// integer steps of the film. Calls `add(pixel, group, sums)` with red, green and blue.
     #[inline(always)]
     pub(super) fn sum_by_pixel<const COUNT: usize, P>(
         &self,
@@ -202,9 +191,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces those samples of a packet that the film cannot hold, and records them in
-    /// `rejected`. Valid samples, which are the usual case, cost only a comparison. `sample_of`
-    /// receives a lane and returns the position of its pixel and its sample index.
+    /// Replaces the samples that the film cannot hold, and records them in `rejected`. Valid
+    /// samples cost only a comparison. `sample_of` returns pixel and sample index of a lane.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -226,10 +214,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Implements [`Self::reject_invalid`] for a packet with at least one invalid sample. A sample
-    /// that is NaN or negative in a channel of a light group becomes black in that group. A channel
-    /// above the largest value that the film can hold, even an infinite one, is reduced to this
-    /// value.
+    /// Implements [`Self::reject_invalid`] for a packet with an invalid sample. A light group in
+    /// which a channel is NaN or negative becomes black. A channel above the limit, even an
+    /// infinite one, is reduced to it.
     #[cold]
     fn replace_invalid(
         &self,
@@ -257,11 +244,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 /// Samples of one job that the film cannot hold.
 pub(super) struct RejectedSamples {
     replicate: usize,
-    /// Samples that are NaN or negative in at least one light group. In place of such a group's
-    /// light the film stores black.
+    /// Samples that are NaN or negative in a light group.
     pub(super) bad: Vec<InvalidSample>,
-    /// Samples that exceed the film's largest value in at least one light group. In place of the
-    /// excessive values the film stores the largest value.
+    /// Samples that exceed the film's limit in a light group.
     pub(super) saturated: Vec<InvalidSample>,
 }
 
@@ -272,15 +257,14 @@ impl RejectedSamples {
 }
 
 /// Returns the number of samples of one pixel in the next packet: the largest power of two, at most
-/// `width`, that divides `first` and fits into the sample indices `first..end`.
+/// `width`, that divides `first` and fits into `first..end`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Indices of a tile's pixels in the order of a Morton curve. An index counts the pixels row by
-/// row. Consecutive pixels of this order share packets; the pixels of a packet form a block of 2 x
-/// 1, 2 x 2, 4 x 2 or 4 x 4.
+/// Indices of a tile's pixels, counted row by row, in the order of a Morton curve. The pixels of a
+/// packet form a block of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
@@ -297,9 +281,7 @@ const MORTON_ORDER: [u8; TILE_PIXELS] = {
     order
 };
 
-/// Returns the indices of the pixels of a tile with the given width and height, in
-/// [`MORTON_ORDER`]. An index counts the pixels of a whole tile row by row. Tiles at the right and
-/// lower edge of the picture are smaller than a whole tile.
+/// Returns the pixels of a tile of the given size in [`MORTON_ORDER`].
 fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
     let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
     MORTON_ORDER.into_iter().filter(inside).collect()
@@ -310,7 +292,7 @@ mod tests {
     use super::*;
     use crate::film::Header;
     use crate::film::testing::TestFilm;
-    use zerkalo_kernel::lanes::{Float, Single, Vec3};
+    use zerkalo_kernel::lanes::{Float, Single};
     use zerkalo_kernel::sampling::SamplerKind;
 
     /// Checks that invalid samples are counted and stored as black, and that samples above the
@@ -341,7 +323,7 @@ mod tests {
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
             let mut rejected = RejectedSamples::new(0);
-            let mut radiance = Radiance { groups: [Vec3::<Single>::zero(); MAX_GROUPS] };
+            let mut radiance = Radiance::<Single>::black();
             radiance.groups[0].x =
                 Single::from_fn(|i| Float::from_f64(if i == 3 { value } else { 0.5 }));
             radiance.groups[1].y = Single::from_f64(0.25);

@@ -1,14 +1,12 @@
 //! Render of a picture that does not fit into memory, in regions: bands of rows, from top to
-//! bottom.
+//! bottom, each with its own film and schedule.
 //!
-//! Each region has its own film and its own schedule. Its film uses the memory of the previous
-//! region's film. A sample is a function of seed, pixel, replicate (half of the samples) and index;
-//! a uniform render in regions therefore equals a render of the whole picture, bit for bit. An
-//! adaptive render in regions differs from that of the whole picture, because it allocates samples
-//! within each region.
+//! A sample is a function of seed, pixel, replicate and index; a uniform render in regions
+//! therefore equals one of the whole picture, bit for bit. An adaptive render differs, because it
+//! allocates samples within each region.
 
 use crate::export::{Provenance, metadata};
-use crate::film::{Display, Film, Noise, TileNoise};
+use crate::film::{Film, Noise, TileNoise};
 use crate::image_file::{Bands, Depth, ImageData, ImageOutput};
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
@@ -21,50 +19,41 @@ use std::time::Instant;
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::WriteError;
 
-/// Target duration in seconds of a piece of a render in regions. A piece is the work between two
-/// calls of the observer, a callback that receives reports on the progress.
+/// Target duration in seconds of the work between two calls of the observer.
 const PIECE_SECONDS: f64 = 0.25;
-/// Number of samples, over all pixels, of the first piece of a render in regions. A piece is the
-/// work between two calls of the observer (the progress callback). The first piece measures the
-/// speed of tracing.
+/// Number of samples, over all pixels, of the first piece, which measures the speed.
 const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
-/// Largest number of samples per pixel of a tracing job (samples of one tile) in a region. Jobs are
-/// short, so that all threads have work until the end of a piece.
+/// Largest number of samples per pixel of a job. Jobs are short, so that all threads have work
+/// until the end of a piece.
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
-/// Callback that receives a report between two pieces of work and before each row is written. If it
-/// returns an error, the render ends with this error.
+/// Callback that receives a report after each piece of work and before each row is written. An
+/// error that it returns ends the render.
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
-/// Render of a picture in regions: bands of rows, one after another.
+/// Render of a picture in regions.
 pub struct RegionRender<'a> {
-    /// Compiled scene, with the film of the current region. `None` while the film is exchanged, and
-    /// after a failed exchange.
+    /// Compiled scene, with the film of the current region. `None` after a failed exchange of the
+    /// film.
     state: Option<RenderState>,
     settings: Settings,
     pool: rayon::ThreadPool,
     provenance: Provenance,
-    display: Display,
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
-    /// Number of rows of the picture in the finished regions.
     finished_rows: u32,
-    /// Estimated error of each tile of the finished regions, in row order.
+    /// Estimated errors of the tiles of the finished regions, in row order.
     estimates: Vec<Option<TileNoise>>,
-    /// Report on all finished regions together.
     report: Report,
     stopped_by: StoppedBy,
     observer: Observer<'a>,
 }
 
 impl<'a> RegionRender<'a> {
-    /// Compiles `scene`, which must have no validation errors, for regions of `rows` rows and for
-    /// `threads` threads. `rows` must be a multiple of [`TILE`](crate::film::TILE). Each region is
-    /// rendered until one of the stop criteria of `settings` is reached. A time limit is divided
-    /// among the regions.
-    ///
-    /// # Errors
-    /// Fails if a thread cannot be started, or if there is not enough memory for a region.
+    /// Compiles `scene`, which must be valid, for regions of `rows` rows, a multiple of
+    /// [`TILE`](crate::film::TILE). Each region is rendered until a stop criterion is reached; a
+    /// time limit is divided among them. Fails if a thread cannot be started, or if there is not
+    /// enough memory for a region.
     pub fn new(
         scene: &Arc<Scene>,
         options: &Options,
@@ -90,7 +79,6 @@ impl<'a> RegionRender<'a> {
             settings: Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings },
             pool,
             provenance,
-            display: options.display,
             rows,
             finished_rows: 0,
             estimates: Vec::new(),
@@ -101,11 +89,7 @@ impl<'a> RegionRender<'a> {
     }
 
     /// Renders the picture and writes its rows as they finish. Returns the report on the whole
-    /// picture and the stop criterion that ended it.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written or the observer returns an error; an existing file is
-    /// then unchanged.
+    /// picture and the stop criterion that ended it. After an error an existing file is unchanged.
     pub fn write(
         &mut self,
         depth: Depth,
@@ -113,12 +97,11 @@ impl<'a> RegionRender<'a> {
     ) -> Result<(Report, StoppedBy), WriteError> {
         let state = self.state();
         let (mix, group_names) = (&state.mix.clone(), &state.group_names());
-        let (size, display) = (state.scene().film.size, self.display);
+        let (size, display) = (state.scene().film.size, state.display());
         output.write(&ImageData { size, mix, group_names, display, depth }, self)?;
         Ok((self.report.clone(), self.stopped_by))
     }
 
-    /// Returns the compiled scene, with the film of the current region.
     pub fn state(&self) -> &RenderState {
         self.state.as_ref().expect("a region after a failed one is not rendered")
     }
@@ -184,9 +167,8 @@ impl<'a> RegionRender<'a> {
     }
 }
 
-/// Returns the report on a picture of `height` rows that is rendered in regions. `finished` is the
-/// report on the regions above the current one. `schedule` is that of the current region, which has
-/// the rows `rows` and has been rendered for `seconds` seconds.
+/// Returns the report on a picture of `height` rows. `finished` is that on the regions above the
+/// current one, which has the rows `rows` and has been rendered for `seconds` seconds.
 fn progress(
     finished: &Report,
     schedule: &Schedule,
@@ -225,6 +207,6 @@ impl Bands for RegionRender<'_> {
     }
 
     fn metadata(&self) -> Vec<(String, String)> {
-        metadata(self.state(), &self.report, &self.provenance, &self.display)
+        metadata(self.state(), &self.report, &self.provenance)
     }
 }

@@ -16,21 +16,17 @@ use zerkalo_world::{self as world, AnyWorld};
 /// Options of a render: scene compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Options of scene compilation.
     pub world: world::Options,
-    /// Random seed and kind of random numbers.
     pub sampling: SampleSettings,
-    /// Display transform of the picture whose noise is estimated in 8-bit levels.
+    /// Display transform of the picture whose noise is estimated.
     pub display: Display,
 }
 
 /// State of a progressive render: compiled scene, its film, and the estimator of the film's noise.
 pub struct RenderState {
-    /// Compiled scene.
     pub world: AnyWorld,
-    /// Film that holds the samples.
     pub film: Film,
-    /// Weight of each light group in the picture of the current scene: colour times intensity.
+    /// Weight of each light group in the current picture.
     pub mix: LightWeights,
     scene: Arc<Scene>,
     lighting: Arc<Relighting>,
@@ -40,22 +36,16 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which must have no validation errors, and creates an empty film. The film
-    /// reuses the memory of the film of `previous`.
-    ///
-    /// # Panics
-    /// Panics if there is not enough memory for the film.
+    /// Compiles `scene`, which must be valid, and creates an empty film, in the memory of the film
+    /// of `previous`. Panics if there is not enough memory.
     pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
         let rows = 0..scene.film.size[1];
         Self::compile(Arc::new(scene.clone()), options, previous, rows)
             .expect("memory for the film")
     }
 
-    /// Compiles `scene` as [`RenderState::new`] does, after validation.
-    ///
-    /// # Errors
-    /// Returns the first validation error of the scene, or an error if there is not enough memory
-    /// for the film.
+    /// Compiles `scene` as [`RenderState::new`] does, after validation. Returns the first
+    /// validation error, or an error if there is not enough memory.
     pub fn checked(
         scene: &Arc<Scene>,
         options: &Options,
@@ -67,12 +57,8 @@ impl RenderState {
         }
     }
 
-    /// Replaces the film by an empty film for the rows `rows` of the picture. The new film reuses
-    /// the memory of the old film.
-    ///
-    /// # Errors
-    ///
-    /// Fails if there is not enough memory for the film. The state is then lost.
+    /// Replaces the film by an empty one for the rows `rows` of the picture, in the same memory. If
+    /// there is not enough memory, the state is lost.
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
         let size = [self.film.width() as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header().clone() };
@@ -81,12 +67,9 @@ impl RenderState {
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
 
-    /// Compiles `scene`, which must have no validation errors, and creates an empty film for the
-    /// rows `rows` of the picture. The film reuses the memory of the film of `previous`. The first
-    /// row must be a multiple of [`TILE`](crate::film::TILE).
-    ///
-    /// # Errors
-    /// Fails if there is not enough memory for the film.
+    /// Compiles `scene`, which must be valid, and creates an empty film for the rows `rows` of the
+    /// picture, in the memory of the film of `previous`. The first row must be a multiple of
+    /// [`TILE`](crate::film::TILE). Fails if there is not enough memory.
     pub(super) fn compile(
         scene: Arc<Scene>,
         options: &Options,
@@ -100,8 +83,7 @@ impl RenderState {
             let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
             Film::memory_bytes(size, previous.film.groups())
         };
-        // For a band of the picture, the needed memory was compared with the available memory when
-        // the picture was divided into bands.
+        // The memory of a band was checked when the picture was divided into bands.
         if size == scene.film.size {
             memory_budget::check(size, groups, previous.as_ref().map_or(0, film_of))?;
         }
@@ -134,8 +116,8 @@ impl RenderState {
         })
     }
 
-    /// Shows the samples of the film as a picture of `scene` from now on and returns `true`, if the
-    /// samples are valid for `scene`. Otherwise changes nothing and returns `false`.
+    /// Shows the samples as a picture of `scene` from now on and returns `true`, if they are valid
+    /// for it. Otherwise changes nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
@@ -146,36 +128,31 @@ impl RenderState {
         true
     }
 
-    /// Returns the scene that the picture shows. The colours and intensities of its lights may
-    /// differ from those of the compiled scene.
+    /// Returns the scene of the picture. Its lights may differ from those of the compiled scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// Returns the name of each light group. The lights of a group share one weight in the picture.
+    /// Returns the name of each light group.
     pub fn group_names(&self) -> Vec<String> {
         self.world.light_groups().names(&self.scene)
     }
 
-    /// Returns the relighting of this film: its light groups, and the scene for which its samples
-    /// were traced.
+    /// Returns the light groups of the film, with the scene for which its samples were traced.
     pub fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    /// Returns the display transform of the picture whose noise is estimated.
     pub fn display(&self) -> Display {
         self.display
     }
 
-    /// Sets the display transform of the picture whose noise is estimated.
     pub fn set_display(&mut self, display: Display) {
         self.display = display;
         self.rebuild_estimator();
     }
 
-    /// Returns the estimator of noise in the picture as displayed: with the current light weights
-    /// and display transform.
+    /// Returns the estimator for the current light weights and display transform.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
     }
@@ -184,7 +161,6 @@ impl RenderState {
         self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
     }
 
-    /// Creates the schedule of samples for the empty film of this render.
     pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
         let pixels = (0..film.tile_count()).map(|tile| film.tile_pixels(tile) as u32);
@@ -192,12 +168,8 @@ impl RenderState {
         Schedule::new(&pixels, settings).with_light_period(self.world.light_period())
     }
 
-    /// Traces the first sample of every pixel in stages: first for a coarse grid of pixels, finally
-    /// for all pixels. `wave` has the jobs of this pass. Calls `on_refined` with the film after
-    /// each stage except the last.
-    ///
-    /// If `cancel_first_pass` becomes `true`, the pass ends after the first stage and returns
-    /// `None`. The film may then only be displayed; no further samples may be added to it.
+    /// Traces the jobs of the first pass, see [`first_pass::run`]. The film of a cancelled pass may
+    /// only be displayed; no further samples may be added to it.
     pub fn trace_first_pass(
         &mut self,
         wave: &Wave,
@@ -209,8 +181,7 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave, a set of jobs that run concurrently, and adds the samples to the film. If
-    /// `cancel_wave` becomes `true`, no further job starts.
+    /// Traces a wave. Once `cancel_wave` is `true`, no further job starts.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

@@ -1,6 +1,5 @@
-//! Synchronous progressive render, which returns to the caller after each allocation round.
-//! Measurements use it, because its samples do not depend on the moments at which a session would
-//! publish snapshots.
+//! Synchronous render, which returns after each round. Measurements use it, because its samples do
+//! not depend on the moments at which a session would publish snapshots.
 
 use crate::schedule::{Schedule, Settings, Step, StoppedBy};
 
@@ -11,23 +10,18 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use zerkalo_scene::Scene;
 
-/// Progressive render that blocks the calling thread, without a background session.
+/// Progressive render that blocks the calling thread.
 pub struct SyncRender {
-    /// Compiled scene and its film.
     pub state: RenderState,
-    /// Schedule of the render, with its latest noise estimates.
     pub schedule: Schedule,
-    /// Seconds that the render has spent on tracing rays, without scene compilation.
+    /// Seconds of tracing, without compilation.
     pub seconds: f64,
     pool: rayon::ThreadPool,
 }
 
 impl SyncRender {
-    /// Compiles `scene`, which must be valid, and prepares a render with `threads` threads.
-    ///
-    /// # Errors
-    /// Returns the operating system's error if a thread cannot be started, or an error if there is
-    /// not enough memory for the film.
+    /// Compiles `scene`, which must be valid. Fails if a thread cannot be started, or if there is
+    /// not enough memory.
     pub fn new(
         scene: &Scene,
         options: &Options,
@@ -42,10 +36,8 @@ impl SyncRender {
         Ok(Self { state, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces the next allocation round: the samples that the schedule adds next, in both
-    /// replicates (halves of the samples). Estimates the error of the picture if the schedule
-    /// requests an estimate at the end of this round. Returns the stop criterion that ended the
-    /// render, or `None` if it continues.
+    /// Traces the next round. Returns the stop criterion that ended the render, or `None` if it
+    /// continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -62,16 +54,8 @@ impl SyncRender {
         }
     }
 
-    /// Returns the estimated RMSE of the displayed picture, in 8-bit levels. Returns `None` before
-    /// the first estimate.
+    /// Returns the estimated RMSE in 8-bit levels. Returns `None` before the first estimate.
     pub fn noise_levels(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_levels)
-    }
-
-    /// Returns a lower and an upper estimate of the total seconds of tracing until the RMSE of the
-    /// displayed picture falls to `levels` 8-bit levels. Returns `None` before the first estimate.
-    pub fn seconds_to_noise(&self, levels: f64) -> Option<(f64, f64)> {
-        let (low, high) = self.schedule.seconds_to_noise(levels, self.seconds)?;
-        Some((self.seconds + low, self.seconds + high))
     }
 }

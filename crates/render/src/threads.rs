@@ -4,12 +4,8 @@ use std::fmt::Display;
 use std::io;
 
 /// Creates a pool of `threads` threads (0: one per processor). A `niceness` above 0 lowers their
-/// priority; with 19 they hardly run while other programs need the processors. The priority is set
-/// for each thread, and only on Linux. If the system refuses it, the threads run with the priority
-/// of the process.
-///
-/// # Errors
-/// Returns an error for the user if a thread cannot be started.
+/// priority, on Linux; with 19 they hardly run while other programs need the processors. Returns an
+/// error for the user if a thread cannot be started.
 pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -19,7 +15,6 @@ pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPoo
         .map_err(|error| error_of(threads, error))
 }
 
-/// Returns the error message that `threads` threads cannot be started. `error` is the reason.
 pub(super) fn error_of(threads: usize, error: impl Display) -> io::Error {
     io::Error::other(format!("cannot start {threads} threads: {error}; try fewer by --threads"))
 }

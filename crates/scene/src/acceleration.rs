@@ -27,20 +27,8 @@ impl Acceleration {
         Self::CHOICES[self as usize].name
     }
 
-    /// Returns the former name of this structure; `None` if its name has not changed. Scene files
-    /// and the command line still accept the former name.
-    pub fn former_name(self) -> Option<&'static str> {
-        match self {
-            Self::Auto | Self::None => None,
-            Self::ScreenBounds => Some("projected"),
-            Self::Obb => Some("object"),
-            Self::Aabb => Some("world"),
-            Self::Bvh => Some("hierarchy"),
-        }
-    }
-
-    /// Returns the structure whose name or former name is `name`; `None` if there is none.
+    /// Returns the structure with the name `name`; `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
+        Self::ALL.into_iter().find(|s| s.name() == name)
     }
 }

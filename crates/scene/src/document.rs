@@ -3,7 +3,6 @@
 use crate::asset::Assets;
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::disk::open_regular;
-use crate::format::migrate::{FormerWord, write_present};
 use crate::format::patch::rewrite;
 use crate::format::read::{SourceScene, read_text};
 use crate::value::TomlValue;
@@ -14,24 +13,16 @@ use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
 
-/// Text of a scene file and the scene that it describes. An edit of the scene changes only the
-/// values in the text that the edit concerns. Comments, order and layout of the rest of the text
-/// are kept.
+/// Text of a scene file and the scene that it describes. An edit changes only the values that it
+/// concerns; the rest of the text is kept.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
-    /// Text and scene as read: the origin of each change. [`Document::apply`] always changes a copy
-    /// of this text, not the result of the previous change. Undoing a removal therefore restores
-    /// its comments.
+    /// Text and scene as read. Each change starts from a copy of them, so that undoing a removal
+    /// restores its comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Former words in the text as read: keys and values under names from earlier versions of the
-    /// scene format.
-    former_words: Vec<FormerWord>,
     /// Warnings about the text of the scene file as read.
     warnings: Vec<Diagnostic>,
-    /// Warning that the file uses names of keys or values from earlier versions of the program. It
-    /// is also one of the `warnings`. `None` if the file uses none of them.
-    migration_warning: Option<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,
 }
@@ -39,22 +30,17 @@ pub struct Document {
 impl Scene {
     /// Returns the text of a new scene file that describes this scene, which must be valid.
     pub fn to_text(&self) -> String {
-        new_text(String::new(), &[], &Self::default(), self)
+        new_text(String::new(), &Self::default(), self)
     }
 }
 
 impl Document {
-    /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
-    /// scene refers to.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Reads and validates the scene file at `path`. Returns the errors of [`Scene::read`].
     pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 
-    /// Reads and validates the scene in the regular file at `path`. Other kinds of files are
-    /// refused without blocking.
+    /// Reads a regular file; other kinds are refused without blocking.
     pub(super) fn read_regular(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, open_regular)
     }
@@ -69,10 +55,8 @@ impl Document {
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics. Returns the errors of
+    /// [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
@@ -80,15 +64,12 @@ impl Document {
     fn parse_in(text: String, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         let source = SourceScene::parse(&text, name, resolver)?;
         let warnings = source.warnings();
-        let migration_warning = source.migration_warning();
-        let (scene, former_words) = (Arc::new(source.scene), source.former_words);
+        let scene = Arc::new(source.scene);
         let text = Arc::new(text);
         Ok(Self {
             name: name.to_string(),
             origin: (Arc::clone(&text), Arc::clone(&scene)),
-            former_words,
             warnings,
-            migration_warning,
             text,
             scene,
         })
@@ -97,10 +78,9 @@ impl Document {
     /// Changes the text so that it describes `scene`, which must be valid.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
-        self.text = if *scene == **old && self.former_words.is_empty() {
-            Arc::clone(text)
-        } else {
-            Arc::new(new_text(text.to_string(), &self.former_words, old, scene))
+        self.text = match *scene == **old {
+            true => Arc::clone(text),
+            false => Arc::new(new_text(text.to_string(), old, scene)),
         };
         self.scene = Arc::new(scene.clone());
     }
@@ -132,23 +112,15 @@ impl Document {
         &self.text
     }
 
-    /// Returns the warnings about the file as it was read, sorted by location: those of
-    /// [`Scene::warnings`] with line and column, and one about names of earlier versions.
+    /// Returns the located [`Scene::warnings`] about the file as it was read.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
     }
-
-    /// Returns the warning about names of earlier versions in the file as it was read. Returns
-    /// `None` if the file has none of these names.
-    pub fn migration_warning(&self) -> Option<&Diagnostic> {
-        self.migration_warning.as_ref()
-    }
 }
 
-/// Changes `text`, which describes the scene `old`, to describe the scene `new`, and returns the
-/// result. Uniform line endings are kept, as are a byte order mark and a missing line ending at the
-/// end of the file. Mixed line endings become LF.
-fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
+/// Changes `text`, which describes `old`, to describe `new`. Uniform line endings are kept, as are
+/// a byte order mark and a missing line ending at the end; mixed line endings become LF.
+fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),
         None => ("", text.as_str()),
@@ -157,7 +129,6 @@ fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene)
     let open_end = !body.is_empty() && !body.ends_with('\n');
     // This cannot fail: the text was parsed before.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
-    write_present(&mut document, former_words);
     rewrite(&mut document, &old.to_table(), &new.to_table());
     let mut body = document.to_string();
     if body.starts_with("\n[") {

@@ -1,6 +1,7 @@
 //! Tests of saving and reloading scene files, on a real file system.
 
-use crate::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
+use crate::testing::MIRROR_ROOM;
+use crate::{DiskState, SaveError, Scene, SceneFile};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// and the opened file.
 fn opened(directory: &Path) -> (PathBuf, SceneFile) {
     let path = directory.join("scene.toml");
-    fs::write(&path, BUILT_IN).unwrap();
+    fs::write(&path, MIRROR_ROOM).unwrap();
     let file = SceneFile::open(&path).unwrap();
     (path, file)
 }
@@ -31,10 +32,10 @@ fn saving_and_undoing_gives_the_same_bytes() {
     let start = file.document().scene().clone();
     file.save(&edited(&file, 3), false).unwrap();
     let text = fs::read_to_string(&path).unwrap();
-    assert_eq!(text, BUILT_IN.to_string() + "\n[trace]\nmax_depth = 3\n");
+    assert_eq!(text, MIRROR_ROOM.to_string() + "\n[trace]\nmax_depth = 3\n");
     assert_eq!(file.on_disk(), DiskState::Unchanged);
     file.save(&start, false).unwrap();
-    assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);
+    assert_eq!(fs::read_to_string(&path).unwrap(), MIRROR_ROOM);
     assert_eq!(count(directory.path()), 1, "no temporary file is left");
 }
 
@@ -42,7 +43,7 @@ fn saving_and_undoing_gives_the_same_bytes() {
 fn changes_by_other_programs_are_detected() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
-    let theirs = BUILT_IN.replace("[640, 480]", "[320, 240]");
+    let theirs = MIRROR_ROOM.replace("[640, 480]", "[320, 240]");
     fs::write(&path, &theirs).unwrap();
     assert_eq!(file.on_disk(), DiskState::Changed);
     let scene = edited(&file, 3);
@@ -64,12 +65,12 @@ fn changes_by_other_programs_are_detected() {
 fn broken_file_is_reported_once_and_document_stays() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
-    fs::write(&path, BUILT_IN.replace("radius = 0.5", "radius = -0.5")).unwrap();
+    fs::write(&path, MIRROR_ROOM.replace("radius = 0.5", "radius = -0.5")).unwrap();
     let errors = file.reload().unwrap_err();
     assert_eq!(errors.messages()[0].subject, "object \"ball\"");
-    assert_eq!(file.document().text(), BUILT_IN);
+    assert_eq!(file.document().text(), MIRROR_ROOM);
     assert_eq!(file.on_disk(), DiskState::Unchanged);
-    fs::write(&path, BUILT_IN).unwrap();
+    fs::write(&path, MIRROR_ROOM).unwrap();
     assert_eq!(file.on_disk(), DiskState::Changed);
     file.reload().unwrap();
 }
@@ -77,7 +78,7 @@ fn broken_file_is_reported_once_and_document_stays() {
 #[test]
 fn save_as_does_not_overwrite_unless_asked() {
     let directory = tempfile::tempdir().unwrap();
-    let mut file = SceneFile::untitled(BUILT_IN.to_string(), "mirror-room.toml").unwrap();
+    let mut file = SceneFile::untitled(MIRROR_ROOM.to_string(), "mirror-room.toml").unwrap();
     let scene = edited(&file, 3);
     assert_eq!(file.save(&scene, true), Err(SaveError::Untitled));
     assert_eq!(file.on_disk(), DiskState::Unchanged);
@@ -110,7 +111,7 @@ fn failed_saves_give_the_cause() {
     fs::set_permissions(&path, permissions).unwrap();
     let error = file.save(&scene, false).unwrap_err().to_string();
     assert!(error.contains("read-only"), "{error}");
-    assert_eq!(fs::read_to_string(&path).unwrap(), BUILT_IN);
+    assert_eq!(fs::read_to_string(&path).unwrap(), MIRROR_ROOM);
 }
 
 #[test]
@@ -145,7 +146,7 @@ fn pipe_in_place_of_the_file_is_refused_without_blocking() {
     }
     assert!(file.reload().unwrap_err().to_string().contains("it is a pipe"));
     assert!(SceneFile::open(&path).is_err());
-    assert_eq!(file.document().text(), BUILT_IN);
+    assert_eq!(file.document().text(), MIRROR_ROOM);
     let other = directory.path().join("other.toml");
     file.save_as(&other, &edited(&file, 3), false).unwrap();
 }

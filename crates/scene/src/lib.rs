@@ -1,9 +1,7 @@
 //! Scene as the user describes it: editable, in double precision, with validation.
 //!
-//! [`Document`] parses and validates a file once; every edit ([`edit::Edit`]) is validated once,
-//! too. The fields of [`Scene`] are public, so that other code can set them to invalid values
-//! without such an edit. A render session (the rendering thread) therefore validates the scene that
-//! it is given.
+//! [`Document`] and [`edit::Edit`] are validated once. The fields of [`Scene`] are public: a render
+//! session validates the scene that it is given.
 
 #[cfg(not(unix))]
 compile_error!("zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX file locks.");
@@ -19,7 +17,6 @@ pub mod value;
 
 mod acceleration;
 mod asset_resolver;
-mod builtin;
 mod contents_hash;
 mod diagnostic;
 mod document;
@@ -37,7 +34,6 @@ pub use crate::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
-pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
@@ -119,3 +115,5 @@ mod file_test;
 mod recovery_test;
 #[cfg(test)]
 mod tables_test;
+#[cfg(test)]
+mod testing;

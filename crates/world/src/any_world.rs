@@ -1,10 +1,10 @@
 //! Compiled scenes (worlds) in single or double precision behind one type.
 
+use crate::analysis::precision;
 use crate::compile::RecenteredGeometry;
 use crate::integrator::first_hit::FirstHit;
-use crate::light_choice::LightChoice;
-use crate::light_groups::LightGroups;
-use crate::precision;
+use crate::lights::choice::LightChoice;
+use crate::lights::groups::LightGroups;
 use crate::world::World;
 use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
 use zerkalo_scene::Scene;

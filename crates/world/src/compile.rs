@@ -1,23 +1,21 @@
 //! Compilation of a scene into a [`World`], step by step: geometry translated to the scene's
 //! centre, materials, lights, transmission, culling.
 
+use crate::analysis::inventory::inventory;
+use crate::analysis::radiance_range::SceneDistances;
+use crate::analysis::truncation_bias;
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
-use crate::emissive_sheets::{Emits, move_off_surfaces};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::light_choice::LightChoice;
-use crate::light_groups::{LightGroupSource, LightGroups};
-use crate::lights_on_surfaces::OnSurface;
-use crate::radiance_range::SceneDistances;
-use crate::scene_inventory::inventory;
-use crate::surface_emission::SurfaceEmission;
-use crate::truncation_bias;
-use crate::world::{
-    DeltaSource, EmitterSource, EnvironmentSource, LightSource, ShadowRayTarget, World,
-};
+use crate::lights::choice::LightChoice;
+use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
+use crate::lights::emitters::{Emitters, ObjectGeometry};
+use crate::lights::groups::{LightGroupSource, LightGroups};
+use crate::lights::on_surfaces::OnSurface;
+use crate::world::{DeltaSource, EnvironmentSource, LightSource, ShadowRayTarget, World};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::{Float, SimdFloat};
@@ -25,13 +23,13 @@ use zerkalo_kernel::primitive::{
     AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
+use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface, Light};
 use zerkalo_scene::material::{Bsdf, Material};
 use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 
 /// Geometry of all objects in double precision, translated so that the scene's centre is the
 /// origin.
-pub(super) struct RecenteredGeometry {
+pub(crate) struct RecenteredGeometry {
     /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
     pub origin: DVec3,
     /// Geometry of each object in canonical form, with its transform applied.
@@ -195,19 +193,18 @@ fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
 /// the surfaces that it touches. The unit is the light's radius or shorter side.
 const MAX_LIFT: f64 = 1e-4;
 
-/// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
-/// touches; see [`Emitter::new`]. Infinite surfaces are not part of the scene's extent, so that the
+/// Returns the distance by which a light with the surface `surface` is moved off the surfaces that
+/// it touches. Infinite surfaces are not part of the scene's extent, so that the
 /// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
 /// own coordinates then counts as well.
-fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
+fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface) -> f64 {
     let lift = emitter_lift::<S>(geometry);
-    let Some(surface) = light.surface() else { return lift };
     let center = surface.center() - geometry.origin;
     let largest = center.abs().max_element() + surface.radius();
     let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
     let max_lift = MAX_LIFT * surface.thickness();
     // A sphere touches a flat surface at a single point, which is too small to see.
-    if matches!(surface, EmitterSurface::Sphere(_)) {
+    if matches!(surface, EmissiveSurface::Sphere { .. }) {
         return lift.min(max_lift);
     }
     let lift_on = |form: &Form| {
@@ -221,21 +218,17 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
     lifts.fold(lift.min(max_lift), f64::max)
 }
 
-/// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
-/// lights are left out. `emitting` has three values for each light that emits: its index in the
-/// scene, the index of its light group, and its emission. The tracer multiplies samples of the
-/// light by the emission.
-fn light_sources<T, S: Float>(
-    scene: &Scene,
-    emitting: &[(usize, usize, [f64; 3])],
-    compile: impl Fn(&Light) -> Option<T>,
-) -> Vec<LightSource<T, S>> {
-    let source = |&(index, group, emission): &(usize, usize, [f64; 3])| {
-        let light = compile(&scene.lights[index])?;
-        let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-        Some(LightSource { light, group, emission, visible: scene.lights[index].visible })
-    };
-    emitting.iter().filter_map(source).collect()
+/// Returns the target of shadow rays to `light`, whose compiled form is `delta`.
+fn shadow_ray_target<S: Float>(
+    geometry: &RecenteredGeometry,
+    light: &Light,
+    delta: DeltaLight<S>,
+) -> ShadowRayTarget<S> {
+    let on_surface = light.apex().and_then(|position| {
+        let position = position - geometry.origin;
+        OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
+    });
+    ShadowRayTarget { light: delta, on_surface }
 }
 
 /// Lights of a scene and their light groups, with the scale of each group: the number of integer
@@ -245,9 +238,8 @@ struct CompiledLights<S> {
     scales: Vec<f64>,
     sources: Vec<DeltaSource<S>>,
     choice: Option<LightChoice<S>>,
-    emitters: Vec<EmitterSource<S>>,
+    emitters: Emitters<S>,
     environments: Vec<EnvironmentSource<S>>,
-    emission: SurfaceEmission<S>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -261,33 +253,41 @@ impl<S: Float> CompiledLights<S> {
     ) -> Self {
         let reflected = (materials.has_direct(), materials.has_ambient());
         let groups = LightGroups::new(scene, reflected, merge_lights);
-        let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let emitter =
-            |light: &Light| Emitter::new(light, geometry.origin, light_lift::<S>(geometry, light));
-        let scales = groups.scales::<S>(scene, geometry.origin, emitter, &distances);
-        let emitting = groups.lights(scene);
-        let delta_light = |light: &Light| {
-            let delta = DeltaLight::new(light, geometry.origin)?;
-            let on_surface = light.apex().and_then(|position| {
-                let position = DVec3::from(position) - geometry.origin;
-                OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
-            });
-            Some(ShadowRayTarget { light: delta, on_surface })
-        };
-        let mut sources = light_sources(scene, &emitting, delta_light);
+        let (mut sources, mut emitters, mut environments) = (Vec::new(), Vec::new(), Vec::new());
+        let mut ranges = HashMap::new();
+        for (index, group, emission) in groups.lights(scene) {
+            let light = &scene.lights[index];
+            let lift = |surface: &EmissiveSurface| light_lift::<S>(geometry, surface);
+            let Some(compiled) = light.compile(geometry.origin, lift) else { continue };
+            ranges.insert(index, distances.light(&compiled, light.visible));
+            let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+            let source = LightSource { light: (), group, emission, visible: light.visible };
+            match compiled {
+                CompiledLight::Delta(delta) => {
+                    sources.push(source.with_light(shadow_ray_target(geometry, light, delta)));
+                }
+                CompiledLight::Emitter(emitter) => emitters.push(source.with_light(Some(emitter))),
+                CompiledLight::Environment(sky) => environments.push(source.with_light(sky)),
+            }
+        }
+        let scales = groups.scales::<S>(scene, &ranges, &distances);
         let choice = LightChoice::take(&mut sources, &groups.many, geometry.extent);
-        let emitters = light_sources(scene, &emitting, emitter);
-        let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let start = start_region(scene, camera);
         let is_entered = |form: usize| {
             let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
             materials.of_object[form].iter().any(transmits) || start.reaches(&geometry.forms[form])
         };
-        let emission =
-            SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift, is_entered);
-        Self { groups, scales, sources, choice, emitters, environments, emission }
+        let objects = ObjectGeometry {
+            scene,
+            forms: &geometry.forms,
+            primitives,
+            lift: emitter_lift::<S>(geometry),
+            is_entered: &is_entered,
+        };
+        let emitters = Emitters::new(emitters, &objects, &groups);
+        Self { groups, scales, sources, choice, emitters, environments }
     }
 
     /// Returns the target of shadow rays to each light without a size: the position of the light,
@@ -301,23 +301,15 @@ impl<S: Float> CompiledLights<S> {
         self.sources.iter().map(target_of_source).collect()
     }
 
-    /// Returns bounding spheres in this order: lights with a size, emissive objects on which points
-    /// are sampled, and the spatial groups (strata) of lights in `self.choice`.
+    /// Returns a sphere around each emitter, and then around each stratum of lights.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
-        let emitters = self.emitters.iter().map(|source| &source.light);
-        let emitters = emitters.map(|light| (light.center(), light.radius()));
-        let objects = self.emission.emitters().map(|light| (light.center, light.radius));
-        let balls = emitters.chain(objects);
-        let balls = balls.map(|(center, radius)| BoundingSphere { center, radius });
-        balls.chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
+        self.emitters.balls().chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
     }
 
-    /// Returns the number of lists of possible occluders: one for each light in `sources`, each
-    /// light with a size, each object from which light is sampled, and each stratum (spatial group
-    /// of lights) of `choice`. Environments have no list.
+    /// Returns the number of lists of possible occluders, see [`TileCandidates::occluders`].
     fn count(&self) -> usize {
         let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0] + strata
+        self.sources.len() + self.emitters.sampled() + strata
     }
 
     /// Returns the largest distance between a light on a surface and the end point of its shadow
@@ -479,7 +471,6 @@ impl<L: SimdFloat> World<L> {
             light_choice: lights.choice,
             emitters: lights.emitters,
             environments: lights.environments,
-            emission: lights.emission,
             culling: culling.mode,
             all_candidates: culling.all_candidates,
             light_buffers: culling.light_buffers,

@@ -1,13 +1,11 @@
-//! `zerkalo measure`: measures the cost of accuracy on a scene. The result is a table, data files
-//! and a plot.
+//! `zerkalo measure`: measures the cost of accuracy on a scene.
 
 mod data;
 mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
-use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, read_scene_and_warn};
+use crate::command::{Failure, handle_signals, print_line, read_scene_and_warn};
 use crate::measure::{self, Experiment, Plan, Reference};
 use indicatif::ProgressBar;
 use std::path::Path;
@@ -17,7 +15,7 @@ use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
 use zerkalo_world::{self as world, AnyWorld};
 
-/// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
+/// Experiments without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
@@ -56,7 +54,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let world = AnyWorld::compile(&scene, &world::Options::default());
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
-    let signals = Signals::watch()?;
+    let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
         bar.set_length(progress.total as u64);
@@ -90,7 +88,6 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// File format of the plot: SVG or PNG.
 enum Drawing {
     Svg,
     Png,
@@ -117,7 +114,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
     Ok(disk::write(path, &bytes)?)
 }
 
-/// Reads the reference picture at `path`, an EXR file that must have the given size.
+/// Reads the reference picture, an EXR file of the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = image_file::read_exr(path).map_err(failed)?;

@@ -1,35 +1,31 @@
-//! Executor of the effects (saving, rendering, exporting) that the dashboard's function `update`
-//! returns.
+//! Executor of the effects that `update` returns.
 
-use crate::dashboard::message::{Effect, Format, Message};
-use crate::dashboard::run::autosave_worker::AutosaveJob;
-use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport};
-use crate::dashboard::run::file_worker::{Files, Job};
+use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport, image_viewer, paths};
+use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
-use crate::dashboard::run::{export_paths, image_viewer};
-use crossbeam_channel::{Receiver, Sender};
+use crate::dashboard::{Effect, Format, Message};
+use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::Options;
 use zerkalo_render::film::LinearImage;
+use zerkalo_render::plan::WatchedFilms;
 use zerkalo_render::schedule::Settings;
-use zerkalo_render::session::{Session, Snapshot};
-use zerkalo_scene::SceneFile;
+use zerkalo_render::session::Session;
+use zerkalo_scene::{Scene, SceneFile};
 
-/// Niceness of tracing threads with low priority: the largest value of Linux. Threads of normal
-/// priority get nearly all the time of a processor that they share with such a thread.
+/// Niceness of tracing threads with low priority: the largest value of Linux.
 const LOW_PRIORITY: i32 = 19;
 
 /// Action that the event loop must take after it has executed an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The event loop continues. Results of the effect, if there are any, arrive as messages.
+    /// Continue. Results of the effect, if there are any, arrive as messages.
     Done,
-    /// The renderer has started a new picture. The value is the generation of the picture: the
-    /// number of the scene version that it shows.
+    /// Await a picture of this generation, which the renderer has started.
     Rendering(u64),
     /// Suspend the program and give the terminal back to the shell.
     Suspend,
@@ -37,57 +33,31 @@ pub enum Outcome {
     Quit,
 }
 
-/// Executor of the dashboard's effects, such as saving and exporting, and source of snapshots of
-/// the render.
-pub trait Effects {
-    /// Returns the channel that receives a message whenever the renderer publishes a new snapshot,
-    /// the state of the render at one moment with the picture so far.
-    fn wakeup(&self) -> &Receiver<()>;
-
-    /// Takes the renderer's latest snapshot (state of the render at one moment). Returns `None` if
-    /// it has been taken already.
-    fn take_snapshot(&self) -> Option<Snapshot>;
-
-    /// Pauses rendering if the argument is `true`, otherwise resumes it. The event loop pauses it
-    /// while the connection to the terminal is silent. Does nothing without a renderer.
-    fn rest(&self, _resting: bool) {}
-
-    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal.
-    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome;
-
-    /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
-    /// editing. Blocks until the edits are written, at most for `patience`.
-    fn flush(&self, _patience: Duration) {}
-
-    /// Completes pending writes and ends the threads. First writes unsaved edits. Then waits until
-    /// `deadline` for the renderer and for pictures that are being written, or without limit if
-    /// `deadline` is `None`.
-    ///
-    /// Returns the path of the recovery file, or `None` if there are no unsaved edits. If unsaved
-    /// edits are lost, returns an error with the reason.
-    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String>;
+/// Executor of effects: the session, the threads of the scene file, and the exports.
+pub struct EffectRunner {
+    /// Renderer of the scene, or reader of watched films.
+    pub session: Session,
+    exporter: Exporter,
+    /// Abilities of a dashboard with a scene; `None` in `zerkalo watch`.
+    editing: Option<Editing>,
+    /// Receiver that is disconnected as soon as the last requested export has ended.
+    exporting: Option<Receiver<()>>,
+    results: Sender<Message>,
 }
 
-/// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
-/// thread that reads and writes the scene file, and the exports.
-pub struct EffectRunner {
-    /// Renderer of the scene.
-    pub session: Session,
+struct Editing {
     files: Files,
-    exporter: Exporter,
     resized: Option<ResizedExport>,
     threads: usize,
     niceness: i32,
     options: Options,
     settings: Settings,
-    results: Sender<Message>,
 }
 
 impl EffectRunner {
-    /// Creates the executor and starts the threads that render, read and write. `file` is the scene
-    /// file, or the path of a scene file that is unreadable. `state` is the folder for recovery
-    /// files that cannot be written beside their scene file. `threads` is the number of threads
-    /// that trace rays. The results of effects are sent to `results`.
+    /// Starts the threads that render, read and write. `file` is the scene file, or the path of an
+    /// unreadable one. `state` is the folder for recovery files that cannot be written beside their
+    /// scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -100,143 +70,175 @@ impl EffectRunner {
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
-            file: files.shared.clone(),
+            file: Some(files.shared.clone()),
             unreadable_path,
             sampler: options.sampling.kind,
             adaptive: settings.adaptive,
         };
-        Ok(Self {
-            session,
-            files,
-            exporter,
-            resized: None,
-            threads,
-            niceness: 0,
-            options,
-            settings,
-            results,
-        })
+        let editing = Editing { files, resized: None, threads, niceness: 0, options, settings };
+        Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
 
-    fn export(&mut self, format: Format) {
-        let (exporter, results) = (self.exporter.clone(), self.results.clone());
-        self.session.submit(move |film| {
-            let written = match film {
-                Some((rendering, report)) => exporter.write(rendering, report, format),
-                None => Err("there is no picture to write".to_string()),
-            };
-            let _ = results.send(Message::Exported(written));
-        });
+    /// Starts the thread that reads `films`, which other processes write.
+    pub fn watching(
+        films: WatchedFilms,
+        threads: usize,
+        results: Sender<Message>,
+    ) -> io::Result<Self> {
+        let reports = results.clone();
+        let session = Session::watch(films, threads, move |report| {
+            // Sending fails only at the end of the program, when the receiver is gone.
+            let _ = reports.send(Message::Watched(Box::new(report)));
+        })?;
+        let exporter = Exporter::of_films();
+        Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
-    fn set_threads(&self) {
-        // If the threads cannot be started, the old ones continue. No message is needed, because
-        // the renderer's reports contain the number of threads.
-        let _ = self.session.set_threads(self.threads, self.niceness);
-    }
-}
-
-impl Effects for EffectRunner {
-    fn wakeup(&self) -> &Receiver<()> {
-        self.session.wakeup()
-    }
-
-    fn take_snapshot(&self) -> Option<Snapshot> {
-        self.session.take()
-    }
-
-    fn rest(&self, resting: bool) {
+    pub fn rest(&self, resting: bool) {
         if resting { self.session.pause() } else { self.session.resume() }
     }
 
-    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
+    /// Executes `effect`. Its results arrive as messages.
+    pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
             Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
             Effect::Restart => return Outcome::Rendering(self.session.restart()),
-            Effect::Display(display) => {
-                self.options.display = display;
-                self.session.set_display(display);
-            }
+            Effect::Suspend => return Outcome::Suspend,
+            Effect::Quit => return Outcome::Quit,
+            Effect::Display(display) => self.session.set_display(display),
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
             Effect::Pause(paused) => self.rest(paused),
+            Effect::Pin => self.pin(),
+            Effect::Export(format) => self.export(format),
+            Effect::Checkpoint(scene) => self.write_checkpoint(&scene),
+            Effect::Copy(path) => frames.copy(&paths::full(&path)),
+            Effect::ViewImage { path, display, screen } => {
+                let viewport = image_viewer::viewport(frames, screen);
+                image_viewer::prepare(path, display, viewport, self.results.clone());
+            }
+            Effect::Threads(_)
+            | Effect::LowPriority(_)
+            | Effect::Save { .. }
+            | Effect::Load
+            | Effect::Autosave(_)
+            | Effect::Recover
+            | Effect::Discard
+            | Effect::ExportSized { .. }
+            | Effect::CancelExport => self.edit(effect),
+        }
+        Outcome::Done
+    }
+
+    fn edit(&mut self, effect: Effect) {
+        let Some(editing) = &mut self.editing else { return };
+        match effect {
             Effect::Threads(threads) => {
-                self.threads = threads;
-                self.set_threads();
+                editing.threads = threads;
+                editing.set_threads(&self.session);
             }
             Effect::LowPriority(low) => {
-                self.niceness = if low { LOW_PRIORITY } else { 0 };
-                self.set_threads();
+                editing.niceness = if low { LOW_PRIORITY } else { 0 };
+                editing.set_threads(&self.session);
             }
-            Effect::Pin => {
-                let results = self.results.clone();
-                self.session.submit(move |film| {
-                    if let Some((rendering, report)) = film {
-                        let picture = LinearImage::of_film(&rendering.film, &rendering.mix);
-                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
-                    }
-                });
-            }
-            Effect::Save { scene, path, overwrite } => self.files.save(scene, path, overwrite),
-            Effect::Load => self.files.give(Job::Load),
-            Effect::Export(format) => self.export(format),
-            Effect::Checkpoint(scene) => {
-                let (exporter, results) = (self.exporter.clone(), self.results.clone());
-                self.session.checkpoint(self.exporter.provenance(&scene), move |checkpoint| {
-                    let written = exporter.write_checkpoint(checkpoint);
-                    let _ = results.send(Message::CheckpointWritten(written));
-                });
-            }
+            Effect::Save { scene, path, overwrite } => editing.files.save(scene, path, overwrite),
+            Effect::Load => editing.files.give(Job::Load),
+            Effect::Autosave(scene) => editing.files.autosave(scene),
+            Effect::Recover => editing.files.give_autosave(AutosaveJob::Recover),
+            Effect::Discard => editing.files.give_autosave(AutosaveJob::Discard),
             Effect::ExportSized { scene, format, display, stop } => {
                 let request = ExportRequest {
                     scene,
                     format,
-                    options: Options { display, ..self.options.clone() },
-                    settings: Settings { stop, ..self.settings },
-                    threads: self.threads,
+                    options: Options { display, ..editing.options.clone() },
+                    settings: Settings { stop, ..editing.settings },
+                    threads: editing.threads,
                 };
-                let started =
-                    ResizedExport::start(request, self.exporter.clone(), self.results.clone());
-                match started {
-                    Ok(resized) => self.resized = Some(resized),
+                match ResizedExport::start(request, self.exporter.clone(), self.results.clone()) {
+                    Ok(resized) => editing.resized = Some(resized),
                     Err(error) => {
                         let why = format!("cannot start a rendering thread: {error}");
                         let _ = self.results.send(Message::Exported(Err(why)));
                     }
                 }
             }
-            Effect::CancelExport => {
-                if let Some(resized) = &self.resized {
-                    resized.cancel();
-                }
-            }
-            Effect::Autosave(scene) => self.files.autosave(scene),
-            Effect::Recover => self.files.give_autosave(AutosaveJob::Recover),
-            Effect::Discard => self.files.give_autosave(AutosaveJob::Discard),
-            effect => return run_on_terminal(effect, frames, &self.results),
+            Effect::CancelExport => editing.resized.iter().for_each(ResizedExport::cancel),
+            _ => {}
         }
-        Outcome::Done
     }
 
-    fn flush(&self, patience: Duration) {
-        self.files.flush(patience);
+    fn pin(&self) {
+        let results = self.results.clone();
+        self.session.submit(move |picture| {
+            if let Some(picture) = picture {
+                let pinned = Arc::new(LinearImage::of_film(picture.film, picture.mix));
+                let _ = results.send(Message::Pinned(pinned, picture.report.spp.mean));
+            }
+        });
     }
 
-    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
-        let Self { session, mut files, resized, .. } = *self;
-        let kept = files.finish();
+    /// Returns a sender that an export drops at its end.
+    fn begin_export(&mut self) -> Sender<()> {
+        let (running, ended) = bounded(0);
+        self.exporting = Some(ended);
+        running
+    }
+
+    fn export(&mut self, format: Format) {
+        let (exporter, results) = (self.exporter.clone(), self.results.clone());
+        let running = self.begin_export();
+        self.session.submit(move |picture| {
+            let _running = running;
+            let written = match picture {
+                Some(picture) => exporter.write(&picture, format),
+                None => Err("there is no picture to write".to_string()),
+            };
+            let _ = results.send(Message::Exported(written));
+        });
+    }
+
+    fn write_checkpoint(&mut self, scene: &Scene) {
+        let (exporter, results) = (self.exporter.clone(), self.results.clone());
+        let running = self.begin_export();
+        self.session.checkpoint(self.exporter.provenance(scene), move |checkpoint| {
+            let _running = running;
+            let written = exporter.write_checkpoint(checkpoint);
+            let _ = results.send(Message::CheckpointWritten(written));
+        });
+    }
+
+    /// Writes unsaved edits to the recovery file at once. Blocks until they are written, at most
+    /// for `patience`.
+    pub fn flush(&self, patience: Duration) {
+        self.editing.iter().for_each(|editing| editing.files.flush(patience));
+    }
+
+    /// Completes pending writes and ends the threads. Waits until `deadline` for the session and
+    /// for pictures that are being written, or without limit if it is `None`. Returns the path of
+    /// the recovery file, or `None` if there are no unsaved edits.
+    ///
+    /// # Errors Fails with the reason if unsaved edits are lost.
+    pub fn finish(self, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
+        let Self { session, editing, exporting, .. } = self;
+        let (kept, resized) = match editing {
+            Some(mut editing) => (editing.files.finish(), editing.resized),
+            None => (Ok(None), None),
+        };
         let end = move || {
             if let Some(resized) = resized {
                 resized.end();
             }
-            // The renderer's thread runs tasks in the order of their submission. When this empty
-            // task runs, all exports that were requested before it have been written.
-            session.with(|_, _| ());
+            // The session runs exports in the order of their requests. If its thread panics, it
+            // drops the sender as at the end of an export.
+            if let Some(last) = exporting {
+                let _ = last.recv();
+            }
+            drop(session);
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        // If the thread cannot be started, the closure `end` is dropped without being run. The
-        // renderer ends then, and pictures that were not written yet are lost.
+        // If the thread cannot be started, the session ends, and pictures that were not written are
+        // lost.
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }
@@ -244,23 +246,9 @@ impl Effects for EffectRunner {
     }
 }
 
-/// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
-/// quit. Other effects are ignored. `frames` is the output to the terminal. A separate thread reads
-/// and encodes an image file and sends the result to `results`.
-pub fn run_on_terminal(
-    effect: Effect,
-    frames: &mut FramePipeline,
-    results: &Sender<Message>,
-) -> Outcome {
-    match effect {
-        Effect::ViewImage { path, display, screen } => {
-            let viewport = image_viewer::viewport(frames, screen);
-            image_viewer::prepare(path, display, viewport, results.clone());
-        }
-        Effect::Copy(path) => frames.copy(&export_paths::full(&path)),
-        Effect::Suspend => return Outcome::Suspend,
-        Effect::Quit => return Outcome::Quit,
-        _ => {}
+impl Editing {
+    fn set_threads(&self, session: &Session) {
+        // If the threads cannot be started, the old ones continue, as the renderer's reports show.
+        let _ = session.set_threads(self.threads, self.niceness);
     }
-    Outcome::Done
 }

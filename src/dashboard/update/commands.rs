@@ -1,76 +1,59 @@
-//! Command table: each row is a command with its keys, label, hints, availability and function.
-//!
-//! Key dispatch, hint line, help, command palette and docs/keys.md are derived from the table.
+//! Command table, from which key dispatch, hint line, help, command palette and docs/keys.md are
+//! derived.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
-use crate::dashboard::message::{Effect, Format};
-use crate::dashboard::model::{CompareView, Mode, Model};
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{CompareView, Effect, Format, Mode, Model, Overlay, UpdateContext};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
 
-/// State of the dashboard that selects the hints in the hint line, the last row of the screen.
+/// State that selects the hints in the hint line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HintLine {
-    /// State before the first key is pressed.
+    /// No key has been pressed yet.
     First,
-    /// State in which no overlay is open and keys are looked up in this context.
+    /// No overlay is open, and keys are looked up in this context.
     In(KeyContext),
-    /// State in which a list or a question is open.
+    /// A list or a question is open.
     List,
-    /// State in which a form for a new object or light is open.
     Form,
-    /// State in which the user types text.
     Typing,
-    /// State in which the help or the list of scene features is open.
+    /// The help or the list of scene features is open.
     Reading,
-    /// State in which film files are watched (`zerkalo watch`).
     Watching,
 }
 
-/// Short description of a command for the hint line. One hint may describe several related
-/// commands, such as those of all arrow keys.
+/// Description of a command, or of several related ones, for the hint line.
 #[derive(Clone, Copy, Debug)]
 pub struct Hint {
-    /// States of the dashboard in which the hint line contains this hint.
     pub lines: &'static [HintLine],
-    /// Position of the hint in the hint line; smaller numbers come first.
+    /// Position in the hint line; smaller numbers come first.
     pub position: u8,
-    /// Keys as the hint shows them, such as `PgUp PgDn`.
+    /// Keys as shown, such as `PgUp PgDn`.
     pub keys: &'static str,
-    /// Effect of the keys, in a word or two.
     pub text: &'static str,
 }
 
-/// Command of the dashboard: a row of the command table.
+/// Row of the command table.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Heading of the chapter of the help that lists the command. The commands of a chapter follow
-    /// each other in the table.
+    /// Chapter of the help. The commands of a chapter follow each other in the table.
     pub chapter: &'static str,
-    /// Description in a few words, for help, command palette and docs/keys.md. Each command has a
-    /// different description.
+    /// Unique description for help, command palette and docs/keys.md.
     pub label: &'static str,
-    /// Contexts of the command, each with the names of its keys there, separated by spaces. A
-    /// command without keys runs only from the command palette.
+    /// Contexts with the names of the keys there, separated by spaces. A command without keys runs
+    /// only from the command palette.
     pub keys: &'static [(KeyContext, &'static str)],
-    /// Hints about the command in the hint line. They may also describe related commands, which
-    /// then have no hints of their own.
+    /// Hints, which may also describe related commands.
     pub hints: &'static [Hint],
-    /// `true` if the command itself handles a value that is being typed, as the commands of Enter
-    /// and Esc do. For all other commands, the typed value is applied before they run.
+    /// `true` if the command itself handles a value that is being typed, as those of Enter and Esc.
+    /// Otherwise the value is applied first.
     pub(super) while_typing: bool,
-    /// `true` if the command also runs in the viewer of exported images. Keys without such a
-    /// command close the viewer.
+    /// `true` if the command also runs in the viewer of exported images, which other keys close.
     pub(super) over_image: bool,
-    /// `true` if the command also runs in `zerkalo watch`, where nothing is edited or rendered.
-    pub while_watching: bool,
-    /// Function that returns `true` if the command can run in the present state of the model.
+    /// Function that returns `true` if the command can run.
     pub(super) available: fn(&Model) -> bool,
-    /// Function that runs the command.
     pub(super) run: fn(&mut UpdateContext<'_>),
 }
 
@@ -87,8 +70,7 @@ const fn command(
         hints: &[],
         while_typing: false,
         over_image: false,
-        while_watching: false,
-        available: with_scene,
+        available: editing,
         run,
     }
 }
@@ -102,15 +84,24 @@ const fn hint(
     Hint { lines, position, keys, text }
 }
 
-/// Returns `true` if there is a scene: the scene file is readable now, or was readable earlier.
-fn with_scene(model: &Model) -> bool {
+/// Returns `true` if there is a picture: of watched files, or of a scene that was readable.
+fn viewing(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Returns `true` if there is a scene, or if the command palette or a question is open. The user
-/// can answer these without a scene.
-fn with_scene_or_choice(model: &Model) -> bool {
-    with_scene(model)
+/// Returns `true` if there is a scene to edit and render.
+fn editing(model: &Model) -> bool {
+    viewing(model) && not_watching(model)
+}
+
+/// Returns `true` unless this is `zerkalo watch`, which neither edits nor renders.
+fn not_watching(model: &Model) -> bool {
+    model.watch.is_none()
+}
+
+/// Returns `true` if there is a picture, or a command palette or question, which need none.
+fn viewing_or_choosing(model: &Model) -> bool {
+    viewing(model)
         || matches!(model.overlay, Some(Overlay::CommandPalette(_) | Overlay::Question(_)))
 }
 
@@ -118,7 +109,7 @@ fn always(_: &Model) -> bool {
     true
 }
 
-/// All commands of the dashboard, in the order of the help.
+/// All commands, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
     command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
@@ -197,24 +188,24 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
     command("objects", "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
     command("objects", "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
-    command("objects", "turn the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
-    command("objects", "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::In(Turning)], 1, "Left Right", "turn 15°")]),
-    command("objects", "turn right", &[(Turning, "Right")], |c| c.turn_selection(Right, Coarse)),
-    command("objects", "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::In(Turning)], 2, "Shift", "1°")]),
-    command("objects", "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
+    command("objects", "rotate the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
+    command("objects", "rotate left", &[(Rotating, "Left")], |c| c.rotate_selection(Left, Coarse)).hints(&[hint(&[H::In(Rotating)], 1, "Left Right", "rotate 15°")]),
+    command("objects", "rotate right", &[(Rotating, "Right")], |c| c.rotate_selection(Right, Coarse)),
+    command("objects", "rotate left, fine", &[(Rotating, "Shift-Left")], |c| c.rotate_selection(Left, Fine)).hints(&[hint(&[H::In(Rotating)], 2, "Shift", "1°")]),
+    command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(Right, Fine)),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
 
-    command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
-    command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
-    command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
-        hint(&[H::In(Moving), H::In(Turning), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
+    command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
+    command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).available(viewing),
+    command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Rotating, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).while_typing().hints(&[
+        hint(&[H::In(Moving), H::In(Rotating), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
         hint(&[H::Reading], 9, "Esc", "close"),
     ]),
-    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).while_watching().available(with_scene_or_choice).while_typing().hints(&[
+    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).while_typing().hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
@@ -222,59 +213,59 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::Form], 4, "Enter", "add"),
         hint(&[H::Typing], 1, "Enter", "apply"),
     ]),
-    command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).while_watching().available(always).hints(&[
+    command("panels", "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::List], 1, "Up Down", "choose"),
         hint(&[H::Reading], 1, "Up Down", "scroll"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
-    command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).while_watching().available(always),
-    command("panels", "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).while_watching().available(always),
-    command("panels", "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).while_watching().available(always),
-    command("panels", "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).while_watching().available(always),
-    command("panels", "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).while_watching().available(always),
+    command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
+    command("panels", "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).available(always),
+    command("panels", "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).available(always),
+    command("panels", "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).available(always),
+    command("panels", "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).available(always),
     command("panels", "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::In(Inspector), H::Form], 2, "Left Right", "step")]),
     command("panels", "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
     command("panels", "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
     command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
     command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
-    command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
+    command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).available(viewing),
 
     command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
     command("file", "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
     command("file", "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
     command("file", "save as", &[(Anywhere, "W")], |c| c.ask_path()),
-    command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
-    command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
+    command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(not_watching),
+    command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(not_watching),
     command("file", "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
-    command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
-    command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
+    command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
+    command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
-    command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
-    command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
-    command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
-    command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
+    command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
+    command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
+    command("picture", "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).available(viewing),
+    command("picture", "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).available(viewing),
     command("picture", "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
     command("picture", "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
-    command("picture", "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).while_watching(),
-    command("picture", "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).while_watching(),
-    command("picture", "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).while_watching(),
-    command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).while_watching(),
-    command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
-    command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).while_watching(),
-    command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).while_watching().hints(&[hint(&[H::Watching], 4, "i", "probe")]),
-    command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
-    command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).while_watching(),
-    command("picture", "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).while_watching(),
-    command("picture", "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).while_watching(),
-    command("picture", "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
-    command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).while_watching(),
-    command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).while_watching(),
-    command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).while_watching(),
-    command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
-    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).while_watching(),
-    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).while_watching(),
+    command("picture", "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).available(viewing),
+    command("picture", "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).available(viewing),
+    command("picture", "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).available(viewing),
+    command("picture", "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).available(viewing),
+    command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).available(viewing).hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
+    command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).available(viewing),
+    command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).available(viewing).hints(&[hint(&[H::Watching], 4, "i", "probe")]),
+    command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).available(viewing).hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
+    command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).available(viewing),
+    command("picture", "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).available(viewing),
+    command("picture", "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).available(viewing),
+    command("picture", "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).available(viewing).hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
+    command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).available(viewing),
+    command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).available(viewing),
+    command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).available(viewing),
+    command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
+    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).available(viewing),
+    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).available(viewing),
 
     command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
@@ -283,10 +274,10 @@ pub static COMMANDS: &[Command] = &[
     command("rendering", "more threads", &[], |c| c.threads(1)),
     command("rendering", "fewer threads", &[], |c| c.threads(-1)),
     command("rendering", "low or normal priority", &[], |c| c.priority()),
-    command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).while_watching().available(always),
+    command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
 
-    command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
-    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
+    command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
+    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
     command("help", "inventory of the scene", &[], |c| c.model.overlay = Some(Overlay::Inventory { scroll: 0 })),
 ];
 
@@ -303,22 +294,23 @@ impl Command {
         Self { while_typing: true, ..self }
     }
 
-    const fn while_watching(self) -> Self {
-        Self { while_watching: true, ..self }
-    }
-
     const fn over_image(self) -> Self {
         Self { over_image: true, ..self }
     }
 
-    /// Returns all keys of the command with their contexts as text, such as `Left in the picture`
-    /// or `U Ctrl-r`. `key` formats the name of one key.
+    /// Returns `true` if help and command palette list the command: if it can run in `zerkalo
+    /// watch`, or this is another dashboard.
+    pub fn is_listed(&self, model: &Model) -> bool {
+        model.watch.is_none() || (self.available)(model)
+    }
+
+    /// Returns all keys with their contexts, such as `Left in the picture`. `key` formats the name
+    /// of one key.
     pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| Some(context.place()))
     }
 
-    /// Returns the keys that run the command in `zerkalo watch` while no overlay is open, as text.
-    /// `key` formats the name of one key.
+    /// Returns the keys that work in `zerkalo watch` while no overlay is open.
     pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| match context {
             Anywhere | Outline => Some(""),
@@ -327,8 +319,8 @@ impl Command {
         })
     }
 
-    /// Formats the keys of the command, grouped by context. `key` formats the name of one key.
-    /// `place` returns the text after the keys of a context, or `None` to leave out the context.
+    /// Formats the keys, grouped by context. `place` returns the text after the keys of a context,
+    /// or `None` to leave it out.
     fn formatted_keys(
         &self,
         key: impl Fn(&str) -> String,
@@ -343,8 +335,7 @@ impl Command {
     }
 }
 
-/// Returns the command that `key` runs in `context`. Returns `None` if the key has no command
-/// there.
+/// Returns the command that `key` runs in `context`.
 pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
     let name = key.to_string();
     let has_key = |(context, names): &(KeyContext, &str), wanted| {

@@ -1,14 +1,9 @@
-//! Drawing of properties and their values, in the inspector and in forms.
+//! Drawing of properties and their values.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{FieldList, Model};
-use crate::dashboard::panel_lines::{FieldLine, PanelLine};
-use crate::dashboard::view::frame::{panel, window};
+use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::text::{Row, columns, paragraphs, skip};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
+use crate::dashboard::{Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
@@ -16,68 +11,56 @@ use zerkalo_render::film::Display;
 use zerkalo_scene::edit::{Property, Widget};
 use zerkalo_scene::value::{number, round_significant};
 
-/// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
-/// the property under the cursor.
+/// Unit of nearly all numbers, therefore shown only for the property under the cursor.
 const LENGTH: &str = "scene units";
 
-/// List of properties, and the areas in which it is drawn.
+/// List of properties, and its areas.
 pub struct Fields<'a> {
-    /// Headings and properties, as lines.
     pub lines: &'a [PanelLine],
-    /// Area of the lines of the property list.
     pub list: Rect,
-    /// Area of the help on the property under the cursor.
     pub help: Rect,
-    /// Cursor, scroll position and text editor of the property list.
     pub state: &'a FieldList,
-    /// Reason why the last change of a value by arrow keys was refused; `None` if it was accepted.
-    /// If the text editor has a reason of its own, the editor's reason is shown instead.
+    /// Reason why a change by arrow keys was refused. One of the text editor is shown instead.
     pub problem: Option<&'a str>,
-    /// `true` if the list receives the keys.
     pub active: bool,
 }
 
-/// Draws the inspector, or nothing if the panel is hidden. Returns the position of the text cursor,
-/// or `None` if the cursor is hidden.
-pub fn inspector(
-    model: &Model,
-    layout: &Layout,
-    theme: &Theme,
-    buffer: &mut Buffer,
-) -> Option<Position> {
+/// Draws the inspector. Returns the position of the text cursor.
+pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<Position> {
     let area = layout.inspector?;
     let (list, help) = model.inspector_rows()?;
     let active = is_active(model, Focus::Inspector);
-    panel(area, &model.selection.title(model.scene()), active, theme, buffer);
+    painter.panel(area, &model.selection.title(model.scene()), active);
     let lines = model.field_lines();
     let fields =
         Fields { lines: &lines, list, help, state: &model.inspector, problem: None, active };
-    fields.draw(theme, buffer)
+    fields.draw(painter)
 }
 
 impl Fields<'_> {
-    /// Draws the list of properties. Returns the position of the text cursor, or `None` if the
-    /// cursor is hidden.
-    pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
+    /// Draws the list. Returns the position of the text cursor.
+    pub fn draw(&self, painter: &mut Painter) -> Option<Position> {
         let label = |line: &PanelLine| {
             line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
         };
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
         let mut typing = None;
-        let border = theme.border(self.active);
-        for (row, i) in window(self.list, self.state.scroll, self.lines.len(), border, buffer) {
-            let to = Row::new(buffer, self.list, row);
-            match &self.lines[i] {
-                PanelLine::Heading(title) => heading(to, title, theme),
+        let border = painter.theme.border(self.active);
+        let visible = painter.window(self.list, self.state.scroll, self.lines.len(), border);
+        for VisibleLine { row, index } in visible {
+            let to = painter.row(self.list, row);
+            match &self.lines[index] {
+                PanelLine::Heading(title) => heading(to, title),
                 PanelLine::Entry(field) => {
-                    let position = self.field(field, i == self.state.cursor, labels, to, theme);
+                    let chosen = self.active && index == self.state.cursor;
+                    let position = self.field(field, chosen, labels, to);
                     typing = typing.or(position);
                 }
             }
         }
         if self.active {
-            self.say(theme, buffer);
+            self.say(painter);
         }
         typing
     }
@@ -88,9 +71,8 @@ impl Fields<'_> {
         chosen: bool,
         labels: usize,
         mut to: Row,
-        theme: &Theme,
     ) -> Option<Position> {
-        let chosen = chosen && self.active;
+        let theme = to.theme;
         let (name, value) = match (chosen, field.property.is_default) {
             (true, _) => (theme.selected(true), theme.selected(true)),
             (false, true) => (theme.dim(), theme.dim()),
@@ -103,7 +85,7 @@ impl Fields<'_> {
         to.skip(indent.min(labels));
         to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
         if let Some(editor) = self.state.editor.as_ref().filter(|_| chosen) {
-            return typed(editor, &mut to, theme);
+            return typed(editor, &mut to);
         }
         let swatch =
             field.swatch.and_then(|color| theme.swatch(Display::default().levels_8(color)));
@@ -127,10 +109,9 @@ impl Fields<'_> {
         None
     }
 
-    /// Draws help on the property under the cursor. If a new value of the property was refused, the
-    /// help is the reason. Otherwise it is the property's description and a description of its
-    /// valid values.
-    fn say(&self, theme: &Theme, buffer: &mut Buffer) {
+    /// Draws help on the property under the cursor: why a value was refused, or what is valid.
+    fn say(&self, painter: &mut Painter) {
+        let theme = painter.theme;
         let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::entry) else {
             return;
         };
@@ -144,12 +125,11 @@ impl Fields<'_> {
             ],
         };
         texts.retain(|(text, _)| !text.is_empty());
-        paragraphs(self.help.inner(Margin::new(1, 0)), &texts, buffer);
+        painter.paragraphs(self.help.inner(Margin::new(1, 0)), &texts);
     }
 }
 
-/// Returns a description of a property's valid values. If the present value is not the default, the
-/// description includes the default.
+/// Describes valid values, with the default if the present value is another.
 fn expected(property: &Property) -> String {
     match &property.default {
         Some(default) if !default.is_empty() && !property.is_default => {
@@ -159,24 +139,25 @@ fn expected(property: &Property) -> String {
     }
 }
 
-/// Draws the heading `title` with a line up to the last column but one of the row `to`.
-pub fn heading(mut to: Row, title: &str, theme: &Theme) {
+/// Draws a heading with a line up to the last column but one.
+pub fn heading(mut to: Row, title: &str) {
+    let theme = to.theme;
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
     let left = to.left().saturating_sub(1);
     to.put(&"─".repeat(left), theme.border(false));
 }
 
-/// Draws the text of `editor` in the free columns of the row `to`. Returns the position of the text
-/// cursor, or `None` if there is no room.
-pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
+/// Draws the text of `editor` in the row. Returns the position of the text cursor, or `None` if
+/// there is no room.
+pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
         return None;
     }
     let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
-        Some(_) => theme.bad(),
-        None => theme.accent(),
+        Some(_) => to.theme.bad(),
+        None => to.theme.accent(),
     });
     let (x, y) = (to.x, to.y);
     to.put_wide(skip(editor.text(), hidden), width, style);
@@ -184,11 +165,9 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Returns `value` as it is displayed outside of the text editor: a number with many digits is
-/// rounded to six significant ones, any other text is unchanged.
+/// Shortens a long number to six significant digits.
 fn brief(value: &str) -> Cow<'_, str> {
-    /// Largest length of a number, in characters, up to which it is shown with all its digits.
-    /// Longer numbers are rounded.
+    /// Largest length of a number that is shown with all its digits.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
         Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),

@@ -1,29 +1,20 @@
-//! Drawing of the full-screen viewer of exported images.
+//! Drawing of the viewer of exported images.
 
-use crate::dashboard::model::{Model, short_name};
-use crate::dashboard::overlay::ViewedImage;
+use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::paint;
-use crate::dashboard::view::text::Row;
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::{Model, ViewedImage, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use zerkalo_terminal::cells::PictureCells;
 use zerkalo_terminal::image::{Protocol, ViewerImage};
 
-/// Draws the viewed image in half blocks (characters that show two pixels per cell) and returns
-/// these cells. If the terminal supports an image protocol, the uploaded image later replaces the
-/// half blocks. Returns `None` if the image is still being read, or if the upload has ended and
-/// placeholder characters of the protocol show the image.
-pub fn draw(
-    model: &Model,
-    viewed: &ViewedImage,
-    theme: &Theme,
-    buffer: &mut Buffer,
-) -> Option<PictureCells> {
+/// Draws the viewed image in half blocks and returns these cells. The uploaded image later replaces
+/// them. Returns `None` if the image is still being read, or placeholder characters show it.
+pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<PictureCells> {
+    let theme = painter.theme;
     let [width, height] = model.screen;
     let last = Rect { x: 0, y: height.saturating_sub(1), width, height: 1 };
-    let mut row = Row::new(buffer, last, 0);
+    let mut row = painter.row(last, 0);
     row.skip(1);
     let Some(image) = &viewed.image else {
         row.put("reading ", theme.dim()).put(&short_name(&viewed.path), theme.text());
@@ -35,21 +26,21 @@ pub fn draw(
     row.put(more, theme.dim());
     let place = image.layout.place;
     if viewed.sent >= 1.0 && image.placeholder(0).is_some() {
-        for at in place.intersection(buffer.area).positions() {
+        for at in place.intersection(painter.buffer.area).positions() {
             if let Some((symbol, color)) = image.placeholder(at.y - place.y) {
-                buffer[at].set_symbol(&symbol).set_style(Style::new().fg(Color::Indexed(color)));
+                painter.buffer[at]
+                    .set_symbol(&symbol)
+                    .set_style(Style::new().fg(Color::Indexed(color)));
             }
         }
         return None;
     }
     let cells = PictureCells::new(&image.raster, model.colors, true);
-    paint(&cells, place, buffer);
+    paint(&cells, place, painter.buffer);
     Some(cells)
 }
 
-/// Returns two texts: a description of the image (size and progress of the upload), and a hint. The
-/// hint names the command that lists what the terminal needs to show sharper images. The hint is
-/// empty if the terminal supports an image protocol.
+/// Returns size and progress of the image, and a hint if the terminal supports no image protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.layout.size;
     let whole = format!("{width}×{height}");

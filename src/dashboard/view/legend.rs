@@ -1,17 +1,16 @@
 //! Legend of pictures in false colour.
 
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::false_color::{Scale, difference, magnitude};
+use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
-use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
+use zerkalo_terminal::cells::{PictureCells, Raster};
 
-/// Width of the legend's colour bar in columns.
 const BAR: usize = 12;
 
-/// Legend of a false-colour scale: the values at both ends, the unit and a colour bar.
+/// Legend of a scale: the values at both ends, the unit and a colour bar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
     low: String,
@@ -21,16 +20,14 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Creates the legend of a false-colour picture. `scale` gives the values at the ends of the
-    /// colour bar, and `unit` is their unit.
+    /// Creates the legend of `scale`.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
         Self { low, high, unit: unit.to_string(), bar }
     }
 
-    /// Creates the legend of false-colour differences from `-end` to `end` in 8-bit levels. `rms`
-    /// is the root mean square of the differences.
+    /// Creates the legend of differences from `-end` to `end`. `rms` is their root mean square.
     pub fn difference(end: f64, rms: f64) -> Self {
         Self {
             low: format!("-{end}"),
@@ -40,15 +37,13 @@ impl Legend {
         }
     }
 
-    /// Returns the width of the whole legend in columns.
     fn columns(&self) -> usize {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of the row `row` of `area`. Omits the unit if there is no
-    /// room for it. Draws nothing if even the legend without the unit does not fit.
-    pub fn draw(&self, area: Rect, row: u16, theme: &Theme, buffer: &mut Buffer) {
-        let mut line = Row::new(buffer, area, row);
+    /// Draws the legend at the right end of the row, without the unit if there is no room for it.
+    pub fn draw(&self, mut line: Row) {
+        let theme = line.theme;
         let words = columns(&self.unit) + 1;
         let (width, with_words) = match line.left() {
             left if left >= self.columns() => (self.columns(), true),
@@ -57,18 +52,17 @@ impl Legend {
         };
         line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
         line.put(" ", theme.text());
-        let bar = Rect { x: line.x, y: area.y + row, width: BAR as u16, height: 1 };
+        let bar = Rect { x: line.x, y: line.y, width: BAR as u16, height: 1 };
         line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
         if with_words {
             line.put(" ", Style::new()).put(&self.unit, theme.dim());
         }
         line.put(" ", Style::new());
-        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, buffer);
+        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, line.buffer);
     }
 }
 
-/// Returns a colour bar: a row of cells with the colours that `color` assigns to values from 0 to
-/// 1.
+/// Returns a bar with the colours of values from 0 to 1.
 fn bar(color: impl Fn(f64) -> [u8; 3]) -> Raster {
     Raster::from_fn(BAR, 2, |i| color((i % BAR) as f64 / (BAR - 1) as f64))
 }

@@ -1,42 +1,39 @@
-//! Messages in the picture's panel: errors of the scene file, and the reason why a scene cannot be
-//! rendered.
+//! Errors of the scene file, and the reason why a scene cannot be rendered, in the picture's panel.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
-use crate::dashboard::view::text::{Row, paragraphs};
+use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::session::State;
 use zerkalo_scene::Diagnostic;
 use zerkalo_scene::value::sanitized;
 
-/// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {
     let inner = layout.picture.inner(BORDER);
     let (x, y) = if inner.width > 50 && inner.height > 12 { (3, 1) } else { (1, 0) };
     inner.inner(Margin::new(x, y))
 }
 
-/// Draws the errors of a scene file that has never been readable since the start of the dashboard.
-pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+/// Draws the errors of a scene file that has never been readable.
+pub fn broken(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let Some(errors) = &model.file.broken else { return };
     let bold = theme.bad().add_modifier(Modifier::BOLD);
     let mut texts = vec![(format!("{} cannot be read", model.file.name), bold)];
     for message in errors.messages() {
         texts.push((String::new(), theme.text()));
-        texts.extend(formatted(message, theme));
+        texts.extend(formatted(message, &theme));
     }
     if errors.more() > 0 {
         texts.push((format!("… and {} more.", errors.more()), theme.text()));
     }
     let help = "Fix the file: it is reloaded as soon as it is written.";
     texts.extend(["", help].map(|text| (text.to_string(), theme.text())));
-    paragraphs(text_area(layout), &texts, buffer);
+    painter.paragraphs(text_area(layout), &texts);
 }
 
-/// Formats a diagnostic of a scene file as texts with their styles: location, problem, help.
+/// Formats location, problem and help.
 fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     if let Some((line, column)) = message.line_column {
@@ -53,10 +50,10 @@ fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     texts
 }
 
-/// Draws up to two messages over the last picture. The first is the reason why the current scene
-/// cannot be rendered. The second, on the lower border of the panel, is the first error of a scene
+/// Draws the reason why the scene cannot be rendered, and on the border the first error of a scene
 /// file that has become unreadable.
-pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn failure(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let failed = model.snapshot.as_ref().and_then(|s| match &s.report.state {
         State::Failed(why) => Some(why),
         _ => None,
@@ -64,16 +61,15 @@ pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffe
     if let Some(why) = failed {
         let title = "This scene cannot be rendered".to_string();
         let texts = [(title, theme.bad()), (sanitized(why), theme.text())];
-        paragraphs(text_area(layout), &texts, buffer);
+        painter.paragraphs(text_area(layout), &texts);
     }
     if let Some(first) = model.file.broken.as_ref().and_then(|b| b.messages().first())
         && !model.fullscreen
     {
         let area = layout.picture;
-        let edge = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
         let place =
             first.line_column.map_or(String::new(), |(line, column)| format!(":{line}:{column}"));
         let text = format!(" ✗ {}{place}  {} ", model.file.name, sanitized(&first.found));
-        Row::new(buffer, edge, area.height.saturating_sub(1)).put(&text, theme.bad());
+        painter.edge(area, area.height.saturating_sub(1)).put(&text, theme.bad());
     }
 }

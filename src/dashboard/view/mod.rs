@@ -1,8 +1,6 @@
-//! Drawing of the dashboard's model into a buffer of terminal cells.
-//!
-//! The cells of the picture are computed separately by [`View::picture`] and cached until one of
-//! their inputs changes.
+//! Drawing of the model into a buffer of terminal cells. The cells of the picture are cached.
 
+mod false_color;
 mod fields;
 mod frame;
 mod image_viewer;
@@ -10,48 +8,45 @@ mod legend;
 mod message_view;
 mod outline;
 mod overlay;
+mod painter;
 mod picture;
 mod pixel_probe;
 mod plot;
 mod status;
 #[cfg(test)]
 mod tests;
-mod text;
 mod theme;
 mod watch;
 
-use crate::dashboard::layout::{Focus, Layout, SMALLEST};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::layout::SMALLEST;
+use crate::dashboard::text;
+use crate::dashboard::{Focus, Layout, Model, Overlay};
+use painter::Painter;
 use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use text::Row;
+use ratatui::style::Style;
 use theme::Theme;
 use zerkalo_terminal::cells::{Colors, PictureCells};
 
-/// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Inputs for which the cells of the picture were computed; `None` before the first picture.
+    /// Inputs of `picture`.
     made_for: Option<Version>,
     picture: PictureCells,
-    /// Rectangle of the screen in which the picture was last drawn.
+    /// Rectangle in which the picture was last drawn.
     pub place: Rect,
-    /// Row-major mask of the cells of `place`: `true` if no overlay or mark covers the cell.
+    /// Row-major mask of the cells of `place`: `true` if nothing covers the cell.
     pub uncovered: Vec<bool>,
 }
 
-/// Inputs of the picture's cells: the model's counter of changes of the picture, the columns and
-/// rows of half cells (upper or lower halves of cells), and the set of colours.
+/// Version of the picture, columns and rows of half cells, and set of colours.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
-    /// Returns the terminal cells of the rendered picture for the area in `layout`. They are
-    /// cached, and computed again only if an input has changed: the model's counter of changes of
-    /// the picture, the size of the area, or the set of colours.
+    /// Returns the cells of the picture for the area in `layout`.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
@@ -63,15 +58,16 @@ impl View {
         &self.picture
     }
 
-    /// Draws `model` into `buffer`, which must be empty and have the size of the model's screen.
-    /// Returns the position of the text cursor, or `None` if the cursor is hidden.
+    /// Draws `model` into `buffer`, which must be empty and have the size of the screen. Returns
+    /// the position of the text cursor.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme { colors: model.colors };
+        let painter = &mut Painter { theme, buffer };
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
-            let cells = image_viewer::draw(model, viewed, &theme, buffer);
+            let cells = image_viewer::draw(model, viewed, painter);
             (self.place, self.uncovered) = match (cells, &viewed.image) {
                 (Some(cells), Some(image)) => {
-                    picture::visible_mask(&cells, image.layout.place, buffer)
+                    picture::visible_mask(&cells, image.layout.place, painter.buffer)
                 }
                 _ => (Rect::ZERO, Vec::new()),
             };
@@ -79,59 +75,57 @@ impl View {
         }
         (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         let Some(layout) = model.layout() else {
-            too_small(model.screen, buffer);
+            too_small(model.screen, painter);
             return None;
         };
         self.picture(model, &layout);
-        frame::draw(model, &layout, self.imager.legend.as_ref(), &theme, buffer);
+        frame::draw(model, &layout, self.imager.legend.as_ref(), painter);
         if model.file.unreadable {
-            message_view::broken(model, &layout, &theme, buffer);
+            message_view::broken(model, &layout, painter);
         } else {
-            picture::paint(&self.picture, layout.image, buffer);
-            message_view::failure(model, &layout, &theme, buffer);
-            pixel_probe::draw(model, &layout, &theme, buffer);
+            picture::paint(&self.picture, layout.image, painter.buffer);
+            message_view::failure(model, &layout, painter);
+            pixel_probe::draw(model, &layout, painter);
         }
-        status::draw(model, layout.status, &theme, buffer);
-        status::hints_line(model, layout.hints, &theme, buffer);
-        // An open form replaces the panels: outline, inspector and plot are not drawn then.
+        status::draw(model, layout.status, painter);
+        status::hints_line(model, layout.hints, painter);
+        // An open form replaces the panels.
         let mut cursor = None;
         if model.watch.is_some() {
-            watch::draw(model, &layout, &theme, buffer);
-            plot::draw(model, &layout, &theme, buffer);
+            watch::draw(model, &layout, painter);
+            plot::draw(model, &layout, painter);
         } else if !matches!(model.overlay, Some(Overlay::Form(_))) {
-            outline::draw(model, &layout, &theme, buffer);
-            cursor = fields::inspector(model, &layout, &theme, buffer);
-            plot::draw(model, &layout, &theme, buffer);
+            outline::draw(model, &layout, painter);
+            cursor = fields::inspector(model, &layout, painter);
+            plot::draw(model, &layout, painter);
         }
         if model.overlay.is_some() {
-            cursor = overlay::draw(model, &theme, buffer);
+            cursor = overlay::draw(model, painter);
         }
         if !model.file.unreadable {
             (self.place, self.uncovered) =
-                picture::visible_mask(&self.picture, layout.image, buffer);
+                picture::visible_mask(&self.picture, layout.image, painter.buffer);
         }
         cursor
     }
 }
 
-/// Returns `true` if key presses go to the panel `focus`: it has the keyboard focus, and no overlay
-/// is open.
+/// Returns `true` if keys go to the panel `focus`.
 fn is_active(model: &Model, focus: Focus) -> bool {
     model.focus == focus && model.overlay.is_none()
 }
 
-/// Draws a message on a terminal that is too small.
-fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
+fn too_small([width, height]: [u16; 2], painter: &mut Painter) {
     let [columns, rows] = SMALLEST;
-    let text = format!(
+    let message = format!(
         "zerkalo needs at least {columns} columns and {rows} rows; this terminal has {width} and \
          {height}."
     );
-    let lines = crate::dashboard::overlay_layout::wrapped(&text, width.max(1));
+    let lines = text::wrapped(&message, width.max(1));
     let area = Rect { x: 0, y: 0, width, height };
     let top = height.saturating_sub(lines.len() as u16) / 2;
     for (row, line) in (top..).zip(&lines) {
         let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;
-        Row::new(buffer, area, row).skip(indent).put(line, ratatui::style::Style::new());
+        painter.row(area, row).skip(indent).put(line, Style::new());
     }
 }

@@ -1,21 +1,18 @@
-//! Drawing of the pixel probe: a mark on the picture, and a box with the values of the probed pixel.
+//! Drawing of the pixel probe: a mark on the picture, and a box with values.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
-use crate::dashboard::view::frame::overlay;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;
 use zerkalo_scene::edit::Target;
 
-/// Width in columns of the box with the values of the probed pixel, with its border.
+/// Width of the box with its border.
 const WIDTH: u16 = 36;
 
-/// Draws the pixel probe: a mark and a box with values. Draws nothing if no pixel is probed.
-pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let Some([x, y]) = model.probe else { return };
     let film = model.scene().film.size;
     // The half cell that shows the pixel.
@@ -24,19 +21,19 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     };
     let column = layout.image.x + place(x, film[0], layout.raster[0]);
     let row = layout.image.y + place(y, film[1], layout.raster[1]) / 2;
-    mark(column, row, theme, buffer);
+    mark(column, row, painter);
     let lines = readout(model);
     let height = lines.len() as u16 + 2;
     let area = layout.picture;
     if area.width < WIDTH + 4 || area.height < height + 4 {
-        let mut row = Row::new(buffer, area, area.height.saturating_sub(1));
+        let mut row = painter.row(area, area.height.saturating_sub(1));
         row.skip(2);
         for (name, value) in lines.iter().take(2) {
             row.put(&format!(" {name} {value} "), theme.text());
         }
         return;
     }
-    // The box is in the corner farthest from the mark.
+    // The box is farthest from the mark.
     let left = area.x + 2;
     let right = area.x + area.width - WIDTH - 2;
     let x_box = if column < area.x + area.width / 2 { right } else { left };
@@ -44,10 +41,10 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let bottom = area.y + area.height - height - 1;
     let y_box = if row < area.y + area.height / 2 { bottom } else { top };
     let frame = Rect { x: x_box, y: y_box, width: WIDTH, height };
-    overlay(frame, &format!("pixel {x}, {y}"), theme, buffer);
+    painter.overlay(frame, &format!("pixel {x}, {y}"));
     let inner = frame.inner(BORDER);
     for (i, (name, value)) in (0..).zip(&lines) {
-        let mut row = Row::new(buffer, inner, i);
+        let mut row = painter.row(inner, i);
         row.skip(1).put_wide(name, 10, theme.dim());
         if i == 1
             && let Some(probe) = model.probed()
@@ -59,7 +56,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     }
 }
 
-/// Returns the lines of the pixel probe's box, each as a label and a formatted value.
+/// Returns the lines of the box, each a label and a value.
 fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let Some(probe) = model.probed() else {
         return vec![("samples", "none yet".to_string())];
@@ -83,8 +80,7 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// Returns the label of the object that is visible at a film pixel (column, row). Returns `None` if
-/// there is none, or if the renderer has not reported the objects.
+/// Returns the label of the object that is visible at a film pixel (column, row).
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
@@ -94,8 +90,8 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
 }
 
 /// Draws a cross in a cell, in a colour that contrasts with the cell.
-fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
-    let Some(cell) = buffer.cell_mut((column, row)) else { return };
+fn mark(column: u16, row: u16, painter: &mut Painter) {
+    let Some(cell) = painter.buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
         _ => false,
@@ -103,7 +99,7 @@ fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
     // The cross covers both half cells, so its colour must contrast with both.
     let style = match (cell.bg, cell.fg) {
         (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
-            theme.accent()
+            painter.theme.accent()
         }
         (bg @ Color::Rgb(..), _) if light(bg) => Style::new().fg(Color::Rgb(0, 0, 0)),
         (Color::Rgb(..), _) => Style::new().fg(Color::Rgb(255, 255, 255)),

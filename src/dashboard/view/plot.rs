@@ -1,20 +1,16 @@
-//! Convergence plot: noise (estimated error of the picture) over seconds of tracing on logarithmic
-//! axes, with the noise target and the estimated time at which the target is reached.
+//! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
+//! the estimated time at which it is reached.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
-use crate::dashboard::view::frame::panel;
-use crate::dashboard::view::text::{Row, columns, number};
-use crate::dashboard::view::theme::Theme;
-use ratatui::buffer::Buffer;
+use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
 
-/// Logarithmic axis of the convergence plot: the smallest and the largest value on it, both greater
-/// than 0.
+/// Logarithmic axis from `low` to `high`, both greater than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     low: f64,
@@ -22,31 +18,26 @@ struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis that contains all positive finite `values`. The lower end is at most the
-    /// smallest value divided by 1.1, the upper end at least the largest value times 1.1, and they
-    /// differ by at least a factor of 2. Returns `None` if no value is positive and finite.
+    /// Creates an axis that contains all positive finite `values`.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
             low = low.min(value);
             high = high.max(value);
         }
-        // The axis spans at least a factor of 2 before both ends get a margin of 10 %.
+        // The axis spans at least a factor of 2, and both ends get a margin of 10 %.
         (low <= high).then(|| {
             let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
             Self { low: low / stretch, high: high * stretch }
         })
     }
 
-    /// Returns the relative position of `value` on the axis: 0 at the lower end, 1 at the upper
-    /// end. Positions beyond the ends are not clamped.
+    /// Returns the position of `value`: 0 at the lower end, 1 at the upper end.
     fn part(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Returns the values of the axis's ticks. These are powers of ten. If the ends of the axis
-    /// differ by less than a factor of 50, two times and five times each power of ten have ticks,
-    /// too.
+    /// Returns powers of ten, and on a short axis also two and five times these.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;
@@ -56,37 +47,34 @@ impl Axis {
     }
 }
 
-/// Formats the value of an axis's tick without trailing zeros, such as `0.5` or `20`.
+/// Formats the value of a tick, such as `0.5` or `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
-        // A tick below 1 is a product with a negative power of ten, which has a rounding error.
-        // Rounding to six decimals removes it.
+        // Rounding removes the error of a product with a negative power of ten.
         format!("{}", (value * 1e6).round() / 1e6)
     } else {
         format!("{value:.0e}")
     }
 }
 
-/// Draws the convergence plot. Draws nothing if the layout has no area for it.
-pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
+    let theme = painter.theme;
     let Some(area) = layout.plot else { return };
-    panel(area, "convergence", false, theme, buffer);
+    painter.panel(area, "convergence", false);
     let inner = area.inner(BORDER);
     let points = &model.convergence.points;
     let Some(last) = points.last() else {
         let middle = inner.height / 2;
         let text = "no estimate of the noise yet";
         let indent = usize::from(inner.width).saturating_sub(columns(text)) / 2;
-        Row::new(buffer, inner, middle).skip(indent).put(text, theme.dim());
+        painter.row(inner, middle).skip(indent).put(text, theme.dim());
         return;
     };
-    let corner = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
-    let mut title = Row::new(buffer, corner, 0);
+    let mut title = painter.edge(area, 0);
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_levels)), 0, theme.text());
     let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // Point at which the noise is expected to reach its target. Its time is the mean of the lower
-    // and the upper estimate.
+    // The expected time is the mean of its bounds.
     let reached = match (target, eta) {
         (Some(target), Some((from, to))) if target < last.noise_levels => {
             Some((last.seconds + 0.5 * (from + to), target))
@@ -96,9 +84,9 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let seconds = points.iter().map(|p| p.seconds).chain(reached.map(|(s, _)| s));
     let noise = points.iter().map(|p| p.noise_levels).chain(target);
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
-    let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
+    let Some(plot) = axes(inner, &x, &y, painter) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
-    // A ratatui canvas supports colours, but no other style.
+    // A canvas supports colours, but no other style.
     let color = |style: Style| style.fg.unwrap_or(Color::Reset);
     let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
         x1,
@@ -135,15 +123,15 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             let point = place(last.seconds, last.noise_levels);
             canvas.draw(&line(point, point, theme.accent()));
         })
-        .render(plot, buffer);
+        .render(plot, painter.buffer);
 }
 
-/// Number of dashes of a dashed line in the convergence plot.
+/// Number of dashes of a dashed line.
 const DASHES: usize = 16;
 
-/// Draws both axes of the convergence plot inside of `area`. Returns the area between them for the
-/// plot. Returns `None` if there is no room.
-fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Rect> {
+/// Draws both axes. Returns the area between them, or `None` if there is no room.
+fn axes(area: Rect, x: &Axis, y: &Axis, painter: &mut Painter) -> Option<Rect> {
+    let theme = painter.theme;
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
     let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
     let left = labels + 2;
@@ -154,19 +142,18 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         Rect { x: area.x + left, y: area.y, width: area.width - left - 1, height: area.height - 2 };
     let line = theme.border(false);
     for row in 0..plot.height {
-        Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
+        painter.row(Rect { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
     }
     let foot = Rect { x: plot.x - 1, width: plot.width + 1, ..area };
-    Row::new(buffer, foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
+    painter.row(foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
-        // The values of the ticks increase, so their rows go from the bottom to the top. A row gets
-        // at most one label.
+        // Ticks go from the bottom to the top. A row gets at most one label.
         if row < free {
             let indent = usize::from(labels) - columns(text);
-            Row::new(buffer, area, row).skip(indent).put(text, theme.dim());
-            Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
+            painter.row(area, row).skip(indent).put(text, theme.dim());
+            painter.row(Rect { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
             free = row;
         }
     }
@@ -178,8 +165,8 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         let end = start + columns(&text) as u16;
         if start >= free && end <= area.x + area.width && column < plot.x + plot.width {
             let label_area = Rect { x: start, width: end - start, ..area };
-            Row::new(buffer, label_area, plot.height + 1).put(&text, theme.dim());
-            Row::new(buffer, Rect { x: column, width: 1, ..area }, plot.height).put("┬", line);
+            painter.row(label_area, plot.height + 1).put(&text, theme.dim());
+            painter.row(Rect { x: column, width: 1, ..area }, plot.height).put("┬", line);
             free = end + 1;
         }
     }

@@ -1,8 +1,7 @@
 //! Division of a planned render's samples among its shards, which different processes trace.
 //!
-//! The samples of a tile after its base (the samples that the plan started from) are cut at
-//! multiples of [`SAMPLE_ALIGNMENT`] into blocks. Shards get whole blocks, contiguous within a
-//! tile, for three reasons:
+//! The samples of a tile after its base are cut at multiples of [`SAMPLE_ALIGNMENT`] into blocks.
+//! Shards get whole blocks, contiguous within a tile, for three reasons:
 //!
 //! - An aligned block of 2^m indices of the Owen-scrambled Sobol sequence is as well distributed as
 //!   the first 2^m. The samples of every shard are therefore stratified (evenly distributed), and
@@ -10,9 +9,8 @@
 //!   of each tile without gaps, starting at 0, wherever the cuts are.
 //! - A block is as long as the widest packet. Shards trace the same packets as one process, at the
 //!   same speed.
-//! - A shard traces the same indices in both replicates, the halves A and B of the samples. In any
-//!   sum of shards each tile therefore has equally many samples of A and of B. The noise is
-//!   estimated from the difference of A and B.
+//! - A shard traces the same indices in both replicates. In any sum of shards each tile therefore
+//!   has equally many samples of A and of B. The noise is estimated from the difference of A and B.
 //!
 //! If the number of blocks is not a multiple of the number of shards, the remaining blocks go to
 //! shards in turn, tile after tile. The total numbers of blocks of two shards differ by at most 1.
@@ -22,9 +20,8 @@ use crate::schedule::SAMPLE_ALIGNMENT;
 use std::ops::Range;
 
 impl PlannedTile {
-    /// Returns the number of blocks of samples that the shards trace in this tile. A block is a run
-    /// of [`SAMPLE_ALIGNMENT`] samples of every pixel, which one shard traces. The first and the
-    /// last block of a tile may be shorter.
+    /// Returns the number of blocks that the shards trace in this tile. The first and the last may
+    /// be shorter.
     fn blocks(&self) -> u32 {
         if self.end > self.base {
             self.end.div_ceil(SAMPLE_ALIGNMENT) - self.base / SAMPLE_ALIGNMENT
@@ -33,8 +30,6 @@ impl PlannedTile {
         }
     }
 
-    /// Returns the index of the first sample in block number `block` of this tile. A block is a run
-    /// of samples of every pixel, which one shard (a process of the divided render) traces.
     fn block_start(&self, block: u32) -> u32 {
         let aligned = (self.base / SAMPLE_ALIGNMENT + block).saturating_mul(SAMPLE_ALIGNMENT);
         aligned.clamp(self.base, self.end)
@@ -42,15 +37,9 @@ impl PlannedTile {
 }
 
 impl Plan {
-    /// Returns the range of sample indices that `shard` (one process's part of the render) traces
-    /// in each tile, in row order of the tiles. Each replicate (half of the samples) numbers its
-    /// own samples from 0, and the shard traces the same range of numbers in both. A range may be
-    /// empty. If `shard` is [`BASE`], the ranges are those of the samples that the plan started
-    /// from.
-    ///
-    /// # Panics
-    ///
-    /// Panics if there is no such shard.
+    /// Returns the range of sample indices that `shard` traces in each tile, in row order, and in
+    /// both replicates. Ranges may be empty. The shard [`BASE`] has those that the plan started
+    /// from. Panics if there is no such shard.
     pub fn ranges(&self, shard: u32) -> Vec<Range<u32>> {
         let shards = self.settings.shards;
         assert!(shard <= shards, "shard {shard} of {shards}");
@@ -61,7 +50,6 @@ impl Plan {
         let range = |tile: &PlannedTile| {
             let (whole, remaining) = (tile.blocks() / shards, tile.blocks() % shards);
             // Position of the shard in the order in which the shards get the blocks of this tile.
-            // The shard with the index `turn`, counted from 0, is first.
             let place = (shard - 1 + shards - turn) % shards;
             turn = (turn + remaining) % shards;
             let start = |place: u32| tile.block_start(place * whole + place.min(remaining));

@@ -1,10 +1,8 @@
-//! Plan files. A plan divides a render among shards, which different processes trace. Its file is
-//! text with one setting or tile per line, in a fixed order, and a checksum at the end.
+//! Plan files: text with one setting or tile per line, in a fixed order, and a checksum at the end.
 //!
-//! The line of a tile has four fields. The first is its base: the number of samples per pixel that
-//! each replicate (half of the samples) had when the plan started. The second is this number in the
-//! merged picture, the third is the expected number of rays per sample. The fourth is `g` if a path
-//! in the tile has made a random choice, such as a direction of a glossy lobe, otherwise `-`.
+//! The line of a tile has four fields: samples per pixel and replicate when the plan started, the
+//! same in the merged picture, the expected number of rays per sample, and `g` if a path in the
+//! tile has made a random choice, otherwise `-`.
 
 use crate::film::{Display, Tone};
 use crate::plan::{MAX_SHARDS, Plan, PlanSettings, PlannedTile, tiles_of};
@@ -18,20 +16,18 @@ use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
 
-/// First line of a plan file, with the version of the format.
+/// First line of a plan file.
 const TITLE: &str = "zerkalo plan 1";
-/// Largest length of a plan file in bytes. The plan of a picture of 16384 x 16384 pixels has about
-/// 30 MB.
+/// Largest length in bytes. The plan of a picture of 16384 x 16384 pixels has about 30 MB.
 const MAX_BYTES: u64 = 1 << 26;
-/// Largest width and height of a planned picture in pixels.
+/// Largest width and height in pixels.
 const MAX_SIDE: u32 = 1 << 14;
-/// Number of bytes of the shortest line of a tile in a plan file.
+/// Bytes of the shortest line of a tile.
 const MIN_TILE_BYTES: usize = 8;
 
-/// Beginning of the first line of plan files, whatever their version.
+/// Beginning of the first line, whatever the version.
 const START: &[u8] = b"zerkalo plan ";
 
-/// Returns `true` if the file at `path` begins like a plan file.
 pub fn is_plan_file(path: &Path) -> bool {
     let mut start = [0; START.len()];
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == START
@@ -40,14 +36,12 @@ pub fn is_plan_file(path: &Path) -> bool {
 /// Error that makes a plan file, or a film file with a plan, unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanError {
-    /// Path of the plan file, or of the film file that contains the plan.
     pub path: PathBuf,
     /// Line of the error, counted from 1; 0 for the file as a whole.
     pub line: usize,
-    /// Description of the error, as a clause of a sentence with the text that was found and the
-    /// text that was expected.
+    /// What was found and expected, as a clause.
     pub what: String,
-    /// Advice to the user, as a clause of a sentence.
+    /// Advice to the user, as a clause.
     pub remedy: &'static str,
 }
 
@@ -64,7 +58,6 @@ impl fmt::Display for PlanError {
 impl std::error::Error for PlanError {}
 
 impl Plan {
-    /// Formats the plan as the text of a plan file.
     pub fn text(&self) -> String {
         let mut text = self.body();
         let checksum = fnv1a64(text.as_bytes());
@@ -72,13 +65,12 @@ impl Plan {
         text
     }
 
-    /// Returns the checksum of the plan, a hash of its text. Plans with equal checksums count as
-    /// equal.
+    /// Returns the hash of the text. Plans with equal checksums count as equal.
     pub fn checksum(&self) -> u64 {
         fnv1a64(self.body().as_bytes())
     }
 
-    /// Formats all lines of the plan file before the checksum.
+    /// Formats all lines before the checksum.
     fn body(&self) -> String {
         let s = &self.settings;
         let base = s.base_plan.map_or("pilot".to_string(), |plan| format!("{plan:016x}"));
@@ -111,10 +103,7 @@ impl Plan {
         text
     }
 
-    /// Reads a plan file.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or is no valid plan.
+    /// Reads a plan file. Fails if it cannot be read or is no valid plan.
     pub fn read(path: &Path) -> Result<Self, PlanError> {
         let error =
             |what: String, remedy| PlanError { path: path.to_path_buf(), line: 0, what, remedy };
@@ -133,10 +122,7 @@ impl Plan {
         Self::parse(path, &bytes)
     }
 
-    /// Parses the text of a plan file. `path` is the name of the file in error messages.
-    ///
-    /// # Errors
-    /// Fails if the text is no valid plan.
+    /// Parses the text of a plan file. `path` is its name in error messages.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, PlanError> {
         let mut lines = Lines { path, line: 0, rest: "" };
         let whole = |lines: &Lines, what: &str, remedy| PlanError {
@@ -216,8 +202,7 @@ impl Plan {
         lines.setting("tiles", &format!("{count}, the number of tiles of the size"), |text| {
             number(text).filter(|n: &usize| *n == count)
         })?;
-        // The file may promise more tiles than it has lines. Memory is reserved only for the lines
-        // that it has.
+        // The file may promise more tiles than it has lines.
         let mut tiles = Vec::with_capacity(count.min(lines.rest.len() / MIN_TILE_BYTES));
         for _ in 0..count {
             tiles.push(lines.tile()?);
@@ -230,13 +215,12 @@ impl Plan {
     }
 }
 
-/// Advice to the user in errors about damaged plan files.
 const DAMAGED: &str = "copy it again or plan again";
 
-/// Lines of a plan file that remain to be parsed.
+/// Remaining lines of a plan file.
 struct Lines<'a> {
     path: &'a Path,
-    /// Number of the line that was read last, counted from 1.
+    /// Number of the latest line, counted from 1.
     line: usize,
     rest: &'a str,
 }
@@ -253,8 +237,8 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads the next line of the plan file, which must have the setting `key`, and parses its
-    /// value. `expected` describes valid values in error messages.
+    /// Reads the next line, which must have the setting `key`. `expected` describes valid values in
+    /// error messages.
     fn setting<T>(
         &mut self,
         key: &str,
@@ -298,8 +282,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Parses a number of a plan file. The text must begin with a digit or a minus sign. Returns `None`
-/// for any other text.
+/// Parses a number that begins with a digit or a minus sign.
 fn number<T: FromStr>(text: &str) -> Option<T> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.parse().ok())?

@@ -1,19 +1,17 @@
-//! Inputs of a merge: film files that belong to one plan (a render divided among shards). No shard
-//! may be in two of the files.
+//! Inputs of a merge: film files that belong to one plan. No shard may be in two of the files.
 
 use crate::plan::part::{Part, PartShard};
 use crate::plan::{BASE, Plan};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Input of a merge: a film file, its plan (a render divided among shards), and the shards whose
-/// samples the file holds.
+/// Film file with its plan and the shards whose samples it holds.
 #[derive(Clone, Debug)]
 pub(super) struct MergeInput {
     pub path: PathBuf,
     pub plan: Arc<Plan>,
-    /// Checksum of the plan to which the film file belongs.
+    /// Checksum of `plan`.
     pub checksum: u64,
     /// Shards that the film file holds, in ascending order.
     pub shards: Vec<PartShard>,
@@ -21,14 +19,12 @@ pub(super) struct MergeInput {
     pub rays: u64,
 }
 
-/// Plans of film files, by checksum. A plan is a render divided among shards. All files of one plan
-/// share one copy of it in memory.
+/// Plans of film files, by checksum, so that all files of a plan share one copy of it.
 #[derive(Debug, Default)]
 pub(super) struct Plans(HashMap<u64, Arc<Plan>>);
 
 impl Plans {
-    /// Creates an input of a merge from the film file at `path`. `part` has the plan of the file,
-    /// and the shards (parts of the planned render) that the file holds.
+    /// Creates an input of a merge from the film file at `path`, which holds `part`.
     pub fn input(&mut self, path: &Path, part: Part) -> MergeInput {
         let Part { plan, shards, rays } = part;
         let checksum = plan.checksum();
@@ -37,25 +33,19 @@ impl Plans {
     }
 }
 
-/// Map from the number of each shard (one process's part of a render) to the path of its film file
-/// and the state of the shard in this file.
-pub(super) type ShardFiles = BTreeMap<u32, (PathBuf, PartShard)>;
-
-/// Checks that the film files `inputs` can be merged. Returns two values: their common plan, and
-/// the file of each shard. One input may be the merged film that the plan started from. It is
-/// changed to an input of this plan that holds only the shard `BASE`.
+/// Checks that the film files `inputs` can be merged, and returns their common plan. One input may
+/// be the merged film that this plan started from. It becomes an input of this plan that holds only
+/// the shard [`BASE`].
 ///
 /// # Errors
-///
 /// Fails if there is no input, if the files belong to different plans, if two of them hold the same
 /// shard, or if the merged film lacks shards of its own plan.
-pub(super) fn join(inputs: &mut [MergeInput]) -> Result<(Arc<Plan>, ShardFiles), String> {
+pub(super) fn join(inputs: &mut [&mut MergeInput]) -> Result<Arc<Plan>, String> {
     let plan = common_plan(inputs)?;
-    let mut shards = ShardFiles::new();
+    let mut holders: HashMap<u32, &Path> = HashMap::new();
     for input in inputs.iter() {
         for shard in &input.shards {
-            let entry = (input.path.clone(), *shard);
-            if let Some((other, _)) = shards.insert(shard.number, entry) {
+            if let Some(other) = holders.insert(shard.number, &input.path) {
                 return Err(format!(
                     "{} and {} both hold {}; name one of them",
                     other.display(),
@@ -65,10 +55,10 @@ pub(super) fn join(inputs: &mut [MergeInput]) -> Result<(Arc<Plan>, ShardFiles),
             }
         }
     }
-    Ok((plan, shards))
+    Ok(plan)
 }
 
-fn common_plan(inputs: &mut [MergeInput]) -> Result<Arc<Plan>, String> {
+fn common_plan(inputs: &mut [&mut MergeInput]) -> Result<Arc<Plan>, String> {
     let latest = inputs.iter().find(|latest| {
         let base = latest.plan.settings.base_plan;
         inputs.iter().all(|m| m.checksum == latest.checksum || Some(m.checksum) == base)
@@ -98,8 +88,7 @@ fn common_plan(inputs: &mut [MergeInput]) -> Result<Arc<Plan>, String> {
     Ok(plan)
 }
 
-/// Returns the name of the shard (one process's part of the render) with the number `number`, such
-/// as `shard 3`. Messages use this name.
+/// Returns the name of the shard `number` in messages, such as `shard 3`.
 pub(super) fn shard_name(number: u32) -> String {
     match number {
         BASE => "the base (shard 0)".to_string(),

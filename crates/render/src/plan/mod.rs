@@ -4,9 +4,8 @@
 //! communicate. A pilot is an adaptive render that ends when its noise is still above the target.
 //! Its noise estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of
 //! the plan, the start of the sample sequence of every tile. The shards trace the rest. The sum of
-//! base and all shards therefore holds the samples `0..end` of each tile in both replicates (halves
-//! of the samples). It equals, bit for bit, the film of a single process that has traced the same
-//! sample counts.
+//! base and all shards therefore holds the samples `0..end` of each tile in both replicates. It
+//! equals, bit for bit, the film of a single process that has traced the same sample counts.
 //!
 //! [`Schedule::predict`]: crate::schedule::Schedule::predict
 
@@ -27,148 +26,102 @@ pub use shard_render::ShardRender;
 pub use watched::{WatchedFilms, WatchedShards, WatchedState};
 
 use crate::film::{Display, Estimator, Film, TILE};
-use crate::schedule::{Schedule, Settings, TilePrediction, TileSamples};
+pub use crate::schedule::PlannedTile;
+use crate::schedule::{Prediction, Schedule, Settings, TileSamples};
 use zerkalo_kernel::sampling::SamplerKind;
 
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
 
-/// Number that stands for the base in lists of shards. The base is the set of samples that a plan
-/// started from, such as those of a pilot render. Shards have the numbers from 1.
+/// Number of the base, the samples that a plan started from. Shards have the numbers from 1.
 pub const BASE: u32 = 0;
 
-/// Settings of a render that is divided among shards: the inputs of its samples, and its noise
-/// target.
+/// Inputs of a plan's samples, and its noise target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSettings {
     /// Path of the scene file as the user gave it.
     pub source: String,
-    /// Hash of the text of the scene and of the files that it names.
+    /// Value of [`scene_hash`](crate::export::scene_hash).
     pub scene_hash: String,
-    /// Width and height of the picture in pixels.
     pub size: [u32; 2],
-    /// Random seed of all samples of the planned render.
     pub seed: u64,
-    /// Kind of the random numbers: Sobol points or independent numbers.
     pub sampler: SamplerKind,
-    /// Floating-point precision of the render, `single` or `double`.
+    /// Floating-point precision, `single` or `double`.
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Largest number of samples per pixel in tiles in which a path makes a random choice (such as
-    /// a direction of a glossy lobe), over the whole render; 0 for no limit.
+    /// Value of [`Settings::rays_per_pixel`].
     pub rays_per_pixel: u32,
-    /// Noise target: RMSE of the displayed picture in 8-bit levels.
+    /// Noise target in 8-bit levels.
     pub noise_levels: f64,
-    /// Number of shards into which the render is divided, 1 to [`MAX_SHARDS`]. Each is for one
-    /// process. They are numbered from 1.
+    /// Number of shards, 1 to [`MAX_SHARDS`].
     pub shards: u32,
-    /// Checksum of the earlier plan that this plan continues: it starts from the film that was
-    /// merged from the shards of the earlier plan. `None` if this plan starts from a pilot, a short
-    /// render whose noise determines the samples of each tile.
+    /// Checksum of the earlier plan whose merged film is the base. `None` if the base is a pilot.
     pub base_plan: Option<u64>,
 }
 
-/// Plan of a render that is divided among shards: the number of samples of each tile, fixed in
-/// advance.
+/// Plan of a render: the number of samples of each tile, fixed in advance, to be divided among
+/// shards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Settings of the planned render: the inputs of its samples, and its noise target.
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_levels: f64,
-    /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles in which no path makes a
-    /// random choice, then of the other tiles (see [`PlannedTile::glossy`]).
+    /// Slopes of the error in tiles that are not glossy, and in glossy tiles.
     pub slopes: [f64; 2],
-    /// Sample counts of the picture's tiles, in row order.
+    /// Tiles in row order.
     pub tiles: Vec<PlannedTile>,
 }
 
-/// Sample counts of one tile in a plan.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlannedTile {
-    /// Base of the tile: samples per pixel that it had before the plan in each replicate (half of
-    /// the samples), from a pilot render or an earlier plan.
-    pub base: u32,
-    /// Samples per pixel in each replicate (half of the samples) of the merged film of all shards.
-    /// They include `base`, the samples that the plan started from.
-    pub end: u32,
-    /// Expected number of rays per sample in this tile.
-    pub rays_per_sample: f32,
-    /// `true` if a path in the tile has made a random choice, such as a direction of a glossy lobe.
-    pub glossy: bool,
-}
-
 impl Plan {
-    /// Creates the plan of a render that continues from the samples of `schedule` and ends at the
-    /// noise target of `schedule`. `usual_slopes` are assumed exponents of the error (see
-    /// [`Plan::slopes`]), used where the schedule has not measured any. Returns `None` if the
-    /// schedule has no noise target, or no estimate of the noise.
+    /// Creates the plan that continues from the samples of `schedule` to its noise target.
+    /// `usual_slopes` are used where the schedule has not measured any. Returns `None` without a
+    /// noise target or an estimate.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
         settings: PlanSettings,
     ) -> Option<Self> {
-        let prediction = schedule.predict(usual_slopes)?;
-        let tile = |tile: &TilePrediction| PlannedTile {
-            base: tile.done,
-            end: tile.count,
-            // Two decimals suffice for an expected cost.
-            rays_per_sample: (tile.rays_per_sample * 100.0).round() as f32 / 100.0,
-            glossy: tile.glossy,
-        };
-        Some(Self {
-            settings,
-            predicted_levels: prediction.rmse,
-            slopes: prediction.slopes,
-            tiles: prediction.tiles.iter().map(tile).collect(),
-        })
+        let Prediction { tiles, rmse, slopes } = schedule.predict(usual_slopes)?;
+        Some(Self { settings, predicted_levels: rmse, slopes, tiles })
     }
 
-    /// Returns the expected number of rays of all samples that the shard with the number `shard`
-    /// traces.
+    /// Returns the expected number of rays of a shard.
     pub fn rays(&self, shard: u32) -> f64 {
-        self.rays_of(self.ranges(shard).into_iter())
+        self.rays_of(self.ranges(shard).iter().map(|range| range.len() as u32))
     }
 
-    /// Returns the expected number of rays of the whole merged picture: those of the base (the
-    /// samples that the plan started from) and of all shards.
+    /// Returns the expected number of rays of base and all shards.
     pub fn all_rays(&self) -> f64 {
-        self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
+        self.rays_of(self.tiles.iter().map(|tile| tile.end))
     }
 
-    /// Returns the expected number of rays for the samples with the indices `ranges` in both
-    /// replicates (halves of the samples). `ranges` has a range of indices for each tile.
-    fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
-        let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
-            let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
-            samples * f64::from(self.tiles[tile].rays_per_sample)
-        };
-        ranges.enumerate().map(rays).sum()
+    /// Returns the expected number of rays of `counts` samples per pixel and replicate in the tiles.
+    fn rays_of(&self, counts: impl Iterator<Item = u32>) -> f64 {
+        let samples = self.samples_of(counts);
+        samples.zip(&self.tiles).map(|(n, t)| n as f64 * f64::from(t.rays_per_sample)).sum()
     }
 
-    /// Returns the number of samples that the shard with the number `shard` traces, over all pixels
-    /// and both replicates (halves of the samples).
+    /// Returns the number of samples of a shard, over all pixels and both replicates.
     pub fn samples(&self, shard: u32) -> u64 {
-        let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
-            2 * range.len() as u64 * pixels_of(self.settings.size, tile)
-        };
-        self.ranges(shard).into_iter().enumerate().map(samples).sum()
+        self.samples_of(self.ranges(shard).iter().map(|range| range.len() as u32)).sum()
     }
 
-    /// Returns the mean number of samples per pixel in the merged picture, over both replicates
-    /// (halves of the samples).
+    /// Returns the mean samples per pixel in the merged picture, over both replicates.
     pub fn spp(&self) -> f64 {
-        let size = self.settings.size;
-        let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
-        let samples: u64 = self.tiles.iter().enumerate().map(samples).sum();
+        let samples: u64 = self.samples_of(self.tiles.iter().map(|tile| tile.end)).sum();
         let [width, height] = self.settings.size.map(u64::from);
         samples as f64 / (width * height) as f64
     }
 
-    /// Compares the sample counts of `film` with those that the plan assigns to the shards with the
-    /// numbers `shards`, which may include [`BASE`]. Returns the number of the first tile whose
-    /// counts differ; `None` if all counts agree.
+    /// Multiplies samples per pixel and replicate in each tile by its pixels and replicates.
+    fn samples_of(&self, counts: impl Iterator<Item = u32>) -> impl Iterator<Item = u64> {
+        let tiles = counts.enumerate();
+        tiles.map(|(i, count)| 2 * u64::from(count) * pixels_of(self.settings.size, i))
+    }
+
+    /// Returns the first tile in which the sample counts of `film` are not those of `shards`, which
+    /// may include [`BASE`].
     pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
         let mut expected = vec![0u32; self.tiles.len()];
         for shard in shards {
@@ -179,9 +132,8 @@ impl Plan {
         (0..self.tiles.len()).find(|tile| film.counts(*tile) != [expected[*tile]; 2])
     }
 
-    /// Returns the schedule that continues `film`, which holds all samples of this plan.
-    /// `estimator` estimates the error of each tile. Returns `None` if `estimator` has no estimate
-    /// for a tile.
+    /// Returns the schedule that continues `film`, which holds all samples of this plan. Returns
+    /// `None` if `estimator` has no estimate for a tile.
     pub fn schedule(
         &self,
         film: &Film,
@@ -202,8 +154,7 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns a phrase for messages about two plans that differ: the first line that is not the
-    /// same in the texts of `self` and `other`. The phrase quotes the line of each text.
+    /// Quotes the first line that is not the same in the texts of two plans.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);
@@ -211,12 +162,11 @@ impl Plan {
     }
 }
 
-/// Returns the number of tiles of a picture of the given size.
 fn tiles_of([width, height]: [u32; 2]) -> usize {
     width.div_ceil(TILE as u32) as usize * height.div_ceil(TILE as u32) as usize
 }
 
-/// Returns the number of pixels of tile number `tile` that are inside a picture of the given size.
+/// Returns the number of pixels of a tile that are inside a picture of the given size.
 fn pixels_of(size: [u32; 2], tile: usize) -> u64 {
     let [width, height] = size.map(|n| n as usize);
     let columns = width.div_ceil(TILE);

@@ -1,46 +1,40 @@
-//! Film files of planned renders: they hold the samples of some shards of a plan, together with the
-//! plan.
+//! Parts: film files with the samples of some shards of a plan, together with the plan.
 
 use crate::film::file::FilmFileHeader;
 use crate::plan::{BASE, Plan};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Tag of the film file's chunk with the text of the plan.
+/// Tag of the chunk with the text of the plan.
 const PLAN_TAG: [u8; 4] = *b"PLAN";
-/// Tag of the film file's chunk that lists the shards (parts of a render) in the film. The chunk
-/// has a line `rays N`, then a line `shard K complete` or `shard K unfinished` for each shard.
+/// Tag of the chunk that lists the shards: a line `rays N`, then a line `shard K complete` or
+/// `shard K unfinished` for each.
 const PART_TAG: [u8; 4] = *b"PART";
 
-/// Part of a planned render: the plan that a film file contains, and the shards that its film
-/// holds.
+/// Plan that a film file contains, and the shards that its film holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Plan of the render to which the film belongs.
     pub plan: Plan,
-    /// Shards that the film holds, in ascending order.
+    /// Shards in ascending order.
     pub shards: Vec<PartShard>,
-    /// Number of rays of all samples in the part's film.
+    /// Number of rays of all samples in the film.
     pub rays: u64,
 }
 
-/// State of one shard (one process's part of a planned render) in a film file: complete or not.
+/// State of one shard in a film file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PartShard {
-    /// Number of the shard; [`BASE`] means the samples that the plan started from.
+    /// Number of the shard; [`BASE`] for the base.
     pub number: u32,
-    /// `true` if the film holds all samples of this shard.
     pub complete: bool,
 }
 
 impl Part {
-    /// Adds the plan, the shards and the metadata entry `Shards` to `header`, the header of a film
-    /// file.
+    /// Adds the plan, the shards and the metadata entry `Shards` to the header of a film file.
     pub fn record(&self, header: &mut FilmFileHeader) {
         let mut text = format!("rays {}\n", self.rays);
         for PartShard { number, complete } in &self.shards {
             let state = if *complete { "complete" } else { "unfinished" };
-            // Writing into a string cannot fail.
             let _ = writeln!(text, "shard {number} {state}");
         }
         let (key, shards) = self.origin();
@@ -51,10 +45,7 @@ impl Part {
     }
 
     /// Reads plan and shards from the header of the film file at `path`. Returns `None` if the film
-    /// belongs to no plan.
-    ///
-    /// # Errors
-    /// Fails if the plan or the list of shards is not valid, or does not fit the film.
+    /// belongs to no plan. Fails if they are not valid, or do not fit the film.
     pub fn of_header(path: &Path, header: &FilmFileHeader) -> Result<Option<Self>, String> {
         let Some(plan) = header.chunks.get(&PLAN_TAG) else { return Ok(None) };
         let plan = Plan::parse(path, plan).map_err(|e| e.to_string())?;
@@ -95,22 +86,19 @@ impl Part {
         (!shards.is_empty()).then_some(Self { plan, shards, rays })
     }
 
-    /// Returns `true` if the part's film holds all samples of the plan.
     pub fn is_whole(&self) -> bool {
         self.plan.is_whole(&self.shards)
     }
 
-    /// Returns a list of the shards (parts of the render) that are missing or incomplete in the
-    /// film, by their numbers, such as `3, 5-7`. `None` if the film holds all.
+    /// Returns the numbers of the shards that are missing or incomplete, such as `3, 5-7`. `None`
+    /// if the film holds all.
     pub fn missing(&self) -> Option<String> {
         let complete = self.shards.iter().filter(|shard| shard.complete);
         let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());
         (!missing.is_empty()).then(|| ranges(&missing))
     }
 
-    /// Returns the metadata entry `("Shards", value)` for the film file. The value lists the shards
-    /// in the film, the number of shards in the plan, the unfinished and the missing shards, and
-    /// the plan's checksum. Example: `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
+    /// Returns the metadata entry `Shards`, such as `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
     /// 0123456789abcdef`.
     fn origin(&self) -> (String, String) {
         let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
@@ -129,14 +117,14 @@ impl Part {
 }
 
 impl Plan {
-    /// Returns the numbers of the plan's shards, including [`BASE`], that are not among `numbers`.
-    /// `numbers` must be in ascending order.
+    /// Returns the numbers of the plan's shards, including [`BASE`], that are not among the
+    /// ascending `numbers`.
     pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
         let all = BASE..=self.settings.shards;
         all.filter(|number| numbers.binary_search(number).is_err()).collect()
     }
 
-    /// Returns `true` if a film that holds `shards` has all samples of this plan.
+    /// Returns `true` if `shards` are all samples of this plan.
     pub(super) fn is_whole(&self, shards: &[PartShard]) -> bool {
         let numbers = BASE..=self.settings.shards;
         shards.iter().map(|shard| shard.number).eq(numbers)

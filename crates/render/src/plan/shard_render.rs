@@ -1,5 +1,4 @@
-//! Render of the samples that a plan assigns to one shard, in steps between which the film can be
-//! saved.
+//! Render of the samples of one shard, in steps between which the film can be saved.
 
 use crate::film::TILE_PIXELS;
 use crate::schedule::{SAMPLE_ALIGNMENT, Spp};
@@ -11,46 +10,36 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration in seconds of a step in the render of a shard (one process's part of a plan).
-/// The caller can save the film between two steps.
+/// Target duration in seconds of a step.
 const STEP_SECONDS: f64 = 0.25;
-/// Target duration in seconds of one tracing job in a shard's render. A job traces samples of one
-/// tile. Jobs are short, so that all threads have work until the end of a step.
+/// Target duration in seconds of a job. Jobs are short, so that all threads have work until the end
+/// of a step.
 const JOB_SECONDS: f64 = 0.01;
-/// Largest number of samples per pixel of a tracing job, even if [`JOB_SECONDS`] allows more. A job
-/// traces samples of one tile in one replicate (half of the samples).
+/// Largest number of samples per pixel of a job.
 const LONGEST_JOB: u32 = 1 << 20;
-/// Number of samples, over all pixels, of the first step of a shard's render. The speed of tracing
-/// is measured in this step. The lengths of the next steps follow from it.
+/// Number of samples, over all pixels, of the first step, which measures the speed.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
-/// Render of the samples of one shard (one process's part of a plan), in steps of about a quarter
-/// of a second. After each step, both replicates (halves of the samples) of every tile hold equally
-/// many samples: the first ones of the shard's range in this tile. A film that was saved between
-/// two steps can therefore be continued.
+/// Render of the samples of one shard. After each step, both replicates of every tile hold equally
+/// many samples: the first ones of the shard's range. A film that was saved between two steps can
+/// therefore be continued.
 pub struct ShardRender {
-    /// Compiled scene and the film with the samples of the shard so far.
     pub state: RenderState,
     pool: rayon::ThreadPool,
-    /// Jobs that remain to be traced. Each is traced in both replicates (halves of the samples).
+    /// Jobs that remain to be traced, in both replicates.
     remaining: VecDeque<Job>,
-    /// `[samples of the complete shard, samples that the film holds so far]`, over all pixels and
-    /// both replicates (halves of the samples).
+    /// Samples of the complete shard, and those in the film, over all pixels and both replicates.
     samples: [u64; 2],
     rays: u64,
-    /// `(samples traced, seconds of tracing)` in all steps so far, from which the speed of tracing
-    /// follows.
+    /// Samples and seconds of tracing in all steps so far.
     measured: (u64, f64),
 }
 
 impl ShardRender {
-    /// Creates the render of a shard on `threads` threads. `ranges` are the shard's sample indices
-    /// in each tile. The film of `state` may already hold the first samples of some ranges, which
-    /// took `rays` rays; the render then continues after them.
-    ///
-    /// # Errors
-    /// Fails if the sample counts of a tile cannot come from an interrupted render of these ranges,
-    /// or if the threads cannot be started.
+    /// Creates the render of a shard with the sample indices `ranges` in each tile. The film of
+    /// `state` may already hold the first samples, which took `rays` rays. Fails if its sample
+    /// counts cannot come from an interrupted render of these ranges, or if a thread cannot be
+    /// started.
     pub fn new(
         state: RenderState,
         ranges: &[Range<u32>],
@@ -78,8 +67,7 @@ impl ShardRender {
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
     }
 
-    /// Traces samples of the shard for about a quarter of a second. Returns `false` if no samples
-    /// are left.
+    /// Traces a quarter of a second. Returns `false` if no samples are left.
     pub fn step(&mut self) -> bool {
         let speed = match self.measured {
             (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
@@ -95,8 +83,7 @@ impl ShardRender {
         while sum < STEP_SECONDS * speed
             && let Some(job) = self.remaining.pop_front()
         {
-            // A job is cut at a multiple of `SAMPLE_ALIGNMENT`, so that packets after the cut are
-            // full.
+            // Packets after the cut are full.
             let end = (job.first + longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
             let count = job.count.min(end - job.first);
             if count < job.count {
@@ -122,24 +109,21 @@ impl ShardRender {
         self.samples[1] += traced;
         self.measured.0 += traced;
         self.measured.1 += start.elapsed().as_secs_f64();
-        // The rest of each cut job is traced in the next step, while its tile is still in the
-        // cache.
+        // The rest of each cut job is traced next, while its tile is still in the cache.
         cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
         true
     }
 
-    /// Returns the number of rays of all samples in the shard's film.
     pub fn rays(&self) -> u64 {
         self.rays
     }
 
-    /// Returns the fraction of the shard's samples that the film holds, 0..=1.
+    /// Returns the share of the shard's samples that the film holds, 0..=1.
     pub fn progress(&self) -> f64 {
         let [total, done] = self.samples;
         if total == 0 { 1.0 } else { done as f64 / total as f64 }
     }
 
-    /// Returns the report on the shard's film, with the progress of the shard.
     pub fn report(&self) -> Report {
         let [total, done] = self.samples;
         let (traced, seconds) = self.measured;

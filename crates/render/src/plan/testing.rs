@@ -5,8 +5,8 @@ use crate::plan::{Plan, PlanSettings, PlannedTile};
 use zerkalo_kernel::sampling::SamplerKind;
 
 /// Creates the plan of a picture with one row of tiles, divided into `shards` parts. Each entry of
-/// `tiles` has two sample counts of a tile, per pixel and replicate: in the base (the samples that
-/// the plan starts from) and in the merged picture.
+/// `tiles` has two sample counts of a tile, per pixel and replicate: in the base and in the merged
+/// picture.
 pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
     let tile = |[base, end]: &[u32; 2]| PlannedTile {
         base: *base,

@@ -1,28 +1,24 @@
-//! Watched films: film files that other processes write, and the sum of their films. A file is read
-//! again when it is replaced.
-//!
-//! The sum of the complete files is kept in memory, because these files do not change. The
-//! unfinished files are added to a copy of this sum. The memory is that of two films, whatever the
-//! number of files.
+//! Watched films: film files that other processes write, and their sum. After a change all films
+//! are added again, which takes the memory of one film.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
-use crate::film::file::{FilmFileHeader, FilmReader, ReadError};
+use crate::film::file::{FilmFileHeader, FilmReader};
 use crate::memory_budget;
 use crate::plan::merge::without_plan;
 use crate::plan::merge_inputs::{MergeInput, Plans, join};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, Plan, is_plan_file};
-use std::collections::BTreeMap;
-use std::fs;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
-/// Time since the last replacement of an unfinished film file after which the file counts as late.
-/// It is three minutes, because `zerkalo render` replaces its files every minute.
+/// Age from which on an unfinished file counts as late. `zerkalo render` replaces its files every
+/// minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -30,91 +26,72 @@ const LATE: Duration = Duration::from_secs(180);
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
     plans: Plans,
-    /// Plan file that the user named, as an input of a merge; it holds no shards. `None` if the
-    /// user named film files.
+    /// Plan file that the user named, as an input without shards.
     named: Option<MergeInput>,
-    /// Plan that all film files share. `None` if the only file is a checkpoint of a render without
-    /// a plan, or before the first file is read.
+    /// Plan that all files share. `None` before the first file, and for a checkpoint without a
+    /// plan.
     plan: Option<Arc<Plan>>,
-    /// `(stamps, sum)` of the complete film files: their stamps (time, length, inode) by their
-    /// index in `files`, and the sum of their films. `None` before a file is read.
-    complete: Option<(BTreeMap<usize, FileStamp>, Film)>,
-    /// Sum of all film files. `None` if no file can be read. Also `None` if all files are complete,
-    /// because `complete` then has the sum.
-    all: Option<Film>,
-    header: Option<FilmFileHeader>,
+    /// Header and film of the sum. `None` if no file can be read.
+    sum: Option<(FilmFileHeader, Film)>,
 }
 
 /// Film file that another process may replace at any time.
 #[derive(Debug)]
 struct WatchedFile {
     path: PathBuf,
-    /// Number of the shard that the film file should hold. `None` if the user named film files
-    /// instead of a plan.
+    /// Shard that a named plan expects in this file.
     shard: Option<u32>,
-    /// Stamp of the film file (time, length, inode) when it was last read. `None` for a missing
-    /// file.
+    /// Stamp when the file was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
-    /// Number of samples, over all pixels, that the film file contributes to the sum.
+    /// Samples, over all pixels, that the file contributes to the sum.
     samples: u64,
-    /// Number of samples, over all pixels, that the plan assigns to the shards of the film file.
-    /// `None` before the file is added to the sum, and for files without a plan.
+    /// Samples of the file's shards when they are complete. `None` before the file is added, and
+    /// without a plan.
     total: Option<u64>,
 }
 
 #[derive(Debug)]
 enum Contents {
     Missing,
-    /// Refused: the film file cannot be used. The text is the reason.
     Refused(String),
     Part(MergeInput),
-    /// Checkpoint of a render without a plan. The number is its seconds of rendering.
+    /// Checkpoint without a plan, with its seconds of rendering.
     Checkpoint(f64),
 }
 
-/// State of a watched film file, or of shards (parts of the render) that no file holds.
+/// State of a watched film file, or of shards without a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WatchedState {
-    /// Complete: the film file holds all samples of its shards.
     Complete,
-    /// Running: the film file is unfinished, and was replaced in the last three minutes.
+    /// Unfinished, and replaced in the last three minutes.
     Running,
-    /// Late: the film file is unfinished, and has not been replaced for three minutes.
+    /// Unfinished, and not replaced for three minutes.
     Late,
-    /// Missing: no film file holds these shards.
     Missing,
-    /// Refused: the film file cannot be used. The text is the reason.
+    /// Unusable, for the given reason.
     Refused(String),
 }
 
-/// State of a watched film file, or of shards of the plan that no file holds.
+/// Watched film file, or shards without a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WatchedShards {
-    /// Numbers of the shards (parts of the render) in the file, or of those that no file holds,
-    /// such as `3` or `5-7`; empty if they are unknown.
+    /// Numbers of the shards, such as `3` or `5-7`; empty if they are unknown.
     pub shards: String,
-    /// Path of the film file. `None` for shards that no file holds.
     pub path: Option<PathBuf>,
-    /// State of the watched film file: complete, unfinished, missing or unusable.
     pub state: WatchedState,
-    /// Number of samples in the film file, over all pixels and both replicates (halves of the
-    /// samples).
+    /// Samples in the file, over all pixels and both replicates.
     pub samples: u64,
-    /// Number of samples, over all pixels, that the plan assigns to the shards of the file. `None`
-    /// if it is unknown.
+    /// Value of `samples` for a complete file, if it is known.
     pub total: Option<u64>,
-    /// Time from the last modification of the film file to the argument `now` of
-    /// [`WatchedFilms::shards`]. `None` if there is no file.
+    /// Time since the last modification.
     pub age: Option<Duration>,
 }
 
 impl WatchedFilms {
     /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
-    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on.
-    ///
-    /// # Errors
-    /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
+    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Fails if a plan file cannot
+    /// be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
         let mut films = Self::default();
         for path in paths {
@@ -132,255 +109,235 @@ impl WatchedFilms {
         Ok(films)
     }
 
+    /// Reads the headers of the parts at `paths`. Fails if one cannot be used, or if two films
+    /// cannot be added.
+    pub(super) fn parts(paths: &[PathBuf]) -> Result<Self, String> {
+        let files = paths.iter().map(|path| WatchedFile::new(path.clone(), None)).collect();
+        let mut films = Self { files, ..Self::default() };
+        films.read_changed();
+        films.files.iter().try_for_each(|file| match &file.contents {
+            Contents::Part(_) => Ok(()),
+            Contents::Refused(reason) => Err(reason.clone()),
+            Contents::Missing => Contents::read(&file.path, &mut Plans::default()).map(drop),
+            Contents::Checkpoint(_) => Err(without_plan(&file.path)),
+        })?;
+        films.try_join().map(|()| films)
+    }
+
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
         let plan = Plan::read(path).map_err(|error| error.to_string())?;
-        let input = self.plans.input(path, Part { plan, shards: Vec::new(), rays: 0 });
-        if let Some(other) = self.named.replace(input) {
-            let [one, two] = [other.path.display(), path.display()];
-            return Err(format!("{one} and {two} are two plans; name one of them"));
-        }
-        // If the plan continues an earlier plan, its base is the merged film of the earlier plan.
-        // That film has a name of its own, which the name of the plan does not determine.
-        let base_plan = self.named.as_ref().and_then(|input| input.plan.settings.base_plan);
-        let shards = self.named.as_ref().map_or(0, |input| input.plan.settings.shards);
-        let first = if base_plan.is_some() { BASE + 1 } else { BASE };
+        // The base of a plan that continues an earlier one is the merged film of the earlier plan,
+        // whose name does not follow from that of the plan.
+        let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let file = |shard| {
+        self.files.extend((first..=plan.settings.shards).map(|shard| {
             WatchedFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
-        };
-        self.files.extend((first..=shards).map(file));
-        Ok(())
+        }));
+        let input = self.plans.input(path, Part { plan, shards: Vec::new(), rays: 0 });
+        match self.named.replace(input) {
+            None => Ok(()),
+            Some(other) => {
+                let [one, two] = [other.path.display(), path.display()];
+                Err(format!("{one} and {two} are two plans; name one of them"))
+            }
+        }
     }
 
-    /// Reads the film files that were replaced since the last call. Returns `true` if there were
-    /// any.
+    /// Reads the files that were replaced since the last call. Returns `true` if there were any.
     pub fn poll(&mut self) -> bool {
         let changed = self.read_changed();
-        if changed.is_empty() {
-            return false;
+        if !changed.is_empty() {
+            self.accept(&changed);
+            self.add();
         }
-        self.accept(&changed);
-        self.add();
-        true
+        !changed.is_empty()
     }
 
-    /// Returns the sum of all films. Returns `None` if no file can be read.
     pub fn film(&self) -> Option<&Film> {
-        self.all.as_ref().or(self.complete.as_ref().map(|(_, film)| film))
+        self.sum.as_ref().map(|(_, film)| film)
     }
 
-    /// Returns the header of a film file that would hold the sum of all films. The header contains
-    /// the plan and the list of shards. Returns `None` if no file can be read.
+    /// Returns the header of the sum, with the plan and all shards.
     pub fn header(&self) -> Option<&FilmFileHeader> {
-        self.header.as_ref()
+        self.sum.as_ref().map(|(header, _)| header)
     }
 
-    /// Returns the plan that all files share. Returns `None` if the only file is a checkpoint of a
-    /// render without a plan, or before the first file is read.
+    pub(super) fn into_sum(self) -> Option<(FilmFileHeader, Film)> {
+        self.sum
+    }
+
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_deref()
     }
 
-    /// Returns the number of rays of all samples in the films.
     pub fn rays(&self) -> u64 {
-        self.inputs().map(|(_, input)| input.rays).sum()
+        self.inputs().map(|input| input.rays).sum()
     }
 
-    /// Returns the seconds of rendering. For a checkpoint they are those of its render. For the
-    /// files of a plan they are the time from the earliest to the latest modification of a file.
+    /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
+    /// the latest modification of a part.
     pub fn seconds(&self) -> f64 {
         if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;
         }
         let times = || self.files.iter().filter_map(|file| Some(file.stamp?.modified));
         let between = times().max().zip(times().min());
-        between
-            .and_then(|(last, first)| last.duration_since(first).ok())
-            .map_or(0.0, |d| d.as_secs_f64())
+        let between = between.and_then(|(last, first)| last.duration_since(first).ok());
+        between.unwrap_or_default().as_secs_f64()
     }
 
-    /// Returns `[number of complete shards, number of all shards of the plan]`. A shard is the
-    /// share of the plan's samples that one process traces. The base, which holds the samples that
-    /// the plan started from, counts as a shard. Returns `None` without a plan.
+    /// Returns the share of the plan's samples that the films hold, 0..=1.
+    pub fn progress(&self) -> Option<f64> {
+        let (film, plan) = (self.film()?, self.plan()?);
+        let pixels = (film.width() * film.height()) as f64;
+        Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
+    }
+
+    /// Returns the numbers of complete shards and of all shards, including the base.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
-        let plan = self.plan.as_ref()?;
-        let shards = self.inputs().flat_map(|(_, input)| &input.shards);
-        Some([shards.filter(|shard| shard.complete).count(), plan.settings.shards as usize + 1])
+        let all = self.plan.as_ref()?.settings.shards as usize + 1;
+        Some([self.shards_held().filter(|shard| shard.complete).count(), all])
     }
 
-    /// Returns the state of all files at the time `now`, and of the shards (parts of the render)
-    /// without a file. The most urgent states are first: refused, missing, late, running, complete.
-    /// Late files are in ascending order of the fraction of their samples that is traced; so are
-    /// running files.
+    /// Returns the state at the time `now` of all files, and of shards without a file. The most
+    /// urgent states are first: refused, missing, late, running, complete. Unfinished files are in
+    /// ascending order of the share of their samples that is traced.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
-        rows.extend(self.unnamed().map(|shards| WatchedShards {
-            shards,
-            path: None,
-            state: WatchedState::Missing,
-            samples: 0,
-            total: None,
-            age: None,
-        }));
-        let share = |row: &WatchedShards| match (row.state.rank(), row.total) {
-            (2 | 3, Some(total)) if total > 0 => row.samples as f64 / total as f64,
+        // A named plan has a file for each missing shard.
+        if let Some(plan) = self.plan.as_ref().filter(|_| self.named.is_none()) {
+            let mut held: Vec<u32> = self.shards_held().map(|shard| shard.number).collect();
+            held.sort_unstable();
+            let absent = plan.absent(&held);
+            if !absent.is_empty() {
+                let (path, state) = (None, WatchedState::Missing);
+                let shards = ranges(&absent);
+                rows.push(WatchedShards {
+                    shards,
+                    path,
+                    state,
+                    samples: 0,
+                    total: None,
+                    age: None,
+                });
+            }
+        }
+        let share = |row: &WatchedShards| match (&row.state, row.total) {
+            (WatchedState::Late | WatchedState::Running, Some(total)) if total > 0 => {
+                row.samples as f64 / total as f64
+            }
             _ => 0.0,
         };
         sort_by_number(&mut rows, |row| total_order(share(row)));
-        sort_by_number(&mut rows, |row| row.state.rank().into());
+        sort_by_number(&mut rows, |row| match row.state {
+            WatchedState::Refused(_) => 0,
+            WatchedState::Missing => 1,
+            WatchedState::Late => 2,
+            WatchedState::Running => 3,
+            WatchedState::Complete => 4,
+        });
         rows
     }
 
-    /// Returns the shards of the plan that no file holds, such as `3, 5-7`; `None` if there are
-    /// none. Also returns `None` if the user named the plan file, because the film file of each
-    /// missing shard then has an entry of its own.
-    fn unnamed(&self) -> Option<String> {
-        let plan = self.plan.as_ref().filter(|_| self.named.is_none())?;
-        let mut held: Vec<u32> =
-            self.inputs().flat_map(|(_, m)| &m.shards).map(|shard| shard.number).collect();
-        held.sort_unstable();
-        let absent = plan.absent(&held);
-        (!absent.is_empty()).then(|| ranges(&absent))
+    pub(super) fn inputs(&self) -> impl Iterator<Item = &MergeInput> {
+        self.files.iter().filter_map(WatchedFile::input)
     }
 
-    fn inputs(&self) -> impl Iterator<Item = (usize, &MergeInput)> {
-        self.files.iter().enumerate().filter_map(|(i, file)| Some((i, file.input()?)))
+    fn shards_held(&self) -> impl Iterator<Item = &PartShard> {
+        self.inputs().flat_map(|input| &input.shards)
     }
 
-    /// Reads the film files whose stamps have changed. Returns their indices.
+    /// Reads the headers of the files whose stamps have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
-            // The stamp is taken before the file is read. If the file is replaced in the meantime,
-            // the stamps differ at the next call, and the file is read again.
+            // If the file is replaced while it is read, the stamps differ at the next call.
             let stamp = FileStamp::of(&file.path);
             if stamp != file.stamp {
-                file.stamp = stamp;
-                file.read(&mut self.plans);
+                let contents = match stamp {
+                    Some(_) => Contents::read(&file.path, &mut self.plans),
+                    None => Ok(Contents::Missing),
+                };
+                let contents = contents.unwrap_or_else(Contents::Refused);
+                let path = std::mem::take(&mut file.path);
+                *file = WatchedFile { stamp, contents, ..WatchedFile::new(path, file.shard) };
                 changed.push(i);
             }
         }
         changed
     }
 
-    /// Checks that the films of all files can be added. Returns `None` if they can. Otherwise tests
-    /// the `changed` files one by one. A file is refused if its film cannot be added to the films
-    /// of the unchanged files and of the `changed` files accepted before it. Returns the reason for
-    /// which the check of all files failed.
+    /// Refuses those of the `changed` files whose films cannot be added to the unchanged files and
+    /// to the accepted ones before them. Returns the first reason.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
-        let all: Vec<usize> = (0..self.files.len()).collect();
-        let refused = self.try_join(&all).err()?;
-        let mut accepted: Vec<usize> =
-            all.iter().copied().filter(|i| !changed.contains(i)).collect();
-        for i in changed {
-            accepted.push(*i);
-            if let Err(message) = self.try_join(&accepted) {
-                accepted.pop();
-                self.files[*i].contents = Contents::Refused(message);
+        let reason = self.try_join().err()?;
+        let new: Vec<Contents> = changed
+            .iter()
+            .map(|i| std::mem::replace(&mut self.files[*i].contents, Contents::Missing))
+            .collect();
+        for (i, contents) in changed.iter().zip(new) {
+            self.files[*i].contents = contents;
+            if let Err(reason) = self.try_join() {
+                self.files[*i].contents = Contents::Refused(reason);
             }
         }
-        Some(refused)
+        Some(reason)
     }
 
-    /// Checks that the films of the files with the indices `numbers` can be added, and stores their
-    /// common plan. Returns an error message if they cannot be added.
-    fn try_join(&mut self, numbers: &[usize]) -> Result<(), String> {
-        let checkpoint = |i: &&usize| matches!(self.files[**i].contents, Contents::Checkpoint(_));
-        let parts = numbers.iter().copied().filter(|i| self.files[*i].input().is_some());
-        let parts: Vec<usize> = parts.collect();
-        if let Some(checkpoint) = numbers.iter().find(checkpoint)
-            && self.files.len() + usize::from(self.named.is_some()) > 1
-        {
-            return Err(without_plan(&self.files[*checkpoint].path));
+    fn try_join(&mut self) -> Result<(), String> {
+        let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
+        let mut inputs: Vec<&mut MergeInput> = self.named.iter_mut().collect();
+        for file in &mut self.files {
+            match &mut file.contents {
+                Contents::Part(input) => inputs.push(input),
+                Contents::Checkpoint(_) if !is_alone => return Err(without_plan(&file.path)),
+                Contents::Checkpoint(_) | Contents::Missing | Contents::Refused(_) => {}
+            }
         }
-        let mut inputs: Vec<MergeInput> = self.named.iter().cloned().collect();
-        inputs.extend(parts.iter().filter_map(|i| self.files[*i].input().cloned()));
-        if inputs.is_empty() {
-            return Ok(());
-        }
-        let (plan, _) = join(&mut inputs)?;
-        self.plan = Some(plan);
-        let joined = inputs.drain(usize::from(self.named.is_some())..);
-        for (i, input) in parts.into_iter().zip(joined) {
-            self.files[i].contents = Contents::Part(input);
+        if !inputs.is_empty() {
+            self.plan = Some(join(&mut inputs)?);
         }
         Ok(())
     }
 
-    /// Adds the films of all accepted files to the sum. If a film cannot be added, its file is
-    /// refused, and the sum is computed again.
     fn add(&mut self) {
-        while let Err((i, message)) = self.try_add() {
-            self.files[i].contents = Contents::Refused(message);
-            self.complete = None;
+        while let Err((i, reason)) = self.try_add() {
+            self.files[i].contents = Contents::Refused(reason);
         }
     }
 
-    /// Adds the films of all accepted files to the sum of films.
-    ///
-    /// # Errors
-    ///
-    /// Returns the index of the file that cannot be added, and the reason.
-    fn try_add(&mut self) -> Result<(), (usize, String)> {
-        (self.all, self.header) = (None, None);
-        let mut order: Vec<(u32, usize)> =
-            self.inputs().map(|(i, input)| (input.shards[0].number, i)).collect();
+    /// Computes the sum of all usable films, or returns the file that cannot be added, with the
+    /// reason.
+    pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
+        self.sum = None;
+        let mut order: Vec<(u32, usize)> = Vec::new();
+        for (i, file) in self.files.iter().enumerate() {
+            order.extend(file.first_shard().map(|shard| (shard, i)));
+        }
         order.sort_unstable();
-        let (complete, unfinished): (Vec<usize>, Vec<usize>) =
-            order.iter().map(|(_, i)| *i).partition(|i| self.files[*i].is_complete());
-        let checkpoint = |file: &WatchedFile| matches!(file.contents, Contents::Checkpoint(_));
-        let checkpoint = self.files.iter().position(checkpoint);
-        let Some(first) = order.first().map(|(_, i)| *i).or(checkpoint) else {
-            self.complete = None;
-            return Ok(());
-        };
-        let header = self.open_film(first)?.header().clone();
-        let mut stamps: BTreeMap<usize, FileStamp> = BTreeMap::new();
-        stamps.extend(complete.iter().filter_map(|i| Some((*i, self.files[*i].stamp?))));
-        let (mut added, mut film) = match self.complete.take() {
-            Some((old, film))
-                if film.check_header(&header.film).is_ok()
-                    && old.iter().all(|(i, stamp)| stamps.get(i) == Some(stamp)) =>
-            {
-                (old, film)
-            }
-            _ => (BTreeMap::new(), empty(&header).map_err(|message| (first, message))?),
-        };
-        for (i, stamp) in stamps {
-            if added.insert(i, stamp).is_none() {
-                self.add_file(i, &mut film)?;
-            }
+        let Some((_, first)) = order.first() else { return Ok(()) };
+        let mut header = self.open_film(*first)?.header().clone();
+        let mut film = empty(&header).map_err(|reason| (*first, reason))?;
+        for (_, i) in order {
+            self.add_file(i, &mut film)?;
         }
-        let unfinished = [unfinished, checkpoint.into_iter().collect()].concat();
-        if !unfinished.is_empty() {
-            let mut all = empty(&header).map_err(|message| (first, message))?;
-            all.add(&film).map_err(|error| (first, error.to_string()))?;
-            for i in unfinished {
-                self.add_file(i, &mut all)?;
-            }
-            self.all = Some(all);
+        if let Some(part) = self.part() {
+            part.record(&mut header);
         }
-        self.complete = Some((added, film));
-        self.header = Some(self.with_shards(header));
+        self.sum = Some((header, film));
         Ok(())
     }
 
-    /// Adds the film of the file with the index `i` to `film`.
-    ///
-    /// # Errors
-    ///
-    /// Returns the index `i` and the reason why the film cannot be added.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
-        let samples = film.samples() - before;
         let file = &mut self.files[i];
-        file.samples = samples;
+        file.samples = film.samples() - before;
         if let (Contents::Part(input), None) = (&file.contents, file.total) {
             let samples = |shard: &PartShard| input.plan.samples(shard.number);
             file.total = Some(input.shards.iter().map(samples).sum());
         }
-        let expected = file.total.unwrap_or(samples);
+        let (samples, expected) = (file.samples, file.total.unwrap_or(file.samples));
         if samples > expected || file.is_complete() && samples != expected {
             let path = file.path.display();
             let what = format!("its {samples} samples are not the {expected} of its shards");
@@ -389,31 +346,20 @@ impl WatchedFilms {
         Ok(())
     }
 
-    fn open_film(
-        &self,
-        i: usize,
-    ) -> Result<FilmReader<std::io::BufReader<fs::File>>, (usize, String)> {
+    fn open_film(&self, i: usize) -> Result<FilmReader<BufReader<File>>, (usize, String)> {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns `header` with the plan that all files share and the list of all shards in the files.
-    fn with_shards(&self, mut header: FilmFileHeader) -> FilmFileHeader {
-        let mut shards: Vec<PartShard> =
-            self.inputs().flat_map(|(_, input)| input.shards.clone()).collect();
+    /// Returns the common plan with all shards in the files.
+    pub(super) fn part(&self) -> Option<Part> {
+        let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
-        if let Some(plan) = self.plan.as_ref().filter(|_| !shards.is_empty()) {
-            let plan = Plan::clone(plan);
-            Part { plan, shards, rays: self.rays() }.record(&mut header);
-        }
-        header
+        let plan = self.plan.as_ref().filter(|_| !shards.is_empty())?;
+        Some(Part { plan: Plan::clone(plan), shards, rays: self.rays() })
     }
 }
 
-/// Creates an empty film that has the size, scales, seed and precision of `header`.
-///
-/// # Errors
-///
-/// Fails if there is not enough memory.
+/// Creates an empty film for `header`. Fails if there is not enough memory.
 fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
     let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
@@ -421,35 +367,35 @@ fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     Film::try_new(film.clone()).map_err(|_| memory_budget::refused(size, groups))
 }
 
+impl Contents {
+    fn read(path: &Path, plans: &mut Plans) -> Result<Self, String> {
+        let reader = FilmReader::open(path).map_err(|error| error.to_string())?;
+        Ok(match Part::of_header(path, reader.header())? {
+            Some(part) => Self::Part(plans.input(path, part)),
+            None => Self::Checkpoint(seconds_of(reader.header())),
+        })
+    }
+}
+
 impl WatchedFile {
     fn new(path: PathBuf, shard: Option<u32>) -> Self {
-        Self { path, shard, stamp: None, contents: Contents::Missing, samples: 0, total: None }
+        let contents = Contents::Missing;
+        Self { path, shard, stamp: None, contents, samples: 0, total: None }
     }
 
-    /// Reads and verifies the film file, and updates its state.
-    fn read(&mut self, plans: &mut Plans) {
-        (self.samples, self.total) = (0, None);
-        self.contents = if self.stamp.is_none() {
-            Contents::Missing
-        } else {
-            self.try_read(plans).unwrap_or_else(Contents::Refused)
-        };
-    }
-
-    fn try_read(&self, plans: &mut Plans) -> Result<Contents, String> {
-        let text = |error: ReadError| error.to_string();
-        let header = FilmReader::open(&self.path).and_then(FilmReader::verify).map_err(text)?;
-        if let Some(part) = Part::of_header(&self.path, &header)? {
-            return Ok(Contents::Part(plans.input(&self.path, part)));
-        }
-        Ok(Contents::Checkpoint(seconds_of(&header)))
-    }
-
-    /// Returns the file as an input of a merge; `None` if it has no plan or cannot be used.
     fn input(&self) -> Option<&MergeInput> {
         match &self.contents {
             Contents::Part(input) => Some(input),
-            _ => None,
+            Contents::Missing | Contents::Refused(_) | Contents::Checkpoint(_) => None,
+        }
+    }
+
+    /// Returns the shard by which usable files are ordered.
+    fn first_shard(&self) -> Option<u32> {
+        match &self.contents {
+            Contents::Part(input) => Some(input.shards[0].number),
+            Contents::Checkpoint(_) => Some(BASE),
+            Contents::Missing | Contents::Refused(_) => None,
         }
     }
 
@@ -458,8 +404,7 @@ impl WatchedFile {
     }
 
     fn row(&self, now: SystemTime) -> WatchedShards {
-        // The modification time may be in the future, because the clocks of two machines may
-        // differ. The age is then 0.
+        // The clocks of two machines may differ: a modification in the future has the age 0.
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
         let age = self.stamp.map(age);
         let shards = match self.input() {
@@ -471,24 +416,13 @@ impl WatchedFile {
         let state = match &self.contents {
             Contents::Missing => WatchedState::Missing,
             Contents::Refused(reason) => WatchedState::Refused(reason.clone()),
-            _ if self.is_complete() => WatchedState::Complete,
-            _ if age.is_some_and(|age| age >= LATE) => WatchedState::Late,
-            _ => WatchedState::Running,
+            Contents::Part(_) if self.is_complete() => WatchedState::Complete,
+            Contents::Part(_) | Contents::Checkpoint(_) => match age {
+                Some(age) if age >= LATE => WatchedState::Late,
+                _ => WatchedState::Running,
+            },
         };
         let path = Some(self.path.clone());
         WatchedShards { shards, path, state, samples: self.samples, total: self.total, age }
-    }
-}
-
-impl WatchedState {
-    /// Returns the rank of this state in the list that users see; 0, the most urgent, is first.
-    fn rank(&self) -> u8 {
-        match self {
-            Self::Refused(_) => 0,
-            Self::Missing => 1,
-            Self::Late => 2,
-            Self::Running => 3,
-            Self::Complete => 4,
-        }
     }
 }

@@ -6,12 +6,10 @@
 //! uses it only in means over many tiles. The error of tiles is thereby measured on pixels that did
 //! not select them (cross-fitting, Chernozhukov et al. 2018).
 //!
-//! The expected error of a tile is calibrated by similar tiles. Tiles with similar allocation
-//! estimates and sample counts form a *class*. The expected error is mostly the mean of the
-//! validation estimates of the class. A tile whose allocation estimate is too low by chance
-//! therefore still gets samples. A feature that only validation pixels contain raises the expected
-//! error of all tiles of the class. A tile whose allocation estimate is too high by chance gets
-//! only a few samples too many.
+//! Tiles with similar allocation estimates and sample counts form a *class*. The expected error of
+//! a tile is mostly the mean of the validation estimates of its class. A tile whose allocation
+//! estimate is too low by chance therefore still gets samples, and one whose estimate is too high
+//! gets only a few too many.
 
 use crate::film::TILE_PIXELS;
 use crate::schedule::tile::Tile;
@@ -21,60 +19,43 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 use zerkalo_scene::value::ascending;
 
-/// Number of rays that one round of adaptive sampling allocates, as a share of the rays traced so
-/// far. A round is one decision on the next samples of all tiles. The share is small enough that
-/// later noise estimates can correct a round, and large enough that threads rarely wait for each
-/// other between rounds.
+/// Rays of an adaptive round, as a share of the rays traced so far: small enough that later
+/// estimates can correct a round, and large enough that threads rarely wait for each other.
 const ROUND_SHARE: f64 = 0.1;
-/// Share of the rays of an allocation round that goes to the tiles with the fewest samples,
-/// whatever their noise estimates are. No estimate contains a feature that no sample has hit; this
-/// share finds such features.
+/// Share of the rays of a round that goes to the tiles with the fewest samples, whatever their
+/// estimates are. It finds features that no sample has hit.
 ///
-/// Measured on 30 sparse pictures (stars and balls of the size of a pixel,
-/// `tests/error_estimates`): the true error exceeds the reported one by 18 % in the mean with a
-/// share of 1/16, by 16 % with 1/8, by 13 % with 1/4. The scene of the physical mirror room needs
-/// 60.7 million rays to reach an RMSE of 0.00068 with a share of 1/32, 61.7 million with 1/16, 64.8
-/// million with 1/8.
+/// True error above the reported one in 30 sparse pictures (`tests/error_estimates`): 18 % in the
+/// mean with 1/16, 16 % with 1/8, 13 % with 1/4. Million rays to an RMSE of 0.00068 in the physical
+/// mirror room: 60.7 with 1/32, 61.7 with 1/16, 64.8 with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// Smallest number of sample blocks that an allocation round gives to tiles. A round gives fewer
-/// only if fewer tiles can get samples, or if fewer blocks suffice for the error target. A block is
-/// a run of samples of every pixel of a tile. So many blocks keep every thread busy until the end
-/// of the round.
+/// Smallest number of blocks in a round, unless fewer tiles can get samples or fewer blocks meet
+/// the error target. It keeps every thread busy until the end of the round.
 const MIN_BLOCKS: usize = 64;
-/// Fraction that decides whether an allocation round ends early. The round ends when the largest
-/// gain (error reduction per ray) of the remaining tiles is below this fraction of the largest gain
-/// of the tiles that were set aside. A tile is set aside for the rest of the round when its next
-/// block would more than double its sample count, because a noise estimate is reliable for one
-/// doubling only. The round gives at least [`MIN_BLOCKS`] blocks, whatever their gain is.
+/// A tile whose next block would more than double its samples is set aside, because an estimate is
+/// reliable for one doubling only. The round ends when the largest gain of the remaining tiles is
+/// below this fraction of the largest gain of those set aside.
 const WORTHWHILE: f64 = 0.25;
 /// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
-/// estimates of all tiles of its class (tiles with similar estimates) have the weight 1 per pixel.
+/// estimates of its class have the weight 1.
 const OWN_WEIGHT: f64 = 0.25;
-/// Number of tiles below which a class (tiles with similar error estimates) is widened by the
-/// nearest classes.
+/// Number of tiles below which a class is widened by the nearest classes. In a small class, each
+/// tile's own validation estimate has a large weight; tiles whose estimate is low by chance would
+/// get no samples, and the reported error would be too low.
 ///
-/// In a small class, each tile's own validation estimate has a large weight in its expected error.
-/// Tiles whose estimate is low by chance would get no samples. The reported error, the sum of these
-/// estimates, would then be too low. Ratio of true to reported error in 40 pictures of stars and of
-/// balls as small as a pixel (`tests/error_estimates`, 48 to 64 seeds each): 1.02 to 1.55 without
-/// widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
+/// Ratio of true to reported error in 40 sparse pictures (`tests/error_estimates`, 48 to 64 seeds
+/// each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
-/// Largest distance between a class (tiles with similar error estimates) and a class that widens
-/// it. The distance is the sum of two numbers: the number of factors of sqrt(2) between the
-/// allocation estimates, and the number of such factors between the sample counts. For example, a
-/// factor of 4 between the sample counts is a distance of 4.
+/// Largest distance between a class and a class that widens it: the number of factors of sqrt(2)
+/// between the allocation estimates plus that between the sample counts.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
-/// Block of samples that an allocation round may give to a tile. A block is a run of samples of
-/// every pixel of the tile.
+/// Block of samples that a round may give to a tile.
 pub(super) struct Candidate {
-    /// Expected decrease of the picture's error per ray of the block. The error is the sum of the
-    /// squared errors of all pixels.
+    /// Gain: expected decrease, per ray, of the sum of the squared errors of all pixels.
     gain: f64,
-    /// Samples per pixel that the tile has in each replicate (half of the samples) without this
-    /// block of samples.
+    /// Samples per pixel and replicate that the tile has before the block.
     pub count: u32,
-    /// Number of the tile that gets this block of samples.
     pub tile: usize,
 }
 
@@ -90,17 +71,14 @@ impl PartialOrd for Candidate {
     }
 }
 impl Ord for Candidate {
-    /// Compares two blocks of samples by their gain. Of two blocks with equal gains, the greater is
-    /// that of the tile with fewer samples. If the samples are equal too, it is that of the tile
-    /// with the lower number.
+    /// Orders blocks by gain, then by fewer samples, then by the lower number of the tile.
     fn cmp(&self, other: &Self) -> Ordering {
         let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
         self.gain.total_cmp(&other.gain).then(fewer)
     }
 }
 
-/// Model of the decrease of a tile's mean squared error with the number n of samples per pixel in
-/// each replicate (half of the samples): `scale * n^(-2 slope)`.
+/// Mean squared error of a tile after n samples per pixel and replicate: `scale * n^(-2 slope)`.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorModel {
     scale: f64,
@@ -108,37 +86,30 @@ pub(super) struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// Returns the mean squared error of the tile after `count` samples per pixel in each of the
-    /// two replicates (halves of the samples).
     pub fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
-    /// Returns an error model with the slope of this one and the mean squared error `mse` at
-    /// `count` samples.
+    /// Returns the model of the same slope through the mean squared error `mse` at `count` samples.
     fn through(&self, count: u32, mse: f64) -> Self {
         Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
     }
 }
 
-/// Error models of one tile. One is fitted to its allocation estimates, which select tiles; the
-/// other to its validation estimates, which are reported.
+/// Models fitted to the allocation and to the validation estimates of one tile.
 struct TileModels {
     allocation: ErrorModel,
     validation: ErrorModel,
 }
 
-/// Class of similar tiles: `(floor(log2 n), floor(2 log2 v))`. Here n is the sample count of the
-/// tile, and v is the allocation estimate of its variance per sample. The second number is `None`
-/// if v is 0.
+/// Class of similar tiles with n samples and the allocation estimate v of their variance per
+/// sample: `(floor(log2 n), floor(2 log2 v))`. The second number is `None` if v is 0.
 type Class = (u32, Option<i32>);
 
-/// Returns the length of the next block of a tile with `count` samples per pixel in each of the two
-/// replicates (halves of the samples). A block is a run of samples that is allocated as a whole. If
-/// `count` is below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is
-/// larger but no multiple of [`SAMPLE_ALIGNMENT`], the block ends at the next multiple. Otherwise
-/// the length is the largest power of two up to a quarter of `count`, at least
-/// [`SAMPLE_ALIGNMENT`], because such blocks of the sample sequence are well distributed.
+/// Returns the length of the next block of a tile with `count` samples per pixel and replicate. It
+/// ends at the next power of two below [`SAMPLE_ALIGNMENT`], and at the next multiple of it from
+/// there on. From a multiple on, the length is the largest power of two up to a quarter of `count`,
+/// because such blocks of the sample sequence are well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -149,22 +120,18 @@ fn block(count: u32) -> u32 {
     }
 }
 
-/// Allocation round in progress: the samples that each tile has got so far. A round is one decision
-/// on the next samples of all tiles.
+/// Round in progress.
 pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
-    /// Samples per pixel of each tile in each of the two replicates (halves of the samples): those
-    /// traced so far and those allocated in this round.
+    /// Samples per pixel and replicate of each tile, traced or allocated.
     pub counts: Vec<u32>,
-    /// Expected number of rays of the samples that this round has allocated so far.
+    /// Expected rays of the samples allocated so far.
     pub spent: f64,
     blocks: usize,
     samples_left: u64,
 }
 
 impl<'a> Allocation<'a> {
-    /// Starts an allocation round, one decision on the next samples of all tiles. The round starts
-    /// with the samples that the tiles of `schedule` have.
     pub fn new(schedule: &'a Schedule) -> Self {
         Self {
             schedule,
@@ -175,11 +142,9 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the length of the next block of `tile`: its number of samples per pixel in each of
-    /// the two replicates (halves of the samples). A block is a run of samples that is allocated as
-    /// a whole. Returns 0 if the tile has reached its largest sample count ([`Schedule::cap`]), or
-    /// if one more sample per pixel of the tile would exceed the requested mean sample count of the
-    /// picture.
+    /// Returns the number of samples per pixel and replicate in the next block of `tile`. Returns 0
+    /// if the tile has reached its cap, or if one more sample per pixel would exceed the requested
+    /// mean.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -192,8 +157,6 @@ impl<'a> Allocation<'a> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    /// Allocates `samples` further samples per pixel in each of the two replicates (halves of the
-    /// samples) to `tile`.
     pub fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
@@ -201,8 +164,8 @@ impl<'a> Allocation<'a> {
         self.counts[tile] += samples;
     }
 
-    /// Allocates one block of samples to one tile after another, starting with the tile that has
-    /// the fewest samples. Ends when the allocation round has about `rays` rays in total.
+    /// Allocates one block to one tile after another, those with the fewest samples first, until
+    /// the round has about `rays` rays.
     pub fn explore(&mut self, rays: f64) {
         for tile in ascending(self.counts.iter().map(|count| i64::from(*count)).collect()) {
             if self.spent >= rays {
@@ -215,8 +178,7 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the next block of samples of `tile` with its gain under the error model `model`.
-    /// Returns `None` if the tile can get no more samples.
+    /// Returns the next block of `tile`. Returns `None` if the tile can get no more samples.
     pub fn candidate(&self, tile: usize, model: &ErrorModel) -> Option<Candidate> {
         let (count, samples) = (self.counts[tile], self.next_block(tile));
         let fall = model.mse(count) - model.mse(count + samples);
@@ -234,9 +196,8 @@ impl<'a> Allocation<'a> {
 }
 
 impl Schedule {
-    /// Returns the jobs of the next allocation round in the adaptive phase. The tiles with the
-    /// highest gain (error reduction per ray) get samples first. The phase starts when every tile
-    /// has [`Schedule::min_samples`] samples in each replicate (half of the samples).
+    /// Returns the jobs of the next round of the adaptive phase, which starts when every tile has
+    /// [`Schedule::min_samples`].
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let models = self.tile_models([self.pooled_slope(false), self.pooled_slope(true)]);
@@ -278,9 +239,8 @@ impl Schedule {
         allocation.into_jobs()
     }
 
-    /// Returns for each tile a model of its expected error as a function of its sample count.
-    /// `pooled` is `[slope of tiles that are not glossy, slope of glossy tiles]`, with RMSE ~
-    /// n^-slope for n samples. A tile is glossy if a path in it has made a random choice.
+    /// Returns the expected error of each tile. `pooled` are the slopes of tiles that are not
+    /// glossy, and of glossy tiles.
     pub(super) fn expected_errors(&self, pooled: [f64; 2]) -> Vec<ErrorModel> {
         self.calibrated(&self.tile_models(pooled))
     }
@@ -289,13 +249,10 @@ impl Schedule {
         self.tiles.iter().map(|t| tile_models(t, self.settings.criterion, pooled)).collect()
     }
 
-    /// Returns the expected error of each tile as a function of its sample count. The error at the
-    /// present count is a weighted mean of two kinds of estimates: the validation estimates of the
-    /// tile's class (tiles with similar error estimates), and the tile's own allocation estimate. A
-    /// class with few tiles also uses the estimates of the nearest classes. The weight of an
-    /// estimate is the number of pixels of its tile. The weight of the own estimate is multiplied
-    /// by [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the validation
-    /// estimates of the class are 0.
+    /// Returns the expected error of each tile. At the present count it is the mean of the
+    /// validation estimates of the tile's class and of the tile's own allocation estimate, weighted
+    /// by pixels and [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the class
+    /// has none.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -319,10 +276,9 @@ impl Schedule {
     }
 }
 
-/// Returns the sum of the validation estimates over the tiles of `class` (tiles with similar error
-/// estimates) and of its nearest classes. Classes are added in the order of their distance, up to
-/// [`MAX_CLASS_DISTANCE`], until there are [`MIN_CLASS_TILES`] tiles. Their validation estimates
-/// are scaled to the allocation estimate of `class`. If that estimate is 0, no classes are added.
+/// Returns the sum of the validation estimates of `class` and of its nearest classes, scaled to its
+/// allocation estimate, until there are [`MIN_CLASS_TILES`] tiles or [`MAX_CLASS_DISTANCE`] is
+/// reached. A class whose allocation estimate is 0 is not widened.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };
@@ -341,8 +297,6 @@ fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum 
     sum
 }
 
-/// Sum of the validation estimates of tiles, each weighted by the tile's pixels, with the sum of
-/// these weights.
 #[derive(Clone, Copy, Default)]
 struct WeightedSum {
     sum: f64,
@@ -360,10 +314,9 @@ impl WeightedSum {
     }
 }
 
-/// Fits two error models to the noise estimates of a tile: one to its allocation estimates, one to
-/// its validation estimates. Each estimate is weighted by its sample count. Earlier estimates, from
-/// fewer samples, reduce the influence of chance in the latest one. `pooled` is `[slope of all
-/// tiles that are not glossy, slope of all glossy tiles]`.
+/// Fits error models to the estimates of a tile, weighted by sample counts. Earlier estimates
+/// reduce the influence of chance in the latest one. `pooled` are the slopes of tiles that are not
+/// glossy, and of glossy tiles.
 fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
     let (mut sums, mut weights) = ([0.0; 2], 0.0);

@@ -1,30 +1,24 @@
-//! Convergence fit: the RMSE of the whole picture as a function of the number of rays, extrapolated
-//! to an error target.
+//! Convergence fit: the RMSE of the whole picture over the number of rays, extrapolated to an error
+//! target.
 
 use crate::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
-/// Largest number of points of the convergence fit. A point is a number of rays and the picture's
-/// RMSE after them. From one point to the next, except to the latest one, the rays grow by a factor
-/// of at least sqrt(2). Seven points span three doublings if all factors are sqrt(2).
+/// Largest number of points of the fit. From one point to the next, except to the latest one, the
+/// rays grow by a factor of at least sqrt(2). Seven points therefore span three doublings or more.
 const POINTS: usize = 7;
 
-/// Relative uncertainty of the extrapolated number of rays left until an error target, even if the
-/// convergence slope is well fitted. The slope decreases a little during the render, because the
-/// rays of exploration (samples for the tiles with the fewest samples) reduce the error less and
-/// less. At a slope of 0.75, a render over two doublings of the rays therefore needs 4 to 10 % more
-/// rays than the extrapolation predicts.
+/// Relative uncertainty of the extrapolated rays, even if the slope is well fitted. The slope
+/// decreases a little during the render, because exploration reduces the error less and less: two
+/// doublings at a slope of 0.75 need 4 to 10 % more rays than extrapolated.
 const SPREAD: f64 = 0.15;
 
-/// Convergence fit: RMSE of the picture as a function of the number of rays, at up to seven numbers
-/// of rays. They span about three doublings of the rays, or more if the rays grew in large steps.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
-    /// Recorded points, oldest first, each as `(number of rays, RMSE of the picture)`.
+    /// Numbers of rays with the RMSE of the picture, oldest first.
     pub points: Vec<(f64, f64)>,
 }
 
 impl ConvergenceFit {
-    /// Records that the picture's RMSE was `noise` after `rays` rays.
     pub fn record(&mut self, rays: f64, noise: f64) {
         if !(rays > 0.0 && noise > 0.0) {
             return;
@@ -42,12 +36,10 @@ impl ConvergenceFit {
         }
     }
 
-    /// Returns a lower and an upper estimate of the total number of rays at which the picture's
-    /// RMSE falls to `target`. The RMSE is extrapolated with the steepest and with the flattest of
-    /// three slopes: those over the latest two, four and six steps between recorded points, that
-    /// is, over about one, two and three doublings of the rays. Before the first two steps, the
-    /// largest and the smallest plausible slope are used instead. Returns `None` if nothing has
-    /// been recorded.
+    /// Returns a lower and an upper estimate of the total number of rays at which the RMSE falls to
+    /// `target`: extrapolated with the steepest and the flattest of the slopes over the latest two,
+    /// four and six steps, about one, two and three doublings. Before the first two steps, the
+    /// extreme plausible slopes are used. Returns `None` before the first point.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -65,14 +57,13 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Returns the slope p of the fit RMSE ~ rays^-p through the first and the last of the (up to
-    /// seven) latest points. If there are fewer than two points, p is 0.5, the slope of independent
-    /// samples.
+    /// Returns the slope p of the fit RMSE ~ rays^-p; 0.5, that of independent samples, before
+    /// there are two points.
     pub fn slope(&self) -> f64 {
         self.fitted_slope().unwrap_or(0.5)
     }
 
-    /// Returns [`ConvergenceFit::slope`]. Returns `None` if there are fewer than two recorded
+    /// Returns the slope through the first and the last point. Returns `None` before there are two
     /// points.
     pub fn fitted_slope(&self) -> Option<f64> {
         let (r0, n0) = *self.points.first()?;

@@ -2,16 +2,17 @@
 //! input or output. It gets the time as an argument, and learns about the film from the reports of
 //! finished jobs.
 //!
-//! The samples of each pixel are divided into two independent halves, the replicates A and B.
-//! Samples are allocated in rounds. A round gives each chosen tile the same sample indices in
-//! replicate A and then in replicate B. Between two rounds, a tile therefore holds equally many
-//! samples of both, and their difference is an estimate of its error. A round depends on estimated
-//! errors and ray counts, never on time or threads. Time can only end the render.
+//! A round gives each chosen tile the same sample indices in replicate A and then in replicate B.
+//! Between two rounds, a tile therefore holds equally many samples of both, and their difference is
+//! an estimate of its error. A round depends on estimated errors and ray counts, never on time or
+//! threads. Time can only end the render.
+//!
+//! A tile is *glossy* if a path in it has made a random choice. Slopes are exponents p of the error
+//! after n samples, RMSE ~ n^-p.
 
 mod allocation;
 mod convergence_fit;
 mod prediction;
-mod retarget;
 mod settings;
 mod state;
 mod stop;
@@ -22,94 +23,74 @@ mod tile;
 use crate::film::{Noise, TileNoise};
 use crate::wave::{Job, Wave, WaveReport};
 use convergence_fit::ConvergenceFit;
-pub use prediction::{Prediction, TilePrediction, TileSamples, USUAL_SLOPE};
+pub use prediction::{PlannedTile, Prediction, TileSamples, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
-/// Samples per pixel that every tile gets in each replicate (half of the samples) before adaptive
-/// sampling and noise estimates start. Estimates from fewer samples would be unreliable, and their
-/// computation would take as long as the tracing of the samples. With a minimum of 16, tiles
-/// without noise would get a third of all samples of the mirror room scene, and two thirds of those
-/// of the reflecting tracks scene.
+/// Samples per pixel and replicate before adaptive sampling and noise estimates start. Estimates
+/// from fewer samples are unreliable and take as long as tracing. With 16, tiles without noise
+/// would get a third of all samples of the mirror room, and two thirds of those of the reflecting
+/// tracks.
 const MIN_SAMPLES: u32 = 4;
-/// Value that replaces [`MIN_SAMPLES`] if the estimated error is concentrated in fewer than
-/// [`FEW_PIXELS`] effective pixels (see [`Noise::effective_pixels`]). Such a picture has either no
-/// noise, or a few noisy pixels; more samples are needed to find them.
+/// Value that replaces [`MIN_SAMPLES`] below [`FEW_PIXELS`] effective pixels: the picture has
+/// either no noise, or a few noisy pixels, which more samples find.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
-/// Number of effective pixels (Kish's effective sample size, see [`Noise::effective_pixels`]) below
-/// which a noise estimate is unreliable. With k effective pixels the relative uncertainty of the
-/// RMSE is 1 / sqrt(2 k): 18 % for 16.
+/// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k of them
+/// the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Alignment of the sample counts of tiles. The number of samples per pixel in each of the two
-/// replicates (halves of the samples) is a multiple of this number. Exceptions are smaller counts,
-/// and the count after the last block of a tile. The alignment is the number of lanes of the widest
-/// SIMD packets of rays. It is the same for narrower packets, because the samples of a picture must
-/// not depend on the processor.
+/// Number of which the samples per pixel and replicate are a multiple, except for smaller counts
+/// and after the last block of a tile. It is the width of the widest packets, on every processor,
+/// because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
-/// Samples per pixel in each replicate (half of the samples) at which a tile of the film is full.
-/// It is the largest multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits
-/// 32 bits.
+/// Samples per pixel and replicate at which a tile is full: the largest multiple of
+/// [`SAMPLE_ALIGNMENT`] whose double fits 32 bits.
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]. Returns
-/// 0 if `count` is such a multiple, or is smaller than [`SAMPLE_ALIGNMENT`]. A larger count is no
-/// multiple only if an earlier stop criterion or limit ([`Settings::rays_per_pixel`]) ended there.
+/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 below
+/// it. A larger count is no multiple only if an earlier stop criterion or cap ended there.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
 
-/// Next step of a render, chosen by its schedule.
+/// Next step of a render.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Wave to trace next: a set of jobs that run concurrently.
     Trace(Wave),
-    /// End of the render, with its reason.
     Finished(StoppedBy),
 }
 
-/// Numbers of samples per pixel in the picture, summed over both replicates (halves of the
-/// samples).
+/// Numbers of samples per pixel over both replicates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spp {
-    /// Smallest number of samples in any pixel.
     pub min: u32,
-    /// Mean number of samples over all pixels.
     pub mean: f64,
-    /// Largest number of samples in any pixel.
     pub max: u32,
 }
 
-/// Schedule of one render: sample counts and noise estimates of its tiles, and the jobs to trace
-/// next.
+/// Sample counts and noise estimates of the tiles of a render, and the jobs to trace next.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     settings: Settings,
     tiles: Vec<Tile>,
-    /// Jobs of the current allocation round (one decision on the next samples of all tiles). Each
-    /// job is traced twice, once in replicate A and once in replicate B (halves of the samples).
+    /// Jobs of the current round, each for both replicates.
     round: Vec<Job>,
     estimate: bool,
     replicate: usize,
-    /// Jobs of the current allocation round (one decision on the next samples of all tiles) that
-    /// are not traced yet in the current replicate (half of the samples).
+    /// Jobs of the round that are not traced yet in the current replicate.
     remaining: Vec<Job>,
     convergence: ConvergenceFit,
-    /// Number of samples traced, over all pixels and both replicates (halves of the samples).
+    /// Number of samples traced, over all pixels and both replicates.
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
-    /// Samples per pixel in each of the two replicates (halves of the samples) after the latest
-    /// uniform allocation round that ended with a noise estimate. A uniform round gives all tiles
-    /// equally many samples.
+    /// Samples per pixel and replicate after the latest uniform round that ended with an estimate.
     estimated_at: u32,
-    /// Light period: the number of samples of a pixel that together trace a shadow ray to each
-    /// light once; see [`Schedule::with_light_period`].
+    /// See [`Schedule::with_light_period`].
     light_period: u32,
 }
 
 impl Schedule {
-    /// Creates a schedule. `pixels` holds the number of pixels of each tile; tiles are in row
-    /// order.
+    /// Creates a schedule of tiles with the given numbers of `pixels`, in row order.
     pub fn new(pixels: &[u32], settings: Settings) -> Self {
         Self {
             settings,
@@ -127,20 +108,17 @@ impl Schedule {
         }
     }
 
-    /// Returns the schedule with the light period `light_period`. So many samples of a pixel in a
-    /// replicate (half of the samples) together trace a shadow ray to each light once; see
-    /// [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
+    /// Sets the light period: the number of samples of a pixel that together trace a shadow ray to
+    /// each light once; see [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
     ///
-    /// The error falls steeply at this count. An error estimated from fewer samples does not
-    /// predict the error after more samples. As soon as a tile has an estimate from `light_period`
-    /// samples, its estimates from fewer samples are therefore discarded.
+    /// The error falls steeply at this count. As soon as a tile has an estimate from so many
+    /// samples, those from fewer samples, which do not predict the error, are discarded.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }
 
-    /// Returns the next step of the render. `seconds` is the time since the start of the render.
-    /// The caller reports the result of a wave (a set of concurrent jobs) to [`Schedule::complete`]
-    /// before the next call.
+    /// Returns the next step after `seconds` seconds of rendering. The caller reports the result of
+    /// a wave to [`Schedule::complete`] before the next call.
     pub fn next(&mut self, seconds: f64) -> Step {
         if self.remaining.is_empty() {
             if self.replicate == 0 {
@@ -164,9 +142,8 @@ impl Schedule {
         })
     }
 
-    /// Records the report of a wave (a set of jobs that run concurrently). `wave` is the one that
-    /// [`Schedule::next`] returned, or the part of it that [`Wave::cut`] left. Jobs that were cut
-    /// off or cancelled are part of a later wave.
+    /// Records the report of a wave that [`Schedule::next`] returned, or of the piece that
+    /// [`Wave::cut`] left. Jobs that were cut off or cancelled are part of a later wave.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
         let mut partial = Vec::new();
@@ -189,15 +166,42 @@ impl Schedule {
                 partial.push(Job { first: count, count: whole.count - job.count, ..whole });
             }
         }
-        // The rests of partially traced jobs follow the jobs that were not traced at all.
+        // The rests of cut jobs follow the jobs that were not traced at all.
         self.remaining.append(&mut partial);
         if self.remaining.is_empty() && wave.estimate {
             self.update_noise();
         }
     }
 
-    /// Computes the error of the picture from the estimates of its tiles, and adds it to the
-    /// convergence fit.
+    /// Sets the stop criteria. A finished render resumes if the new ones are not reached.
+    pub fn set_stop(&mut self, stop: Stop) {
+        self.settings.stop = stop;
+    }
+
+    /// Sets [`Settings::rays_per_pixel`](crate::schedule::Settings::rays_per_pixel).
+    pub fn set_rays_per_pixel(&mut self, cap: u32) {
+        self.settings.rays_per_pixel = cap;
+    }
+
+    /// Discards all noise estimates after a change of light weights or display transform. The
+    /// samples stay valid; the noise is unknown until [`Schedule::set_estimates`].
+    pub fn forget_estimates(&mut self) {
+        self.tiles.iter_mut().for_each(Tile::forget_estimates);
+        self.noise = None;
+        self.convergence = ConvergenceFit::default();
+    }
+
+    /// Sets the noise estimates of all tiles, in row order, between two waves. `None` means that a
+    /// tile has too few samples.
+    pub fn set_estimates(&mut self, estimates: &[Option<TileNoise>]) {
+        for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
+            tile.set_estimate(*estimate);
+        }
+        // A round that began before the first estimates would end without new ones.
+        self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
+        self.update_noise();
+    }
+
     fn update_noise(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error));
         if let Some(noise) = self.noise {
@@ -205,38 +209,25 @@ impl Schedule {
         }
     }
 
-    /// Returns the latest estimate of the error of the whole picture. Returns `None` before the
-    /// first estimate.
+    /// Returns the latest estimate of the picture's error. Returns `None` before the first.
     pub fn noise(&self) -> Option<Noise> {
         self.noise
     }
 
-    /// Returns the latest estimate of each tile's RMSE as displayed, in 8-bit levels, in row order;
-    /// 0 before the first estimate.
-    pub fn tile_noise_levels(&self) -> Vec<f32> {
-        let levels = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().levels.sqrt() as f32);
-        self.tiles.iter().map(levels).collect()
-    }
-
-    /// Returns the latest estimate of each tile's error, in row order; `None` before the first
-    /// estimate.
+    /// Returns the latest error estimates of the tiles, in row order; `None` before the first.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
         self.tiles.iter().map(|tile| tile.error)
     }
 
-    /// Returns the number of samples traced so far, over all pixels and both replicates (halves of
-    /// the samples).
+    /// Returns the number of samples traced, over all pixels and both replicates.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Returns the number of rays traced so far.
     pub fn rays(&self) -> u64 {
         self.rays
     }
 
-    /// Returns the numbers of samples per pixel in the picture, over both replicates (halves of the
-    /// samples).
     pub fn spp(&self) -> Spp {
         let counts = || self.tiles.iter().map(|t| 2 * t.done);
         let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
@@ -253,11 +244,9 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// Returns the largest number of samples per pixel that `tile` may have in each replicate (one
-    /// of two independent halves of the samples) at the end of the render. If a path in the tile
-    /// has made a random choice (such as a direction of a glossy lobe), it is half of
-    /// [`Settings::rays_per_pixel`], at least 1. For other tiles, or if that setting is 0, it is
-    /// [`MAX_SAMPLES`].
+    /// Returns the cap of `tile`: its largest number of samples per pixel and replicate. It is half
+    /// of [`Settings::rays_per_pixel`], at least 1, in glossy tiles; [`MAX_SAMPLES`] in others, or
+    /// if that setting is 0.
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -266,8 +255,7 @@ impl Schedule {
         }
     }
 
-    /// Returns the root mean square error, in the unit of `criterion`, over all pixels of the tiles
-    /// for which `selects` is true.
+    /// Returns the RMSE over all pixels of the tiles for which `selects` is true.
     fn pooled(&self, criterion: Criterion, selects: impl Fn(&Tile) -> bool) -> f64 {
         let (sum, pixels) =
             self.tiles.iter().filter(|t| selects(t)).fold((0.0, 0u64), |(s, n), t| {
@@ -276,18 +264,16 @@ impl Schedule {
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Returns the number of samples that each replicate (half of the samples) still needs, over
-    /// all pixels, until the picture has the requested mean number of samples per pixel. Returns
-    /// `u64::MAX` if no number is requested.
+    /// Returns the samples of each replicate, over all pixels, that are left until the requested
+    /// mean number of samples per pixel; `u64::MAX` if none is requested.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
     }
 
-    /// Returns the jobs of the next allocation round, one decision on the next samples of all
-    /// tiles. Sets `self.estimate` to `true` if the round ends with noise estimates, otherwise to
-    /// `false`. Returns no jobs if nothing is left to trace.
+    /// Returns the jobs of the next round, and stores in `estimate` if the round ends with noise
+    /// estimates. Returns no jobs if nothing is left to trace.
     fn next_round(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
@@ -298,29 +284,24 @@ impl Schedule {
         }
     }
 
-    /// Returns the number of samples per pixel that every tile gets in each replicate (half of the
-    /// samples) before noise estimates are used.
     fn min_samples(&self) -> u32 {
         let sparse = |noise: Noise| self.settings.criterion.of(noise.effective_pixels) < FEW_PIXELS;
         if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Returns the smallest number of samples per pixel in each of the two replicates (halves of
-    /// the samples) among the tiles below their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all
-    /// tiles have reached their cap.
+    /// Returns the smallest number of samples per pixel and replicate among the tiles below their
+    /// cap; [`MAX_SAMPLES`] if there are none.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
-    /// Returns jobs that raise the sample counts of all tiles to the same number, or to the cap of
-    /// a tile (see [`Schedule::cap`]) if that is lower. `common` is the smallest number of samples
-    /// per pixel in each of the two replicates (halves of the samples) among the tiles below their
-    /// cap.
+    /// Returns jobs that raise all tiles to the same number of samples, or to their caps. `common`
+    /// is that of [`Schedule::common_count`].
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            // The count grows to the next power of two. It is between two powers if an earlier stop
-            // criterion has ended the render there.
+            // The count is between two powers if an earlier stop criterion has ended the render
+            // there.
             n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
             n => {
                 (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)
@@ -343,12 +324,10 @@ impl Schedule {
         self.jobs(samples)
     }
 
-    /// Returns the number of samples, not yet rounded to [`SAMPLE_ALIGNMENT`], that each pixel gets
-    /// next in each of the two replicates (halves of the samples). `done` is the number of samples
-    /// of a pixel in each replicate so far. With an error target the result is half of the
-    /// estimated remaining samples, at most `done`. Without an error target it is an eighth of
-    /// `done`. With a time limit it is at most an eighth of `done`, because a larger step could
-    /// exceed the limit by much.
+    /// Returns the growth of a pixel's `done` samples per replicate in the next uniform round,
+    /// before it is rounded to [`SAMPLE_ALIGNMENT`]. With an error target it is half of the
+    /// estimated remaining samples, at most `done`. Without one, or at most with a time limit, it
+    /// is an eighth of `done`.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };
@@ -366,16 +345,14 @@ impl Schedule {
             .collect()
     }
 
-    /// Returns the convergence slope p, RMSE ~ n^-p for n samples, of all tiles in which a path has
-    /// made a random choice if `glossy` is `true`, otherwise of all other tiles. It is fitted to
-    /// the latest doubling of the sample count of each of these tiles. Returns 0.5 if none of them
-    /// has doubled its count, or their errors are 0.
+    /// Returns the pooled slope of all glossy tiles, or of all other tiles; 0.5 if it cannot be
+    /// fitted.
     fn pooled_slope(&self, glossy: bool) -> f64 {
         self.fitted_slope(glossy).unwrap_or(0.5)
     }
 
-    /// Returns [`Schedule::pooled_slope`]. Returns `None` if no such tile has doubled its sample
-    /// count, or their errors are 0.
+    /// Returns the slope over the latest doubling of the samples of all glossy tiles, or of all
+    /// other tiles. Returns `None` if none of them has doubled its count, or their errors are 0.
     fn fitted_slope(&self, glossy: bool) -> Option<f64> {
         let criterion = self.settings.criterion;
         let selected = self.tiles.iter().filter(|t| t.glossy == glossy);

@@ -1,8 +1,8 @@
-//! Settings of the schedule: stop criteria, and the reasons for which a render ends.
+//! Settings of the schedule: error measure, stop criteria, cap.
 
 use crate::film::{Mse, Noise};
 
-/// Measure of the error that adaptive sampling minimises.
+/// Error that adaptive sampling minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
     /// RMSE of the displayed picture, in 8-bit levels.
@@ -27,45 +27,36 @@ impl Criterion {
     }
 }
 
-/// Stop criteria. The first one that is reached ends the render. A render without stop criteria
-/// does not end.
+/// Stop criteria, of which the first that is reached ends the render. A render without any does not
+/// end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
-    /// Target for the mean number of samples per pixel, over both replicates (halves of the
-    /// samples); rounded up to an even number. `None` for no target.
+    /// Mean number of samples per pixel over both replicates, rounded up to an even number.
     pub spp: Option<u32>,
-    /// Target for the estimated RMSE of the whole picture as displayed, in 8-bit levels. `None` for
-    /// no target.
+    /// Estimated RMSE of the displayed picture, in 8-bit levels.
     pub noise_levels: Option<f64>,
-    /// Target for the estimated RMSE of the whole picture in linear radiance. `None` for no target.
+    /// Estimated RMSE of the picture in linear radiance.
     pub rmse_linear: Option<f64>,
-    /// Time limit of the render in seconds. It is tested between waves, sets of jobs that run
-    /// concurrently. `None` for no limit.
+    /// Time limit in seconds, tested between waves.
     pub seconds: Option<f64>,
 }
 
 /// Reason for which a render has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedBy {
-    /// The mean number of samples per pixel reached its target.
     Spp,
-    /// The RMSE of the displayed picture fell to its target.
     Noise,
-    /// The RMSE of the picture in linear radiance fell to its target.
     Rmse,
-    /// The time limit of the render was reached.
     Time,
-    /// At least one tile has reached its largest number of samples ([`Settings::rays_per_pixel`]).
-    /// The tiles that may still get samples together meet the error target, or there are no such
-    /// tiles.
+    /// Tiles have reached their cap ([`Settings::rays_per_pixel`]), and the other tiles, if there
+    /// are any, meet the error target.
     RaysPerPixel,
-    /// All tiles hold the largest number of samples that a tile of the film can hold.
+    /// All tiles hold [`MAX_SAMPLES`](crate::schedule::MAX_SAMPLES).
     Full,
 }
 
 impl StoppedBy {
-    /// Returns the name of the reason in printed statistics. It never changes between versions of
-    /// the program.
+    /// Returns the name of the reason in printed statistics, which never changes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spp => "spp",
@@ -78,25 +69,21 @@ impl StoppedBy {
     }
 }
 
-/// Settings of the schedule, which allocates samples to tiles.
+/// Settings of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// `true` if tiles may get different numbers of samples according to their noise. Otherwise all
-    /// tiles get the same number, except those that [`Settings::rays_per_pixel`] limits.
+    /// `true` if tiles may get different numbers of samples according to their noise.
     pub adaptive: bool,
-    /// Measure of the error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// Largest number of samples per pixel in tiles in which a path has made a random choice, such
-    /// as a direction of a glossy lobe. It is for the whole render and both replicates (halves of
-    /// the samples) together, and is rounded down to an even number, at least 2. 0 means no limit.
+    /// Largest number of samples per pixel and render in glossy tiles, over both replicates;
+    /// rounded down to an even number, at least 2. 0 means no limit.
     pub rays_per_pixel: u32,
-    /// Stop criteria of the render.
     pub stop: Stop,
 }
 
 impl Settings {
-    /// Creates settings that minimise the error of the displayed picture. `rays_per_pixel` is 0; a
-    /// renderer replaces it by that of the scene.
+    /// Creates settings that minimise the displayed error. A renderer replaces `rays_per_pixel`, 0,
+    /// by that of the scene.
     pub fn new(adaptive: bool, stop: Stop) -> Self {
         Self { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
     }

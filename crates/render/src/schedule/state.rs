@@ -53,10 +53,10 @@ impl Schedule {
         out
     }
 
-    /// Restores an encoded state into a new schedule of the same film. `counts` has two numbers of
-    /// samples per pixel for each tile of the film, one for each replicate (half of the samples).
-    /// The noise estimates are discarded if the criterion differs. Returns `None` if the state is
-    /// not valid or does not belong to the film; the schedule may then have changed.
+    /// Restores an encoded state into a new schedule of the same film, whose tiles hold `counts`
+    /// samples per pixel in each replicate. The noise estimates are discarded if the criterion
+    /// differs. Returns `None` if the state is not valid or does not belong to the film; the
+    /// schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
         let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Levels };
@@ -98,8 +98,7 @@ impl Schedule {
         Some(())
     }
 
-    /// Decodes a list of jobs. Returns `None` if the bytes end early, two jobs have the same tile,
-    /// or a job is not valid.
+    /// Decodes a list of jobs with different tiles.
     fn decode_jobs(&self, fields: &mut Fields) -> Option<Vec<Job>> {
         let mut seen = vec![false; self.tiles.len()];
         let jobs = fields.u32()?;
@@ -151,8 +150,7 @@ fn decode_mse(fields: &mut Fields) -> Option<Mse> {
     Some(Mse { linear: error(fields)?, levels: error(fields)? })
 }
 
-/// Decodes the estimated error of a tile or of the picture. In extreme pictures it is infinite or
-/// NaN. Returns `None` if the number is negative or the bytes end early.
+/// Decodes an estimated error, which is infinite or NaN in extreme pictures, but not negative.
 fn error(fields: &mut Fields) -> Option<f64> {
     fields.f64().filter(|value| value.is_nan() || *value >= 0.0)
 }

@@ -1,11 +1,11 @@
-//! Background rendering: a thread that receives scenes, traces them and publishes snapshots.
+//! Sessions: a thread of its own traces scenes, or reads film files that other processes write, and
+//! publishes snapshots.
 //!
-//! A client first sends a command and then raises the cancel flag of the running wave, a set of
-//! jobs that are traced concurrently. The worker (the rendering thread) first lowers the flag and
-//! then receives all commands. If the client or the worker reversed its two steps, the worker could
-//! lower the flag without receiving the command, which would then wait until the wave ends. If
-//! several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples: its
-//! remaining jobs are traced when the render resumes.
+//! A client first sends a command and then raises the cancel flag of the running wave. The
+//! rendering thread first lowers the flag and then receives all commands. In the reverse order, it
+//! could lower the flag without receiving the command, which would then wait until the wave ends.
+//! If several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples:
+//! its remaining jobs are traced when the render resumes.
 //!
 //! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
@@ -16,6 +16,7 @@
 //! [`Relighting`]: crate::Relighting
 
 mod active_render;
+mod picture;
 mod report;
 mod snapshot;
 #[cfg(test)]
@@ -26,10 +27,13 @@ mod worker;
 
 use crate::export::Provenance;
 use crate::film::Display;
+use crate::plan::WatchedFilms;
+pub use crate::plan::{WatchedShards, WatchedState};
 use crate::schedule::{Settings, Stop};
 use crate::{Checkpoint, EncodedCheckpoint, Options, RenderState, threads};
 use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
+pub use picture::Picture;
 pub use report::{QUALITIES, Report, State};
 use snapshot::Slot;
 pub use snapshot::{Snapshot, TileMaps, View};
@@ -38,16 +42,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
+pub use watch::WatchReport;
+use watch::Watcher;
 use worker::Worker;
 use zerkalo_scene::Scene;
 
-/// Function that a client queues to run on the rendering thread. It gets the state and the report
-/// of the render; `None` if there is no film.
-type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
-
-/// Function that gets an encoded checkpoint, or `None` if there is no picture yet.
-type CheckpointTask = Box<dyn FnOnce(Option<EncodedCheckpoint>) + Send>;
+/// Function that a client queues to run on the session's thread. It gets the picture, or `None` if
+/// there is no film.
+type Task = Box<dyn FnOnce(Option<Picture>) + Send>;
 
 enum Command {
     Scene(u64, Arc<Scene>),
@@ -59,41 +61,62 @@ enum Command {
     Display(Display),
     Pool(rayon::ThreadPool),
     Task(Task),
-    Checkpoint(Provenance, CheckpointTask),
     Quit,
 }
 
-/// State that the session's handle and its rendering thread share in addition to the command
-/// channel.
+/// State that the handle and the thread share in addition to the command channel.
 #[derive(Default)]
 struct Shared {
-    /// Flag that cancels the wave being traced (a set of concurrent jobs), because commands are
-    /// waiting.
+    /// Cancels the wave being traced, because commands are waiting.
     cancel_wave: AtomicBool,
-    /// Flag that cancels the first pass over the picture, because a newer scene is waiting.
+    /// Cancels the first pass over the picture, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     slot: Slot,
-    /// Number of scenes compiled so far. Tests read it to see which scenes were skipped.
+    /// Number of scenes compiled so far.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
 }
 
-/// Handle of a rendering thread with its own thread pool. Dropping the session ends the thread.
+/// Handle of a thread that renders scenes or watches film files, with a thread pool of its own.
+/// Dropping the handle ends the thread. A session that watches has no scene: it ignores commands
+/// that edit, pause or stop a render.
 pub struct Session {
     commands: Sender<Command>,
     shared: Arc<Shared>,
     wakeup: Receiver<()>,
     generations: u64,
+    /// Rendering thread, whose end the handle awaits. `None` for a thread that watches: it may be
+    /// reading from a slow disk.
     thread: Option<JoinHandle<()>>,
 }
 
 impl Session {
-    /// Starts a rendering thread that traces with a pool of `threads` threads (0: one per
-    /// processor).
-    ///
-    /// # Errors
-    /// Returns an error for the user if a thread cannot be started.
+    /// Starts a thread that traces with a pool of `threads` threads (0: one per processor). Returns
+    /// an error for the user if a thread cannot be started.
     pub fn new(threads: usize, options: Options, settings: Settings) -> io::Result<Self> {
+        Self::start(threads, |inbox, context| {
+            move || Worker::new(inbox, context, options, settings).run()
+        })
+    }
+
+    /// Starts a thread that shows the sum of `films`. It calls `on_report` with each report that
+    /// differs from the previous one. Returns an error for the user if a thread cannot be started.
+    pub fn watch(
+        films: WatchedFilms,
+        threads: usize,
+        on_report: impl Fn(WatchReport) + Send + 'static,
+    ) -> io::Result<Self> {
+        let mut session = Self::start(threads, |inbox, context| {
+            move || Watcher::new(films, context).run(&inbox, &on_report)
+        })?;
+        session.thread = None;
+        Ok(session)
+    }
+
+    fn start<F: FnOnce() + Send + 'static>(
+        threads: usize,
+        run: impl FnOnce(Receiver<Command>, WorkContext) -> F,
+    ) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
         // The channel holds one wake-up; a full channel means that one is pending.
@@ -102,124 +125,112 @@ impl Session {
         let view = View::default();
         let context =
             WorkContext { pool, shared: Arc::clone(&shared), notify, view, generation: 0 };
-        let worker = Worker::new(inbox, context, options, settings);
-        let thread = std::thread::Builder::new().name("session".into()).spawn(|| worker.run());
+        let thread = std::thread::Builder::new().name("session".into());
+        let thread = thread.spawn(run(inbox, context));
         let thread = thread.map_err(|error| threads::error_of(threads, error))?;
         Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
 
-    /// Renders `scene` from now on. Returns the generation of the scene, a number that its reports
-    /// contain; later scenes have larger generations. Samples are kept if they are valid for the
-    /// new scene (see [`Relighting::mix`]).
+    /// Renders `scene` from now on, with the present samples if they are valid for it (see
+    /// [`Relighting::mix`]). Returns the generation of the scene, a number that its reports
+    /// contain; it increases with each scene.
     ///
     /// [`Relighting::mix`]: crate::Relighting::mix
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
         self.begin(|generation| Command::Scene(generation, scene))
     }
 
-    /// Continues the render of `checkpoint`, whose samples are shown as a picture of `scene`.
-    /// Returns the generation of the scene as [`Session::set_scene`] does. If the checkpoint cannot
-    /// be used for this scene, reports have the state [`State::Failed`].
+    /// Continues the render of `checkpoint` as a picture of `scene`, and returns its generation. If
+    /// this is not possible, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
 
-    /// Queues the encoding of the render as a checkpoint. The rendering thread encodes it between
-    /// two pieces of tracing work, and then calls `task` with it. The argument of `task` is `None`
-    /// if there is no picture yet.
+    /// Encodes the render as a checkpoint and calls `task` with it, as [`Session::submit`] does.
+    /// The argument of `task` is `None` if there is no picture yet.
     pub fn checkpoint(
         &self,
         provenance: Provenance,
         task: impl FnOnce(Option<EncodedCheckpoint>) + Send + 'static,
     ) {
-        self.send(Command::Checkpoint(provenance, Box::new(task)));
+        self.submit(move |picture| {
+            task(picture.and_then(|picture| picture.checkpoint(&provenance)));
+        });
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns a new generation
-    /// (number of a version of the scene), as [`Session::set_scene`] does.
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation.
     pub fn restart(&mut self) -> u64 {
         self.begin(Command::Restart)
     }
 
-    /// Sets the stop criteria of the render. A finished render resumes if the new criteria are not
-    /// reached yet.
+    /// Sets the stop criteria. A finished render resumes if the new ones are not reached yet.
     pub fn set_stop(&self, stop: Stop) {
         self.send(Command::Stop(stop));
     }
 
-    /// Sets the display transform for the noise estimate, which is the RMSE of the displayed
-    /// picture. Samples are kept.
+    /// Sets the display transform of the picture whose noise is estimated.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
 
-    /// Sets the number of tracing threads (0: one per processor) and their priority. `niceness` 0
-    /// is the priority of the calling thread; 1 to 19 are lower priorities (on Linux).
-    ///
-    /// # Errors
-    /// Returns the operating system's error if a thread cannot be started. The old threads are then
-    /// kept.
+    /// Sets the number of tracing threads (0: one per processor) and their niceness, 0 to 19 (on
+    /// Linux). If a thread cannot be started, returns the error, and the old threads are kept.
     pub fn set_threads(&self, threads: usize, niceness: i32) -> io::Result<()> {
         self.send(Command::Pool(threads::pool(threads, niceness)?));
         Ok(())
     }
 
-    /// Pauses the render until [`Session::resume`].
     pub fn pause(&self) {
         self.send(Command::Pause(true));
     }
 
-    /// Resumes the render after a pause.
     pub fn resume(&self) {
         self.send(Command::Pause(false));
     }
 
-    /// Sets the contents of snapshots. Initially they contain neither picture nor pixel probe.
+    /// Sets the contents of snapshots; initially neither picture nor probe.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
-    /// Queues `task` and returns at once. The rendering thread runs the task between two pieces of
-    /// tracing work. The argument of the task is the state and the report of the render. It is
-    /// `None` if there is no film: no scene has been set yet, or the scene cannot be rendered.
-    /// Tasks that are still queued when the session ends are dropped.
-    pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
+    /// Queues `task` and returns at once. The session's thread runs it between two pieces of work.
+    /// The argument is `None` if there is no film: no scene has been set yet, the scene cannot be
+    /// rendered, or no watched file can be read. Tasks that are queued when the session ends are
+    /// dropped.
+    pub fn submit(&self, task: impl FnOnce(Option<Picture>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
 
-    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` if there is
-    /// no film.
+    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` without a
+    /// render.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&RenderState, &Report) -> R + Send + 'static,
     ) -> Option<R> {
         let (sender, receiver) = bounded(1);
-        self.submit(move |film| {
-            if let Some((state, report)) = film {
-                // A closed channel means that the client has stopped waiting.
-                let _ = sender.send(task(state, report));
+        self.submit(move |picture| {
+            if let Some(picture) = picture
+                && let Some(state) = picture.state()
+            {
+                let _ = sender.send(task(state, picture.report));
             }
         });
         receiver.recv().ok()
     }
 
-    /// Returns the channel that receives a message whenever a new snapshot is published.
+    /// Returns the channel that receives a message for each new snapshot.
     pub fn wakeup(&self) -> &Receiver<()> {
         &self.wakeup
     }
 
-    /// Waits at most `limit` for a snapshot that has not been taken yet. Returns `None` if there is
-    /// none after this time.
-    ///
-    /// # Panics
-    /// Panics if the rendering thread has panicked.
+    /// Waits at most `limit` for a snapshot that has not been taken yet. Panics if the rendering
+    /// thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
         let deadline = Instant::now() + limit;
         loop {
             match self.wakeup.recv_deadline(deadline) {
-                // After the message of one snapshot is received, a second snapshot may replace the
-                // first one before `take`. The message of the second snapshot then finds no
-                // snapshot.
+                // A second snapshot may replace the first one between its message and `take`. The
+                // message of the second then finds no snapshot.
                 Ok(()) => match self.take() {
                     Some(snapshot) => return Some(snapshot),
                     None => continue,
@@ -230,15 +241,12 @@ impl Session {
         }
     }
 
-    /// Takes the latest snapshot. Returns `None` if it has been taken already, or if there is none
-    /// yet.
+    /// Takes the latest snapshot. Returns `None` if it has been taken already.
     pub fn take(&self) -> Option<Snapshot> {
         self.shared.slot.take()
     }
 
-    /// Sends a command to the rendering thread and cancels the first pass over the picture.
-    /// `command` creates the command from a new generation (number of a version of the scene).
-    /// Returns the generation.
+    /// Sends a command with a new generation, cancels the first pass, and returns the generation.
     fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
         self.generations += 1;
         self.send(command(self.generations));
@@ -247,8 +255,7 @@ impl Session {
     }
 
     fn send(&self, command: Command) {
-        // Sending fails only after the worker has ended: by `Quit`, or by a panic, which `drop`
-        // propagates.
+        // Sending fails after `Quit`, or after a panic, which `drop` propagates.
         let _ = self.commands.send(command);
         self.shared.cancel_wave.store(true, Ordering::Release);
     }

@@ -1,91 +1,99 @@
-//! Snapshots: picture and progress of a render at one moment, published by the session.
+//! Snapshots: picture and progress of a render at one moment.
 
 use crate::film::{
-    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail,
+    DirtyTile, Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe,
+    Thumbnail, TileNoise,
 };
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::relighting::Relighting;
 use crate::session::report::Report;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use zerkalo_scene::Scene;
 
-/// Contents that a client requests of snapshots: the size of the picture, and the pixel to probe.
+/// Contents that a client requests of snapshots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. If it is `None`,
-    /// snapshots have neither of them, and no [`Snapshot::tiles`].
+    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
+    /// neither of them, nor [`Snapshot::tiles`].
     pub raster: Option<[usize; 2]>,
-    /// Column and row of the pixel whose samples and error are requested. `None` requests none.
+    /// Column and row of the pixel whose samples and error are requested.
     pub probe: Option<[usize; 2]>,
 }
 
-/// State of a render at one moment. All fields describe the version of the scene with the number
-/// `report.generation`.
+/// State of a render at one moment, for the scene with the generation in the report.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Progress of the render.
     pub report: Report,
-    /// Picture in the size that [`View::raster`] requests. It has the mean radiance of each light
-    /// group (lights that share one weight) in each pixel. The client applies the light weights.
-    /// `None` if no picture is requested, or without a film.
+    /// Picture of the requested size: mean radiance of each light group, to which the client
+    /// applies light weights.
     pub picture: Option<Thumbnail>,
-    /// Light weights of the scene that the report describes; empty without a film.
+    /// Light weights of the scene of the report.
     pub mix: LightWeights,
-    /// Light groups of the film. [`Snapshot::mix_for`] uses them to compute the light weights of a
-    /// newer scene in which only lights were edited. `None` without a film.
+    /// Light groups of the film, for [`Snapshot::mix_for`].
     pub lighting: Option<Arc<Relighting>>,
-    /// First hits of camera rays, one for each pixel of the size that [`View::raster`] requests.
-    /// `None` if no size is requested, or without a scene. Before the first complete picture it is
-    /// also `None` if tracing the hits would delay that picture too much.
+    /// First hits of the requested size. `None` before the first complete picture if they would
+    /// delay it too much.
     pub first_hits: Option<Arc<FirstHitBuffer>>,
-    /// Error and number of samples of each tile; empty if no picture is requested, or without a
-    /// film.
+    /// Error and sample count of each tile, if a picture is requested.
     pub tiles: Arc<TileMaps>,
-    /// Samples and error of the requested pixel. `None` if the pixel is outside of the film or none
-    /// is requested.
+    /// Samples and error of the requested pixel, if it is inside the film.
     pub probe: Option<PixelProbe>,
 }
 
 impl Snapshot {
-    /// Returns the light weights with which this picture shows `scene`, which may be newer than the
-    /// snapshot. Returns `None` if `scene` needs new samples, because more than light colours and
-    /// intensities differ. The picture can then only show its own scene, with the weights
-    /// [`Snapshot::mix`].
+    /// Returns the light weights with which this picture shows `scene`, which may be newer. Returns
+    /// `None` if `scene` needs new samples.
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
 }
 
-/// RMSE and sample count of each tile of the film, in row order. A tile covers
-/// [`TILE`](crate::film::TILE) x [`TILE`](crate::film::TILE) pixels, fewer at the right and lower
-/// edge.
+/// RMSE and sample count of each tile of the film, in row order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileMaps {
-    /// Number of tiles in a row of tiles.
     pub columns: usize,
-    /// Number of rows of tiles of the film.
     pub rows: usize,
-    /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
+    /// RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
     pub noise_levels: Vec<f32>,
-    /// Samples per pixel of each tile, over both replicates (halves of the samples).
+    /// Samples per pixel of each tile, over both replicates.
     pub spp: Vec<u32>,
 }
 
 impl TileMaps {
-    pub(super) fn of(film: &Film, noise_levels: Vec<f32>) -> Self {
+    fn of(film: &Film, estimates: &[Option<TileNoise>]) -> Self {
+        let levels =
+            |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().levels.sqrt() as f32);
         let count = |tile: usize| {
             let [a, b] = film.counts(tile);
             a.saturating_add(b)
         };
         let columns = film.tile_columns();
-        let rows = film.tile_count() / columns;
-        Self { columns, rows, noise_levels, spp: (0..film.tile_count()).map(count).collect() }
+        Self {
+            columns,
+            rows: film.tile_count() / columns,
+            noise_levels: estimates.iter().map(levels).collect(),
+            spp: (0..film.tile_count()).map(count).collect(),
+        }
     }
 }
 
-/// Inputs of a snapshot besides the film: the contents that the client requests, light weights,
-/// display transform and first hits.
+/// Estimates the error of every tile. The replicates of a tile may have different counts, as in a
+/// checkpoint. Returns `None` if `cancel` becomes `true` before the end.
+pub(super) fn tile_estimates(
+    film: &Film,
+    estimator: &Estimator,
+    pool: &rayon::ThreadPool,
+    cancel: &AtomicBool,
+) -> Option<Vec<Option<TileNoise>>> {
+    let estimate = |tile| film.tile(tile).and_then(|tile| estimator.tile_so_far(tile));
+    let unless_cancelled = |tile| (!cancel.load(Ordering::Relaxed)).then(|| estimate(tile));
+    let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
+    pool.install(|| tiles.map(unless_cancelled).collect())
+}
+
+/// Inputs of a snapshot besides the film.
 pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
@@ -95,13 +103,13 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a snapshot of `film`. `noise_levels` has the RMSE of each tile in 8-bit levels.
-    /// `downsample` caches the contributions of the film's tiles to the picture between snapshots,
-    /// so that only changed tiles are read again.
+    /// Creates a snapshot of `film`. `estimates` are the errors of the tiles, or nothing before the
+    /// first estimate. `downsample` caches the contributions of tiles to the picture, so that only
+    /// changed tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,
-        noise_levels: Vec<f32>,
+        estimates: &[Option<TileNoise>],
         report: Report,
         downsample: &mut Option<IncrementalDownsample>,
         pool: &rayon::ThreadPool,
@@ -117,7 +125,7 @@ impl Frame {
             downsample.thumbnail()
         });
         let tiles = match self.view.raster {
-            Some(_) => Arc::new(TileMaps::of(film, noise_levels)),
+            Some(_) => Arc::new(TileMaps::of(film, estimates)),
             None => Arc::default(),
         };
         let probe = self
@@ -136,8 +144,7 @@ impl Frame {
     }
 }
 
-/// Slot that holds the latest snapshot of a render. A new snapshot replaces one that has not been
-/// taken.
+/// Slot that holds the latest snapshot until it is taken or replaced.
 #[derive(Debug, Default)]
 pub(super) struct Slot(Mutex<Option<Snapshot>>);
 
@@ -154,8 +161,8 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// Locks the slot. A lock that was poisoned by a panic of another client is still usable,
-    /// because the slot always holds a complete snapshot or none.
+    /// A lock that was poisoned by a panic is still usable, because the slot always holds a
+    /// complete snapshot or none.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

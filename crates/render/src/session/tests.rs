@@ -6,7 +6,6 @@ use crate::schedule::{Criterion, Spp, Stop, StoppedBy};
 use crate::session::*;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_scene::built_in;
 use zerkalo_world as world;
 
 /// Longest time that a test waits for the session. Only a failing test reaches it.
@@ -28,7 +27,8 @@ fn session(stop: Stop) -> Session {
 }
 
 fn scene(width: u32) -> Arc<Scene> {
-    let mut scene = built_in();
+    let text = include_str!(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room.toml"));
+    let mut scene = Scene::parse(text, "mirror-room.toml").unwrap();
     scene.film.size = [width, 64];
     Arc::new(scene)
 }

@@ -1,21 +1,17 @@
-//! Throughput of tracing: samples per second over the latest second.
+//! Throughput of tracing over the latest second.
 
 use std::collections::VecDeque;
 
-/// Length of the time window in which the throughput is measured, in seconds of tracing.
+/// Time window of the measurement, in seconds of tracing.
 const WINDOW_SECONDS: f64 = 1.0;
 
-/// Throughput of tracing in the latest second ([`WINDOW_SECONDS`]), computed from recorded sample
-/// counts.
 #[derive(Debug, Default)]
 pub(super) struct Throughput {
-    /// Recorded totals since the start of the render, oldest first, each as `(seconds of tracing,
-    /// number of samples)`.
+    /// Seconds of tracing and numbers of samples since the start of the render, oldest first.
     marks: VecDeque<(f64, u64)>,
 }
 
 impl Throughput {
-    /// Records the number of samples that the first `seconds` seconds of tracing have given.
     pub fn record(&mut self, seconds: f64, samples: u64) {
         self.marks.push_back((seconds, samples));
         while self.marks.get(1).is_some_and(|(time, _)| *time <= seconds - WINDOW_SECONDS) {
@@ -23,8 +19,8 @@ impl Throughput {
         }
     }
 
-    /// Returns the throughput in the latest time window: samples per second of tracing, summed over
-    /// all pixels. Returns `None` before there are two sample counts.
+    /// Returns the samples per second in the time window, over all pixels. Returns `None` before
+    /// there are two marks.
     pub fn samples_per_second(&self) -> Option<f64> {
         let (&(from, first), &(to, last)) = (self.marks.front()?, self.marks.back()?);
         (to > from).then(|| (last - first) as f64 / (to - from))

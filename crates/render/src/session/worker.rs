@@ -1,13 +1,12 @@
-//! Worker: the rendering thread of a session, which receives commands and chooses the next piece of
-//! work.
+//! Worker of a session that renders: receives commands and chooses the next piece of work.
 
-use crate::export::Provenance;
 use crate::film::Display;
 use crate::schedule::{Settings, Step, Stop};
 use crate::session::active_render::{ActiveRender, WorkContext};
+use crate::session::picture::{Picture, Source};
 use crate::session::report::{Report, State};
 use crate::session::snapshot::Snapshot;
-use crate::session::{CheckpointTask, Command, Task};
+use crate::session::{Command, Task};
 use crate::{Checkpoint, Options};
 use crossbeam_channel::Receiver;
 use std::ops::ControlFlow;
@@ -20,25 +19,19 @@ pub(super) struct Worker {
     context: WorkContext,
     options: Options,
     settings: Settings,
-    /// Newest scene that the client has set. `None` before the first.
+    /// Newest scene that the client has set.
     newest: Option<Arc<Scene>>,
-    /// `true` if the render of the newest scene has not been started yet.
+    /// `true` if its render has not been started yet.
     pending: bool,
-    /// `true` if the newest scene must start with an empty film, even if samples of the active
-    /// render could be reused.
+    /// `true` if it must start with an empty film, whatever samples there are.
     restart: bool,
-    /// Scene to show, and the checkpoint from which its render continues. `None` if no
-    /// checkpoint is waiting to be continued.
+    /// Scene to show, and the checkpoint from which its render continues.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
-    checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
-    /// Active render; `Ok(None)` if there is none. The error states why the newest scene cannot be
-    /// rendered.
+    /// Active render, or the reason why the newest scene cannot be rendered.
     work: Result<Option<ActiveRender>, String>,
-    /// State of the session after the latest piece of work.
     state: State,
-    /// `true` if there is no work to do before the next command.
     idle: bool,
 }
 
@@ -59,7 +52,6 @@ impl Worker {
             restart: false,
             resume: None,
             tasks: Vec::new(),
-            checkpoints: Vec::new(),
             paused: false,
             work: Ok(None),
             state: State::Idle,
@@ -77,11 +69,10 @@ impl Worker {
         }
     }
 
-    /// Receives all queued commands of the client. Waits for one if there is no work. Returns
-    /// `Break` if the session ends.
+    /// Receives all queued commands, or waits for one if there is no work. Returns `Break` if the
+    /// session ends.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The cancel flags are lowered before commands are received. In the reverse order a flag
-        // could be lowered without its command being received; the module `session` explains this.
+        // The flags are lowered before commands are received, see the module `session`.
         self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
@@ -124,7 +115,6 @@ impl Worker {
                 }
             }
             Command::Task(task) => self.tasks.push(task),
-            Command::Checkpoint(provenance, task) => self.checkpoints.push((provenance, task)),
             Command::Quit => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
@@ -171,27 +161,24 @@ impl Worker {
     }
 
     fn run_tasks(&mut self) {
-        for (provenance, task) in std::mem::take(&mut self.checkpoints) {
-            task(match &self.work {
-                Ok(Some(work)) => work.checkpoint(&provenance, &self.context, self.state.clone()),
-                _ => None,
-            });
-        }
-        if self.tasks.is_empty() {
+        let tasks = std::mem::take(&mut self.tasks);
+        if tasks.is_empty() {
             return;
         }
-        let tasks = std::mem::take(&mut self.tasks);
-        let film = match &self.work {
-            Ok(Some(work)) => Some((&work.state, work.report(&self.context, self.state.clone()))),
-            _ => None,
-        };
+        let work = self.work.as_ref().ok().and_then(Option::as_ref);
+        let film = work.map(|work| (work, work.report(&self.context, self.state.clone())));
         for task in tasks {
-            task(film.as_ref().map(|(state, report)| (*state, report)));
+            task(film.as_ref().map(|(work, report)| Picture {
+                film: &work.state.film,
+                mix: &work.state.mix,
+                report,
+                source: Source::Render(work, &self.context.pool),
+            }));
         }
     }
 
-    /// Does the next piece of rendering work, if there is any: estimates the noise again if it is
-    /// out of date, traces a piece of a wave (set of concurrent jobs), and publishes a snapshot.
+    /// Does the next piece of rendering work: estimates the noise again if it is out of date,
+    /// traces a piece of a wave, and publishes a snapshot.
     fn advance(&mut self) {
         let context = &self.context;
         self.idle = true;
@@ -213,7 +200,7 @@ impl Worker {
         // The first picture of a scene is traced even during a pause.
         let paused = self.paused && work.first_picture_after.is_some();
         if work.estimates_stale {
-            // The picture is published at once. Its noise follows as soon as it is estimated.
+            // The picture is published at once, before its noise is estimated.
             self.state = if paused { State::Paused } else { State::Tracing };
             work.publish(context, self.state.clone(), true);
             if !work.reestimate(&context.pool, &context.shared.cancel_wave) {

@@ -1,5 +1,7 @@
 //! Camera: description in scene files, lens, navigation, and compiled form.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod lens;
 mod navigate;
 mod perspective;
@@ -14,15 +16,15 @@ description! {
     /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
     pub struct Camera {
         /// Position of the camera.
-        eye: [f64; 3] => eye "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
+        eye: [f64; 3] = [0.0, 1.0, 5.0], in COORDINATE "scene units";
         /// Point that the camera looks at. Exactly one of `target` and `direction` is given.
         target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
         /// View direction of the camera.
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
         /// Up direction of the picture; not parallel to the view direction.
-        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
         /// Opening angle of the camera, across the height or across the width of the picture.
-        view_angle: ViewAngle => view_angle "{ vertical = 40.0 }";
+        view_angle: ViewAngle => ViewAngle::Vertical(40.0), written "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are
         /// invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
@@ -43,28 +45,15 @@ one_of! {
     }
 }
 
-fn eye() -> [f64; 3] {
-    [0.0, 1.0, 5.0]
-}
-
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
-}
-
-fn view_angle() -> ViewAngle {
-    ViewAngle::Vertical(40.0)
-}
-
-/// Creates the camera of a scene file without a `[camera]` table. This camera looks at the origin.
-/// A `[camera]` table must have `target` or `direction`.
+/// Camera without a `[camera]` table: directed at the origin.
 impl Default for Camera {
     fn default() -> Self {
         Self {
-            eye: eye(),
+            eye: [0.0, 1.0, 5.0],
             target: Some([0.0; 3]),
             direction: None,
-            up: up(),
-            view_angle: view_angle(),
+            up: [0.0, 1.0, 0.0],
+            view_angle: ViewAngle::Vertical(40.0),
             near: 0.0,
             aperture: None,
             focus: None,
@@ -76,8 +65,7 @@ impl Default for Camera {
 pub const FIELDS: &[Field] = Camera::FIELDS;
 
 impl ViewAngle {
-    /// Returns the key of the opening angle in scene files, `vertical` or `horizontal`, and the
-    /// angle in degrees.
+    /// Returns the key in scene files, and the angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -87,9 +75,7 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Returns the unit vector of the camera's view direction. Returns `None` if `target` is the
-    /// eye itself, if `direction` is zero, or if not exactly one of `target` and `direction` is
-    /// given.
+    /// Returns the unit vector of the view direction; `None` if the camera does not define one.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
@@ -99,7 +85,7 @@ impl Camera {
         unit(look)
     }
 
-    /// Returns the validation errors of the camera.
+    /// Returns the validation errors.
     pub fn faults(&self) -> Vec<ValidationError> {
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(ValidationError::new(
@@ -121,9 +107,8 @@ impl Camera {
         checks.and(self.orientation_error()).and(self.focus_error()).errors()
     }
 
-    /// Returns a validation error if the camera does not define the axes of the picture: the target
-    /// is the eye, or `up` is parallel to the view direction. Returns `None` otherwise. All numbers
-    /// of the camera must be in range.
+    /// Returns a validation error if the target is the eye, or if `up` is parallel to the view
+    /// direction. All numbers must be in range.
     fn orientation_error(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
             return Some(ValidationError::new(
@@ -133,8 +118,8 @@ impl Camera {
             ));
         };
         let up = unit(self.up)?;
-        // If the sine of the angle between the vectors is 1e-6 or less, rounding errors would
-        // determine the picture's axes.
+        // If the sine of the angle is 1e-6 or less, rounding errors would determine the picture's
+        // axes.
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",

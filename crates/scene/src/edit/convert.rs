@@ -1,36 +1,23 @@
-//! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
-//! brightness are kept where possible.
+//! Conversion between kinds of shapes, lights, textures and cameras, which keeps position, size,
+//! direction and brightness where possible.
+
+#![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::Scene;
 use crate::camera::{Camera, Focus, ViewAngle};
 use crate::edit::bounds::scene_bounds;
 use crate::edit::lens;
-use crate::edit::set::{finish, replace};
-use crate::edit::toml_view::{insert_value, read};
+use crate::edit::set::{label, replace};
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{
-    Directional, EmitterSurface, Environment, Falloff, Light, LightUnit, Point, Spot,
-};
+use crate::light::{EmissiveSurface, Falloff, Light, LightKind, LightUnit, Placement};
 use crate::material::{Bump, Material, Texture};
 use crate::shape::Shape;
 use crate::value::{
-    Field, NumberRange, ValueType, number, round_fine, round_nice, round_significant, rounded_to,
-    unit,
+    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant,
+    rounded_to, unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
-use toml::{Table, Value};
-
-/// Kinds of light, each with its name and description.
-pub(super) const LIGHT_KINDS: &[Field] = &[
-    kind("point", "Light from one point, such as a lamp."),
-    kind("directional", "Light from infinitely far away, such as the sun."),
-    kind("spot", "Light from one point into a cone, such as a spotlight."),
-    kind("sphere", "Light from a sphere, such as a bulb: soft shadows."),
-    kind("rectangle", "Light from one side of a rectangle, such as a window."),
-    kind("disk", "Light from one side of a disk."),
-    kind("environment", "Light from all directions, such as the sky."),
-];
 
 const fn kind(name: &'static str, doc: &'static str) -> Field {
     Field::required(name, ValueType::Text, "", doc)
@@ -39,10 +26,9 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
 /// Field for the kind of a light. The inspector shows it as a row, but it is not a key of scene
 /// files.
 pub(super) const KIND: Field =
-    Field::required("kind", ValueType::OneOf(LIGHT_KINDS), "", "Kind of light source.");
+    Field::required("kind", ValueType::OneOf(crate::light::KINDS), "", "Kind of light source.");
 
-/// Field for the choice between `target` and `direction` of a camera. The inspector shows it as a
-/// row, but it is not a key of scene files.
+/// Choice between `target` and `direction` of a camera, a row of the inspector but no key of files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -53,18 +39,7 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Returns the key in `values` that is one of the mutually exclusive keys of the edit target
-/// `subject`, such as the kind `point` of a light. Returns `None` if `values` has none of these
-/// keys.
-pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
-    crate::edit::toml_view::exclusive_keys(subject)
-        .iter()
-        .copied()
-        .find(|key| values.contains_key(*key))
-}
-
-/// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
-/// another shape or light. Nothing changes if it has this kind already.
+/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -96,22 +71,20 @@ pub(super) fn switch(
                 next.materials.get_mut(material).ok_or_else(|| EditError::gone(subject))?;
             switch_texture(material, key, name);
         }
-        _ => {}
+        Target::Ambient | Target::Background | Target::Film | Target::IntegratorSettings => {}
     }
-    let values = read(&next, subject)?;
-    Ok(finish(&next, subject, key, values)?.with_note(note))
+    let label = label(&next, subject, key);
+    Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
 }
 
-/// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
-/// there is no such kind.
+/// Returns a shape of the kind `name` with the place, size and rotation of `shape`.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The size is that of the bounding box before rotation, because the bounding box of a
-            // rotated shape is larger than the shape.
+            // The bounding box of a rotated shape is larger than the shape.
             let mut straight = shape.clone();
-            straight.rotate_y(-rotation(shape));
+            straight.rotate_y(-shape.rotation());
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
             let size = h - l;
             let usual = size.max_element();
@@ -126,44 +99,8 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let base = base.map(|x| round_nice(x, scale));
     let size = size.map(|x| round_significant(x, 6));
     let mut next = Shape::fitted_to(name, base, size)?;
-    next.rotate_y(rotation(shape));
+    next.rotate_y(shape.rotation());
     Some(next)
-}
-
-/// Returns the rotation of a shape about the vertical [degrees]; 0 for a kind without the key
-/// `rotation`.
-fn rotation(shape: &Shape) -> f64 {
-    match shape {
-        Shape::Cube(cube) => cube.rotation,
-        Shape::Pyramid(pyramid) => pyramid.rotation,
-        Shape::Prism(prism) => prism.rotation,
-        _ => 0.0,
-    }
-}
-
-/// Angle between the axis and the edge of the cone of a spot light that is added or converted
-/// \[degrees\].
-const SPOT_ANGLE: f64 = 30.0;
-
-/// Gives `light`, which has no kind, the kind `name`. Of `position`, `direction` and `radius`, the
-/// light takes the values for which the kind has keys. Nothing changes if there is no such kind.
-pub(super) fn set_kind(
-    light: &mut Light,
-    name: &str,
-    position: [f64; 3],
-    direction: [f64; 3],
-    radius: f64,
-) {
-    match name {
-        "point" => light.point = Some(Point { position }),
-        "directional" => light.directional = Some(Directional { direction }),
-        "spot" => {
-            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
-            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
-        }
-        "environment" => light.environment = Some(Environment::default()),
-        _ => light.set_surface(name, position.into(), direction, radius),
-    }
 }
 
 /// Converts a light to the kind `name`. The light keeps its position, direction and size where the
@@ -172,7 +109,7 @@ pub(super) fn set_kind(
 /// the centre is kept if the range of intensities allows it. Returns a note if this irradiance
 /// requires another intensity, otherwise `None`.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
-    if light.kinds() == [name] {
+    if light.kind.key() == name {
         return None;
     }
     let ball = scene_bounds(scene);
@@ -187,17 +124,20 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     let far = || (center - along * (3.0 * ball.radius)).map(|x| round_nice(x, ball.radius));
     let position = light.position().unwrap_or_else(|| far().to_array());
     let radius = match light.surface() {
-        Some(EmitterSurface::Rectangle(rectangle)) => {
-            0.5 * (rectangle.size[0] * rectangle.size[1]).sqrt()
+        Some(EmissiveSurface::Rectangle { size: [width, height], .. }) => {
+            0.5 * (width * height).sqrt()
         }
         Some(surface) => surface.radius(),
         None => ball.radius / 5.0,
     };
+    let kind = LightKind::placed(name, &Placement { position, direction, radius })?;
     let old = light.clone();
-    light.clear_kind();
-    set_kind(light, name, position, direction, radius);
+    light.kind = kind;
     if light.surface().is_none() {
-        (light.unit, light.visible) = (LightUnit::Radiance, true);
+        light.unit = LightUnit::Radiance;
+    }
+    if !light.has_radiance() {
+        light.visible = true;
     }
     if light.apex().is_none() {
         light.falloff = Falloff::None;
@@ -221,27 +161,20 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
                 LightUnit::Radiance => 1.0,
                 LightUnit::Power => 1.0 / (PI * surface.area()),
             };
-            // A sphere shows a quarter of its area to a distant point.
-            let shown = match surface {
-                EmitterSurface::Sphere(_) => 0.25 * surface.area(),
-                _ => surface.area(),
-            };
-            radiance * (shown / squared).min(PI)
+            radiance * (surface.frontal_area() / squared).min(PI)
         }
     }
 }
 
 /// Changes the falloff of the light at `index`, a point or spot light. The intensity is changed so
-/// that the irradiance at the centre of the scene is kept. `values` has the present values of the
-/// light's keys.
+/// that the irradiance at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
-    values: Table,
-    falloff: Value,
+    falloff: KeyValue,
 ) -> Result<Edit, EditError> {
     let subject = Target::Light(index);
-    let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
+    let mut edit = replace(scene, &subject, "falloff", falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
     if let Some(position) = light.position().filter(|_| light.falloff != old.falloff) {
@@ -268,8 +201,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Sets the kind of a material's texture or bump map to `name`. `key` is `texture` or `bump`. The
-/// placement of a texture on the shape is kept.
+/// Sets the kind of `texture` or `bump`. The placement of a texture is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -281,8 +213,8 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts the value of the camera's `key` to the kind `name`, such as `target` to `direction`.
-/// The picture stays the same, except for rounding.
+/// Converts the value of `key`, such as `target` to `direction`. The picture stays the same, except
+/// for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -309,8 +241,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
             if camera.lens_radius() > 0.0 && camera.focus.is_none() {
-                // So far the target was in focus. A focus distance keeps it in focus without a
-                // target.
+                // The target was in focus; a focus distance keeps it so.
                 let distance = round_significant(camera.focus_depth(), 5);
                 camera.focus = Some(Focus::Distance(distance));
             }
@@ -330,39 +261,16 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Appends a transform step of the kind `name` to the list `key`, with the value that changes
-/// nothing: the vector 0, the angle 0 or the factor 1.
-pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
-    let zero = || Value::Array(vec![Value::Float(0.0); 3]);
-    let value = match name {
-        "translate" => zero(),
-        "scale" => Value::Float(1.0),
-        "rotate" => {
-            let axis = [0.0, 1.0, 0.0].map(Value::Float).to_vec();
-            let turn = [("axis".into(), Value::Array(axis)), ("degrees".into(), 0.0.into())];
-            Value::Table(Table::from_iter(turn))
-        }
-        _ => Value::Float(0.0),
-    };
-    let step = Value::Table(Table::from_iter([(name.to_string(), value)]));
-    match object.get_mut(key).and_then(Value::as_array_mut) {
-        Some(steps) => steps.push(step),
-        None => {
-            insert_value(object, key, Some(Value::Array(vec![step])));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::edit::{rows, set};
     use crate::shape::KINDS;
+    use crate::testing::mirror_room;
 
     #[test]
     fn converted_shapes_keep_place_and_size() {
-        let scene = built_in();
+        let scene = mirror_room();
         for object in 0..scene.objects.len() {
             let subject = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
@@ -390,40 +298,40 @@ mod tests {
 
     #[test]
     fn lights_of_every_kind_become_each_other() {
-        let scene = built_in();
+        let scene = mirror_room();
         let lamp = Target::Light(0);
         let center = DVec3::from_array(scene_bounds(&scene).center);
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
         for from in crate::light::KINDS {
-            let from = set(&scene, &lamp, "kind", from).unwrap().scene;
+            let from = set(&scene, &lamp, "kind", from.name).unwrap().scene;
             for to in crate::light::KINDS {
-                let edit = set(&from, &lamp, "kind", to).unwrap();
+                let edit = set(&from, &lamp, "kind", to.name).unwrap();
                 assert_eq!(edit.scene.faults(), []);
                 let light = &edit.scene.lights[0];
-                assert_eq!(light.kinds(), [*to]);
+                assert_eq!(light.kind.key(), to.name);
                 let ratio = irradiance(light) / irradiance(&from.lights[0]);
-                assert!((ratio - 1.0).abs() < 0.01, "{to}: {ratio}");
+                assert!((ratio - 1.0).abs() < 0.01, "{}: {ratio}", to.name);
             }
         }
     }
 
     #[test]
     fn converted_lights_keep_side_and_brightness() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.lights[0].falloff = Falloff::InverseSquare;
         scene.lights[0].intensity = 40.0;
         let lamp = Target::Light(0);
         let edit = set(&scene, &lamp, "kind", "directional").unwrap();
         let light = &edit.scene.lights[0];
-        assert!(light.point.is_none() && light.falloff == Falloff::None);
+        assert!(light.kind.key() == "directional" && light.falloff == Falloff::None);
         let center = DVec3::from_array(scene_bounds(&scene).center);
-        let from = DVec3::from_array(scene.lights[0].point.unwrap().position);
+        let from = scene.lights[0].apex().unwrap();
         let expected = 40.0 / (from - center).length_squared() / std::f64::consts::PI;
         assert!((light.intensity / expected - 1.0).abs() < 0.01, "{}", light.intensity);
         assert!(edit.note.unwrap().starts_with("Intensity 40 became "));
-        let direction = DVec3::from_array(light.directional.unwrap().direction);
+        let direction = DVec3::from_array(light.direction().unwrap());
         let back = set(&edit.scene, &lamp, "kind", "p").unwrap().scene;
-        let at = DVec3::from_array(back.lights[0].point.unwrap().position);
+        let at = back.lights[0].apex().unwrap();
         assert!((center - at).angle_between(direction) < 1e-3);
         let even = set(&scene, &lamp, "falloff", "none").unwrap();
         assert!((even.scene.lights[0].intensity / expected - 1.0).abs() < 0.01);
@@ -441,7 +349,8 @@ mod tests {
         let expected = ["position", "direction", "outer_angle", "inner_angle"];
         assert_eq!(keys[2..6], expected.map(|key| format!("spot.{key}")), "{keys:?}");
         let edit = set(&spot, &lamp, "spot.outer_angle", "40").unwrap();
-        assert_eq!(edit.scene.lights[0].spot.unwrap().outer_angle, 40.0);
+        let LightKind::Spot(wide) = &edit.scene.lights[0].kind else { panic!() };
+        assert_eq!(wide.outer_angle, 40.0);
         assert!(set(&spot, &lamp, "spot.outer_angle", "10").is_err(), "the inner cone has 15");
         let point = set(&spot, &lamp, "kind", "point").unwrap().scene;
         assert_eq!(point.lights, scene.lights);
@@ -455,7 +364,7 @@ mod tests {
 
     #[test]
     fn converted_cameras_keep_the_picture() {
-        let scene = built_in();
+        let scene = mirror_room();
         let camera = |scene: &Scene| scene.camera.clone();
         let free = set(&scene, &Target::Camera, "aim", "direction").unwrap().scene;
         let angle = camera(&free).view().unwrap().angle_between(scene.camera.view().unwrap());

@@ -1,7 +1,8 @@
 //! Tests of the arrow keys that step a property's value: round values, steps back, limits.
 
+use crate::Scene;
 use crate::edit::{Property, Target, Widget, outline, rows, set, step, toggle};
-use crate::{Scene, built_in};
+use crate::testing::mirror_room;
 
 /// Returns the value of the property `key` as text, after `steps` steps of the arrow keys.
 fn after(scene: &Scene, subject: &Target, key: &str, steps: f64) -> String {
@@ -19,7 +20,7 @@ fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
 }
 
 fn with(subject: &Target, key: &str, text: &str) -> Scene {
-    set(&built_in(), subject, key, text).unwrap_or_else(|e| panic!("{key} = {text}: {e}")).scene
+    set(&mirror_room(), subject, key, text).unwrap_or_else(|e| panic!("{key} = {text}: {e}")).scene
 }
 
 #[test]
@@ -81,11 +82,11 @@ fn arrow_steps_of_each_number_kind() {
 #[test]
 fn arrow_step_of_one_component() {
     let ball = Target::Object(2);
-    let edit = step(&built_in(), &ball, "shape.sphere.center", Some(2), -1.0).unwrap();
+    let edit = step(&mirror_room(), &ball, "shape.sphere.center", Some(2), -1.0).unwrap();
     assert_eq!(value(&edit.scene, &ball, "shape.sphere.center"), "-0.9, 0.5, -0.1");
-    let edit = step(&built_in(), &Target::Film, "size", Some(0), 0.1).unwrap();
+    let edit = step(&mirror_room(), &Target::Film, "size", Some(0), 0.1).unwrap();
     assert_eq!(value(&edit.scene, &Target::Film, "size"), "641, 480");
-    assert!(step(&built_in(), &ball, "shape.sphere.center", Some(3), 1.0).is_err());
+    assert!(step(&mirror_room(), &ball, "shape.sphere.center", Some(3), 1.0).is_err());
     let mirror = Target::Object(1);
     let flat = with(&mirror, "shape.rectangle.normal", "0.05 0 0");
     let edit = step(&flat, &mirror, "shape.rectangle.normal", Some(0), -1.0).unwrap();
@@ -135,7 +136,7 @@ fn arrow_step_of_missing_key_starts_from_default() {
 /// steps, up or down. Steps of 50 rungs reach the ends of all ranges.
 #[test]
 fn arrow_steps_stop_at_range_ends() {
-    let scene = built_in();
+    let scene = mirror_room();
     for (_, subject) in outline(&scene) {
         for row in rows(&scene, &subject).unwrap() {
             if !matches!(row.entry, Widget::Numbers | Widget::Color) {
@@ -165,14 +166,14 @@ fn arrow_steps_stop_at_range_ends() {
 #[test]
 fn choices_cycle() {
     let red = Target::Material("red".into());
-    let mut scene = built_in();
+    let mut scene = mirror_room();
     let mut seen = Vec::new();
     for _ in 0..5 {
         scene = toggle(&scene, &red, "metal", true).unwrap().scene;
         seen.push(value(&scene, &red, "metal"));
     }
     assert_eq!(seen, ["gold", "silver", "copper", "iron", ""]);
-    assert_eq!(scene, built_in());
+    assert_eq!(scene, mirror_room());
     let edit = toggle(&scene, &red, "metal", false).unwrap();
     assert_eq!(value(&edit.scene, &red, "metal"), "iron");
     let ball = Target::Object(2);
@@ -181,7 +182,7 @@ fn choices_cycle() {
     let edit = toggle(&scene, &ball, "shape", true).unwrap();
     assert_eq!(edit.scene.objects[2].shape.key(), "cube");
     let edit = toggle(&scene, &Target::Light(0), "kind", true).unwrap();
-    assert!(edit.scene.lights[0].directional.is_some());
+    assert_eq!(edit.scene.lights[0].kind.key(), "directional");
     let edit = toggle(&scene, &Target::Camera, "aim", false).unwrap();
     assert!(edit.scene.camera.direction.is_some());
     let edit = toggle(&scene, &Target::Light(0), "on", true).unwrap();

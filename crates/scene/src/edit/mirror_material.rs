@@ -1,27 +1,25 @@
-//! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
-//! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
+//! Edits of the scene's mirror: a material that reflects.
+
+#![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::Scene;
 use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
-use zerkalo_kernel::primitive::Form;
+use crate::shape::Shape;
 
-/// Returns the name of the material that the mirror commands change: the first of the following
-/// that reflects.
+/// Returns the name of the material that the mirror commands change: the first of the following.
 ///
-/// - The material that is selected, or that of the selected object. Glass counts even if it only
-///   transmits.
-/// - The material with the largest reflection coefficient in the selected object and its parts.
-/// - The material with the largest reflection coefficient in the first rectangle that reflects.
-/// - The material with the largest reflection coefficient in all objects and parts.
-///
-/// If none reflects, returns the selected material, or else that of the first rectangle, so that
-/// the reflection can be increased from 0 again. Returns `None` if there is neither.
+/// - The selected material, or that of the selected object, if it reflects or transmits.
+/// - The most reflecting material of the selected object and its parts.
+/// - The most reflecting material of the first rectangle that reflects.
+/// - The most reflecting material of all objects and parts.
+/// - The selected material, or that of the first rectangle, so that a reflection can be increased
+///   from 0.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
-    let chosen = selected.and_then(|subject| match subject.material(scene) {
-        Some(Target::Material(name)) => Some(name),
-        _ => None,
+    let chosen = selected.and_then(|subject| {
+        let Target::Material(name) = subject.material(scene)? else { return None };
+        Some(name)
     });
     let is_specular = |material: &String| {
         scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
@@ -35,10 +33,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
         return Some(part);
     }
     // Rectangles of any orientation count; the ground (`platform`) does not.
-    let rectangle = |i: &usize| {
-        let object = &scene.objects[*i];
-        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))
-    };
+    let rectangle = |i: &usize| matches!(scene.objects[*i].shape, Shape::Rectangle(_));
     let mut all = 0..scene.objects.len();
     if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
         return Some(name);
@@ -52,11 +47,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
 
-/// Changes the value of `key` of the material that [`mirror`] finds for `selected`, such as its
-/// `roughness`, `reflection` or `lobe`, by `steps` presses of an arrow key, as [`step`] does.
-///
-/// # Errors
-/// Fails if [`mirror`] finds no material.
+/// Changes `key` of the [`mirror`] by arrow steps, as [`step`] does. Fails if there is no mirror.
 pub fn step_mirror(
     scene: &Scene,
     selected: Option<&Target>,
@@ -73,12 +64,12 @@ pub fn step_mirror(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::material::Lobe;
+    use crate::testing::mirror_room;
 
     #[test]
     fn mirror_prefers_selection_then_rectangle() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
         assert_eq!(at(&scene, Some(Target::Object(2))), "red");
@@ -93,7 +84,7 @@ mod tests {
         for material in scene.materials.values_mut() {
             material.reflection = 0.0;
         }
-        assert_eq!(at(&scene, None), "mirror", "so that it can be turned up again");
+        assert_eq!(at(&scene, None), "mirror", "so that it can be increased again");
         assert_eq!(at(&scene, Some(Target::Object(3))), "green");
         scene.objects.clear();
         assert_eq!(mirror(&scene, None), None);
@@ -122,7 +113,7 @@ mod tests {
 
     #[test]
     fn adjust_roughness_from_zero_and_back() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.materials.get_mut("mirror").unwrap().roughness = 0.0;
         let start = scene.clone();
         let mut seen = vec![0.0];
@@ -148,7 +139,7 @@ mod tests {
 
     #[test]
     fn next_lobe_cycles_and_reflect_steps() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let mut lobes = Vec::new();
         for _ in 0..5 {
             scene = step_mirror(&scene, None, "lobe", 1.0).unwrap().scene;

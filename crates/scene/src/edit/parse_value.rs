@@ -1,14 +1,11 @@
 //! Parsing and formatting of property values as users type and read them.
 
 use crate::edit::EditError;
-use crate::format::emit::color;
 use crate::format::suggest::did_you_mean;
-use crate::value::{Color, Field, NumberRange, ValueType, number, sanitized, truncated};
-use toml::Value;
+use crate::value::{Color, Field, KeyValue, NumberRange, ValueType, number, sanitized, truncated};
 
-/// Parses `text` as a value of `field`. A whole number must be in its range. The ranges of other
-/// numbers are checked later, by the validation of the edited scene.
-pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
+/// Parses `text` as a value of `field`. The ranges of numbers that are not whole are checked later.
+pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
     let text = text.trim();
     let wrong = || {
         let found = format!("{} cannot be \"{}\"", field.name, truncated(text));
@@ -22,39 +19,35 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
         }
         None => Err(wrong()),
     };
-    let floats = |list: Vec<f64>| Value::Array(list.into_iter().map(Value::Float).collect());
-    let whole = |x: f64, range: NumberRange| {
-        let fits = x.fract() == 0.0 && range.holds(x);
-        if fits { Ok(Value::Integer(x as i64)) } else { Err(wrong()) }
+    let wholes = |n: usize, range: NumberRange| {
+        let list = list(n)?;
+        let fits = list.iter().all(|x| x.fract() == 0.0 && range.holds(*x));
+        if fits { Ok(KeyValue::Numbers(list)) } else { Err(wrong()) }
     };
     match field.takes {
-        ValueType::Text => name(field.name, unquoted(text)).map(Value::String),
+        ValueType::Text => name(field.name, unquoted(text)).map(KeyValue::Text),
         ValueType::Switch => {
             let words = ["true", "on", "yes", "1", "false", "off", "no", "0"];
             let index = choose(text, &words).ok_or_else(wrong)?;
-            Ok(Value::Boolean(index < 4))
+            Ok(KeyValue::Switch(index < 4))
         }
         ValueType::Choice(choices) => {
             let word = word(field, unquoted(text), choices.iter().map(|c| c.name));
-            word.map(Value::from)
+            word.map(|word| KeyValue::Text(word.to_string()))
         }
-        ValueType::Whole(range) => list(1).and_then(|list| whole(list[0], range)),
-        ValueType::Wholes(n, range) => {
-            let wholes = list(n)?.into_iter().map(|x| whole(x, range));
-            wholes.collect::<Result<_, _>>().map(Value::Array)
-        }
-        ValueType::Number(_) => list(1).map(|list| Value::Float(list[0])),
-        ValueType::Numbers(n, _) => list(n).map(floats),
-        ValueType::Direction => list(3).map(floats),
-        ValueType::Factor => match numbers(text).as_deref() {
-            Some([factor]) => Ok(Value::Float(*factor)),
-            Some(list @ [_, _, _]) => Ok(floats(list.to_vec())),
+        ValueType::Whole(range) => wholes(1, range),
+        ValueType::Wholes(n, range) => wholes(n, range),
+        ValueType::Number(_) => list(1).map(KeyValue::Numbers),
+        ValueType::Numbers(n, _) => list(n).map(KeyValue::Numbers),
+        ValueType::Direction => list(3).map(KeyValue::Numbers),
+        ValueType::Factor => match numbers(text) {
+            Some(list) if [1, 3].contains(&list.len()) => Ok(KeyValue::Numbers(list)),
             _ => Err(wrong()),
         },
         ValueType::Color(_) => match Color::from_hex(unquoted(text)) {
-            Some(color) => Ok(floats(color.0.to_vec())),
+            Some(color) => Ok(KeyValue::Numbers(color.0.to_vec())),
             None if text.contains('#') => Err(wrong()),
-            None => list(3).map(floats),
+            None => list(3).map(KeyValue::Numbers),
         },
         ValueType::Table(_)
         | ValueType::OneOf(_)
@@ -64,9 +57,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     }
 }
 
-/// Returns the index in `words` of the word that equals `text`, or else of the only word that
-/// starts with `text`. Case is ignored. Returns `None` if no word or more than one word starts with
-/// `text`.
+/// Returns the index of the word that equals `text`, or else of the only one that starts with it.
+/// Case is ignored.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -97,7 +89,7 @@ pub(super) fn word<'a>(
     })
 }
 
-/// Validates `text` as a name, which must be printable. `what` is the key in the error.
+/// Returns `text` as a name, if it is printable. `what` is the key in the error.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
@@ -111,8 +103,8 @@ fn unquoted(text: &str) -> &str {
     text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
 }
 
-/// Parses numbers that are separated by commas, semicolons or spaces (or the `x` of `640x480` and
-/// `640 x 480`), with or without brackets. Returns `None` if one of them is not a number.
+/// Parses numbers that are separated by commas, semicolons, spaces or the `x` of `640x480`, with or
+/// without brackets.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
@@ -129,47 +121,33 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
-/// Returns `true` if `part` has at least one digit, and apart from digits only signs, points, `e`
-/// and `E`. The words `inf` and `nan` are excluded, because no field accepts them.
+/// Returns `true` if `part` may be a number; no field accepts `inf` and `nan`.
 fn digits(part: &str) -> bool {
     part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// Formats a value of the type `takes`: numbers with the shortest digits, lists without brackets. A
-/// colour is formatted as `#rrggbb` if that is exact, and shorter than its three numbers.
-pub(super) fn show(takes: ValueType, value: &Value) -> String {
-    if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
-        let channels = join(&color.0.map(number));
-        return color.to_hex().filter(|hex| hex.len() < channels.len()).unwrap_or(channels);
-    }
-    match value {
-        Value::Array(list) => {
-            join(&list.iter().map(|v| show(ValueType::Text, v)).collect::<Vec<_>>())
-        }
-        Value::Float(x) => number(*x),
-        Value::Integer(i) => i.to_string(),
-        Value::Boolean(yes) => yes.to_string(),
-        Value::String(text) => sanitized(text),
-        other => other.to_string(),
-    }
-}
-
-fn join(parts: &[String]) -> String {
-    parts.join(", ")
-}
-
-/// Returns the numbers of a value: one number, or those of a list. Returns `None` for any other
-/// value.
-pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
-    let one = |value: &Value| match value {
-        Value::Float(x) => Some(*x),
-        Value::Integer(i) => Some(*i as f64),
-        _ => None,
+/// Formats numbers with the shortest digits, lists without brackets, and a colour as `#rrggbb` if
+/// that is exact and shorter.
+pub(super) fn show(takes: ValueType, value: &KeyValue) -> String {
+    let list = match value {
+        KeyValue::Switch(on) => return on.to_string(),
+        KeyValue::Text(text) => return sanitized(text),
+        KeyValue::Numbers(list) => list,
     };
-    match value {
-        Value::Array(list) => list.iter().map(one).collect(),
-        other => one(other).map(|x| vec![x]),
+    if let ValueType::Whole(_) | ValueType::Wholes(..) = takes {
+        return list.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    }
+    let text = list.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+    let color = color(takes, value).and_then(Color::to_hex);
+    color.filter(|hex| hex.len() < text.len()).unwrap_or(text)
+}
+
+/// Returns the colour `value`; `None` if `takes` is not the type of colours.
+pub(super) fn color(takes: ValueType, value: &KeyValue) -> Option<Color> {
+    match (takes, value) {
+        (ValueType::Color(_), KeyValue::Numbers(list)) => list[..].try_into().ok().map(Color),
+        _ => None,
     }
 }
 
@@ -188,7 +166,7 @@ mod tests {
         for (text, expected) in
             [("0.5", 0.5), (".5", 0.5), (" 5. ", 5.0), ("1e-3", 1e-3), ("+2", 2.0), ("[3]", 3.0)]
         {
-            assert_eq!(parse(&one, text), Ok(Value::Float(expected)), "{text}");
+            assert_eq!(parse(&one, text), Ok(KeyValue::Numbers(vec![expected])), "{text}");
         }
         for text in [
             "", "x", "inf", "nan", "1 2", "0,5", "--1", "1e", "[1", "e", "0x10", "1x", "x1", "1 x",
@@ -198,13 +176,13 @@ mod tests {
         }
         let three = field(ValueType::Numbers(3, NumberRange::FINITE));
         for text in ["1, 2, 3", "1 2 3", "[1,2,3]", "1;2 ;3", " [ 1 2 3 ] "] {
-            assert_eq!(floats(&parse(&three, text).unwrap()), Some(vec![1.0, 2.0, 3.0]), "{text}");
+            assert_eq!(parse(&three, text), Ok(KeyValue::Numbers(vec![1.0, 2.0, 3.0])), "{text}");
         }
         let refusal = parse(&three, "1 2").unwrap_err();
         assert_eq!(refusal.found, "it needs 3 numbers, not 2");
         let size = field(ValueType::Wholes(2, NumberRange::closed(1.0, 100.0)));
         for text in ["64x48", "64 x 48", "64×48", "64 48"] {
-            assert_eq!(floats(&parse(&size, text).unwrap()), Some(vec![64.0, 48.0]), "{text}");
+            assert_eq!(parse(&size, text), Ok(KeyValue::Numbers(vec![64.0, 48.0])), "{text}");
         }
         for text in
             ["64x", "x64", "64 48x", "64xx48", "64 x x 48", "64 x", "64 0", "64 4.5", "64 1e9"]
@@ -219,20 +197,20 @@ mod tests {
     #[test]
     fn typed_colours_and_choices_are_parsed() {
         let color = field(ValueType::Color(NumberRange::SHARE));
-        assert_eq!(floats(&parse(&color, "#ff0000").unwrap()), Some(vec![1.0, 0.0, 0.0]));
-        assert_eq!(floats(&parse(&color, ".5 0 1").unwrap()), Some(vec![0.5, 0.0, 1.0]));
+        assert_eq!(parse(&color, "#ff0000"), Ok(KeyValue::Numbers(vec![1.0, 0.0, 0.0])));
+        assert_eq!(parse(&color, ".5 0 1"), Ok(KeyValue::Numbers(vec![0.5, 0.0, 1.0])));
         assert!(parse(&color, "#ff00").is_err() && parse(&color, "red").is_err());
         let switch = field(ValueType::Switch);
         for (text, expected) in
             [("true", true), ("ON", true), ("y", true), ("of", false), ("n", false), ("f", false)]
         {
-            assert_eq!(parse(&switch, text), Ok(Value::Boolean(expected)), "{text}");
+            assert_eq!(parse(&switch, text), Ok(KeyValue::Switch(expected)), "{text}");
         }
         assert!(parse(&switch, "o").is_err(), "on or off");
         let lobes: &[Choice] =
             &[Choice { name: "mirror", doc: "" }, Choice { name: "monkey", doc: "" }];
         let lobe = field(ValueType::Choice(lobes));
-        assert_eq!(parse(&lobe, "mi"), Ok(Value::String("mirror".into())));
+        assert_eq!(parse(&lobe, "mi"), Ok(KeyValue::Text("mirror".into())));
         let refusal = parse(&lobe, "miror").unwrap_err().to_string();
         assert!(refusal.ends_with("Did you mean \"mirror\"?"), "{refusal}");
         assert!(parse(&lobe, "m").is_err() && parse(&lobe, "").is_err());
@@ -240,12 +218,12 @@ mod tests {
 
     #[test]
     fn printed_values_are_short() {
-        let list = |list: &[f64]| Value::Array(list.iter().map(|x| Value::Float(*x)).collect());
+        let list = |list: &[f64]| KeyValue::Numbers(list.to_vec());
         let color = ValueType::Color(NumberRange::LIGHT);
         assert_eq!(show(ValueType::Direction, &list(&[0.1, -3.0, 1e9])), "0.1, -3, 1e9");
         assert_eq!(show(color, &list(&[1.0, 0.0, 0.5])), "1, 0, 0.5");
         assert_eq!(show(color, &list(&Color::from_hex("#80ff01").unwrap().0)), "#80ff01");
-        assert_eq!(show(ValueType::Switch, &Value::Boolean(true)), "true");
+        assert_eq!(show(ValueType::Switch, &KeyValue::Switch(true)), "true");
     }
 
     #[test]

@@ -1,52 +1,44 @@
-//! Properties of an edit target (camera, light, object, material, ...), as an inspector shows them:
-//! one row per key.
+//! Properties of an edit target as an inspector shows them: one row per key.
 
 use crate::Scene;
-use crate::edit::convert::{AIM, KIND, chosen};
-use crate::edit::parse_value::{floats, show};
-use crate::edit::toml_view::{exclusive_keys, fields, get, read};
+use crate::edit::convert::{AIM, KIND};
+use crate::edit::parse_value::{color, parse, show};
+use crate::edit::part::{exclusive_keys, fields, given_key, part};
 use crate::edit::{EditError, Target};
-use crate::format::emit::{color, preset};
-use crate::value::{DefaultValue, Field, NumberRange, ValueType, names, number};
-use toml::{Table, Value};
+use crate::value::{
+    Choice, DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number,
+};
 
 /// Word that a property accepts as its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Text of the word. If it is the name of a material, it may contain any character that files
-    /// allow.
+    /// Text of the word. The name of a material may contain any character.
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,
 }
 
-/// Kind of a property's value, by which an inspector chooses the input element.
+/// Kind of a property's value, by which an inspector chooses the input element. Choices, kinds and
+/// lists take [`Property::words`].
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Widget {
-    /// Widget for free text, such as a name.
     Text,
-    /// Widget for a switch: the value is `true` or `false`.
     Switch,
-    /// Widget for a choice: the value is one of [`Property::words`].
     Choice,
-    /// Widget for the kind of a shape or a light: the value is one of [`Property::words`]. The kind
-    /// determines which other properties exist.
+    /// Kind of a shape or a light, which determines the other properties.
     Kind,
-    /// Widget for a list of transform steps. Typing one of [`Property::words`] appends a step of
-    /// that kind.
+    /// List of transform steps, to which a word appends a step.
     List,
-    /// Widget for a number, or for a list of numbers such as a position.
     #[default]
     Numbers,
-    /// Widget for a colour: three numbers, the linear red, green and blue.
     Color,
 }
 
 /// Property of an edit target: one row of an inspector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Property {
-    /// Dotted key, as [`set`](crate::edit::set) requires it: `shape.sphere.radius`,
-    /// `transform.0.rotate_y`.
+    /// Dotted key, such as `shape.sphere.radius`.
     pub key: String,
     /// Label of the property: the last part of the key, with spaces.
     pub label: String,
@@ -56,8 +48,7 @@ pub struct Property {
     pub entry: Widget,
     /// Value as text, in the form in which it can be typed; empty if the key has no value.
     pub value: String,
-    /// Each number of the value as text: the numbers of a list, or the three channels of a colour.
-    /// Empty for other values.
+    /// Each number of the value as text.
     pub components: Vec<String>,
     /// Linear red, green and blue of a colour; `None` for other values.
     pub color: Option<[f64; 3]>,
@@ -75,45 +66,46 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject`, in the order in which the manual of the scene format lists
-/// its keys. The properties of an object's material are not included; they belong to the target
-/// [`Target::material`].
-///
-/// # Errors
-/// Fails if the scene has no such target.
+/// Returns the properties of `subject` in the order of the manual, without those of an object's
+/// material.
 pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
-    let values = read(scene, subject)?;
+    let part = part(scene, subject)?;
     let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
     let virtual_kind = match subject {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
+        Target::Ambient
+        | Target::Background
+        | Target::Object(_)
+        | Target::Material(_)
+        | Target::Film
+        | Target::IntegratorSettings => None,
+    };
+    let given = given_key(part, subject);
+    let light = match subject {
+        Target::Light(i) => scene.lights.get(*i),
         _ => None,
     };
-    let has_size = match subject {
-        Target::Light(i) => scene.lights.get(*i).is_some_and(|light| light.surface().is_some()),
-        _ => true,
-    };
+    let hidden_key = |name: &str| light.is_some_and(|light| !light.has_key(name));
     for field in fields(subject) {
-        let is_environment = values.contains_key("environment");
-        if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
-            // Only lights with a size have the key `unit`. Only these lights and environments have
-            // the key `visible`.
+        if hidden_key(field.name) {
             continue;
         }
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {
-            // One row chooses between the two exclusive keys; the row of the key that is given
-            // follows.
+            // One row chooses between the exclusive keys; the row of the key that is given follows.
             if exclusive_keys(subject)[0] == field.name {
-                walk.kind(kind, chosen(subject, &values), kind.name.to_string(), 0);
+                walk.kind(kind, given, kind.name.to_string(), 0);
             }
-            if values.contains_key(field.name) {
-                walk.field(field, &values, field.name.to_string(), 1);
+            if given == Some(field.name)
+                && let Some(node) = part.child(field.name)
+            {
+                walk.field(field, node, field.name.to_string(), 1);
             }
-            continue;
+        } else if let Some(node) = part.child(field.name) {
+            walk.field(field, node, field.name.to_string(), 0);
         }
-        walk.field(field, &values, field.name.to_string(), 0);
     }
     Ok(walk.rows)
 }
@@ -125,46 +117,50 @@ struct PropertyWalker<'a> {
 }
 
 impl PropertyWalker<'_> {
-    fn field(&mut self, field: &'static Field, values: &Table, key: String, depth: usize) {
-        let value = get(values, field.name);
-        match (field.takes, value) {
-            (ValueType::Table(inner), Some(Value::Table(values))) => {
+    fn field(&mut self, field: &'static Field, node: &dyn KeyNode, key: String, depth: usize) {
+        match field.takes {
+            ValueType::Table(inner) if !node.is_absent() => {
                 for field in inner {
-                    self.field(field, values, format!("{key}.{}", field.name), depth);
+                    if let Some(node) = node.child(field.name) {
+                        self.field(field, node, format!("{key}.{}", field.name), depth);
+                    }
                 }
             }
-            (ValueType::OneOf(_), None) => self.kind(field, None, key, depth),
-            (ValueType::OneOf(kinds), Some(Value::Table(values))) => {
-                let given = kinds.iter().find(|k| values.contains_key(k.name));
-                self.kind(field, given.map(|k| k.name), key.clone(), depth);
-                if let Some(kind) = given {
-                    self.field(kind, values, format!("{key}.{}", kind.name), depth + 1);
+            ValueType::OneOf(kinds) => {
+                let given = given_kind(kinds, node);
+                self.kind(field, given.map(|(kind, _)| kind.name), key.clone(), depth);
+                if let Some((kind, node)) = given {
+                    self.field(kind, node, format!("{key}.{}", kind.name), depth + 1);
                 }
             }
-            (ValueType::ListOf(_), value) => self.steps(field, value, &key, depth),
-            _ => self.leaf(field, value, key, depth),
+            ValueType::ListOf(kinds) => self.steps(field, kinds, node, &key, depth),
+            _ => self.leaf(field, node, key, depth),
         }
     }
 
-    fn steps(&mut self, field: &'static Field, value: Option<&Value>, key: &str, depth: usize) {
-        let ValueType::ListOf(kinds) = field.takes else { return };
-        let list = value.and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    fn steps(
+        &mut self,
+        field: &'static Field,
+        kinds: &'static [Field],
+        list: &dyn KeyNode,
+        key: &str,
+        depth: usize,
+    ) {
+        let steps: Vec<_> = (0..).map_while(|i: usize| list.child(&i.to_string())).collect();
         let mut row = self.row(field, key.to_string(), depth);
         row.entry = Widget::List;
-        row.value = match list.len() {
+        row.value = match steps.len() {
             0 => String::new(),
             1 => "1 step".to_string(),
             n => format!("{n} steps"),
         };
         row.words = words(kinds);
-        row.is_default = list.is_empty();
+        row.is_default = steps.is_empty();
         self.rows.push(row);
-        for (i, step) in list.iter().enumerate() {
-            let Some(values) = step.as_table() else { continue };
-            let given = kinds.iter().find(|k| values.contains_key(k.name));
-            let Some(kind) = given else { continue };
+        for (i, step) in steps.into_iter().enumerate() {
+            let Some((kind, node)) = given_kind(kinds, step) else { continue };
             let from = self.rows.len();
-            self.field(kind, values, format!("{key}.{i}.{}", kind.name), depth + 1);
+            self.field(kind, node, format!("{key}.{i}.{}", kind.name), depth + 1);
             for row in &mut self.rows[from..] {
                 row.label = format!("{} {}", i + 1, row.label);
             }
@@ -184,38 +180,37 @@ impl PropertyWalker<'_> {
         self.rows.push(row);
     }
 
-    fn leaf(&mut self, field: &'static Field, value: Option<&Value>, key: String, depth: usize) {
+    fn leaf(&mut self, field: &'static Field, node: &dyn KeyNode, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
-        row.value = value.map_or(String::new(), |value| show(field.takes, value));
+        let value = node.value();
+        row.is_default = match field.preset {
+            DefaultValue::Required => false,
+            DefaultValue::Without(_) => node.is_absent(),
+            DefaultValue::Is(text) => value == parse(field, text).ok(),
+        };
+        if let Some(value) = value {
+            row.value = show(field.takes, &value);
+            row.color = color(field.takes, &value).map(|c| c.0);
+            if let KeyValue::Numbers(numbers) = value {
+                row.components = numbers.into_iter().map(number).collect();
+            }
+        }
         match field.takes {
             ValueType::Text => row.entry = Widget::Text,
             ValueType::Switch => row.entry = Widget::Switch,
             ValueType::Choice(choices) => {
                 row.entry = Widget::Choice;
-                let word =
-                    |c: &crate::value::Choice| Word { name: c.name.into(), doc: c.doc.into() };
+                let word = |c: &Choice| Word { name: c.name.into(), doc: c.doc.into() };
                 row.words = choices.iter().map(word).collect();
             }
-            ValueType::Color(_) => {
-                row.entry = Widget::Color;
-                row.color = value.and_then(color).map(|c| c.0);
-            }
+            ValueType::Color(_) => row.entry = Widget::Color,
             _ => {}
-        }
-        if matches!(row.entry, Widget::Numbers | Widget::Color) {
-            let numbers = value.and_then(floats).unwrap_or_default();
-            row.components = numbers.into_iter().map(number).collect();
         }
         if is_material(self.subject, field) {
             row.entry = Widget::Choice;
             let name = |name: &String| Word { name: name.clone(), doc: String::new() };
             row.words = self.scene.materials.keys().map(name).collect();
         }
-        row.is_default = match field.preset {
-            DefaultValue::Required => false,
-            DefaultValue::Without(_) => value.is_none(),
-            DefaultValue::Is(text) => value == preset(text).as_ref(),
-        };
         self.rows.push(row);
     }
 
@@ -237,6 +232,14 @@ impl PropertyWalker<'_> {
     }
 }
 
+/// Returns the field of the kind that `node` has, and the node of the kind's value.
+fn given_kind<'a>(
+    kinds: &'static [Field],
+    node: &'a dyn KeyNode,
+) -> Option<(&'static Field, &'a dyn KeyNode)> {
+    kinds.iter().find_map(|kind| Some((kind, node.child(kind.name)?)))
+}
+
 /// Returns `true` if the value of `field` in the edit target `subject` is the name of a material.
 pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
     matches!(subject, Target::Object(_)) && field.name == "material"
@@ -247,9 +250,7 @@ pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// Returns a phrase for the accepted values of the type `takes`, such as `3 numbers, not all zero`.
-/// The phrase describes the notation that users type. The manual of the scene format has another
-/// phrase for types whose notation in files differs.
+/// Returns a phrase for the accepted values in the notation that users type.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),
@@ -272,8 +273,8 @@ fn expected(takes: ValueType) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::edit::{outline, set};
+    use crate::testing::mirror_room;
 
     fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
         let rows = rows(scene, subject).unwrap();
@@ -282,7 +283,7 @@ mod tests {
 
     #[test]
     fn rows_flatten_nested_tables_and_show_kinds() {
-        let scene = built_in();
+        let scene = mirror_room();
         let keys = |subject: &Target| -> Vec<String> {
             rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
         };
@@ -320,7 +321,7 @@ mod tests {
     /// Checks that setting a property to the text of its displayed value changes nothing.
     #[test]
     fn every_row_value_can_be_typed_back() {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         let steps = "[{ rotate = { axis = [1, 0, 0], degrees = 5 } }, { scale = 2.0 }]";
         let text = format!(
             "[[object]]\nshape.plane = {{ point = [0, -9, 0], normal = [0, 1, 0] }}\ntransform = {steps}\n"

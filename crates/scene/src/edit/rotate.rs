@@ -2,20 +2,17 @@
 
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
-use crate::value::{floor_log10, rounded_to, sin_cos_degrees, turned};
+use crate::value::{floor_log10, rotated_y, rounded_to, sin_cos_degrees};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
-/// Rotates `subject` by `degrees` about the vertical, counter-clockwise seen from above: an object
-/// about its own centre, a light about the centre of the scene.
+/// Rotates an object about its own centre, or a light about that of the scene, by `degrees` about
+/// the vertical, counter-clockwise seen from above.
 ///
-/// An object without a transform is rotated by the keys of its shape, if the shape has such keys.
-/// Any other object gets two steps at the end of its transform, a rotation and a translation. Later
-/// rotations change these two steps.
-///
-/// # Errors
-/// Fails for targets that cannot be rotated.
-pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
+/// An object with a transform, or with a shape that has no keys for the rotation, gets a rotation
+/// and a translation at the end of its transform, which later rotations change. Fails for other
+/// targets.
+pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("the angle is not a finite number", ""));
     }
@@ -24,39 +21,36 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
         Target::Object(i) => {
             let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
             if !object.transform.is_empty() || !object.shape.rotate_y(degrees) {
-                turn_by_steps(object, degrees);
+                rotate_by_steps(object, degrees);
             }
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
-            if let Some(direction) = light.direction_mut() {
-                *direction = turned(*direction, degrees);
+            let handles = light.kind.handles();
+            for direction in [handles.direction, handles.up].into_iter().flatten() {
+                *direction = rotated_y(*direction, degrees);
             }
-            if let Some(rectangle) = &mut light.rectangle {
-                rectangle.up = turned(rectangle.up, degrees);
-            }
-            if let Some(position) = light.position_mut() {
+            if let Some(position) = handles.position {
                 let pivot = scene_bounds(scene).center;
                 let offset = std::array::from_fn(|i| position[i] - pivot[i]);
-                let offset = turned(offset, degrees);
+                let offset = rotated_y(offset, degrees);
                 let digits = floor_log10(offset[0].hypot(offset[2])) - 6;
                 let coordinate = |i| rounded_to(pivot[i] + offset[i], digits);
                 *position = [coordinate(0), position[1], coordinate(2)];
             }
         }
         _ => {
-            let found = format!("{} cannot be turned", subject.label(scene));
+            let found = format!("{} cannot be rotated", subject.label(scene));
             return Err(EditError::new(&found, "Select an object or a light."));
         }
     }
-    let label = format!("turn {}", subject.label(scene));
+    let label = format!("rotate {}", subject.label(scene));
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Rotates the object about the vertical through its centre. The rotation is written as the steps
-/// `rotate_y` and `translate` at the end of the object's transform. If the transform already ends
-/// with such steps, they are replaced. Steps without effect are removed.
-fn turn_by_steps(object: &mut Object, degrees: f64) {
+/// Rotates the object by the steps `rotate_y` and `translate` at the end of its transform, which
+/// are replaced. Steps without effect are removed.
+fn rotate_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
         [.., TransformOp::RotateY(angle)] => (angle, [0.0; 3], 1),
@@ -93,8 +87,8 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::shape::{KINDS, Shape};
+    use crate::testing::mirror_room;
 
     fn middle(object: &Object) -> DVec3 {
         let (low, high) = object.form().bounds().unwrap();
@@ -102,20 +96,20 @@ mod tests {
     }
 
     #[test]
-    fn turn_changes_the_rotation_key_of_a_shape() {
-        let scene = built_in();
-        let edit = turn(&scene, &Target::Object(3), 5.0).unwrap();
+    fn rotate_changes_the_rotation_key_of_a_shape() {
+        let scene = mirror_room();
+        let edit = rotate(&scene, &Target::Object(3), 5.0).unwrap();
         let Shape::Cube(cube) = &edit.scene.objects[3].shape else { panic!() };
         assert!(cube.rotation == 35.0 && edit.scene.objects[3].transform.is_empty());
-        let edit = turn(&scene, &Target::Object(1), 90.0).unwrap();
+        let edit = rotate(&scene, &Target::Object(1), 90.0).unwrap();
         let Shape::Rectangle(mirror) = &edit.scene.objects[1].shape else { panic!() };
         assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
     }
 
     /// Checks that rotations keep the position of objects of every kind, with and without a
-    /// transform, and that small rotations together change nothing if they add up to a full turn.
+    /// transform, and that small rotations together change nothing if they add up to 360 degrees.
     #[test]
-    fn turn_keeps_the_middle_and_full_turn_is_identity() {
+    fn rotate_keeps_the_middle_and_360_degrees_are_identity() {
         for kind in KINDS {
             let base = DVec3::new(3.0, 0.0, -2.0);
             let shape = Shape::fitted_to(kind.name, base, DVec3::new(1.0, 0.5, 2.0)).unwrap();
@@ -131,14 +125,14 @@ mod tests {
                 let start = Scene { objects: vec![object], ..Scene::default() };
                 let mut scene = start.clone();
                 for _ in 0..72 {
-                    scene = turn(&scene, &Target::Object(0), 5.0).unwrap().scene;
+                    scene = rotate(&scene, &Target::Object(0), 5.0).unwrap().scene;
                     let steps = scene.objects[0].transform.len();
                     assert!(steps <= 3, "{}: {steps} steps", kind.name);
                 }
                 if kind.name != "plane" {
                     let (a, b) = (middle(&start.objects[0]), middle(&scene.objects[0]));
                     assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
-                    let half = turn(&start, &Target::Object(0), 180.0).unwrap().scene;
+                    let half = rotate(&start, &Target::Object(0), 180.0).unwrap().scene;
                     let c = middle(&half.objects[0]);
                     // The bounding box of an irregular object gets another centre when the object
                     // rotates.
@@ -153,15 +147,15 @@ mod tests {
     }
 
     #[test]
-    fn turn_rotates_lights_about_the_scene() {
-        let scene = built_in();
+    fn rotate_rotates_lights_about_the_scene() {
+        let scene = mirror_room();
         let mut round = scene.clone();
         for _ in 0..72 {
-            round = turn(&round, &Target::Light(0), 5.0).unwrap().scene;
+            round = rotate(&round, &Target::Light(0), 5.0).unwrap().scene;
         }
-        let [a, b] = [&scene, &round].map(|s| DVec3::from(s.lights[0].point.unwrap().position));
+        let [a, b] = [&scene, &round].map(|s| s.lights[0].apex().unwrap());
         assert!((a - b).length() < 1e-4, "{a} {b}");
-        assert!(turn(&scene, &Target::Camera, 5.0).is_err());
-        assert!(turn(&scene, &Target::Light(0), f64::NAN).is_err());
+        assert!(rotate(&scene, &Target::Camera, 5.0).is_err());
+        assert!(rotate(&scene, &Target::Light(0), f64::NAN).is_err());
     }
 }

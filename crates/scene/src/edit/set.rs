@@ -1,66 +1,50 @@
 //! Edits that set one value by typed text.
 
 use crate::Scene;
+use crate::TransformOp;
 use crate::edit::convert;
 use crate::edit::convert::{AIM, KIND};
-use crate::edit::parse_value::{floats, parse, word};
+use crate::edit::parse_value::{parse, word};
+use crate::edit::part::{exclusive_keys, field, fields, part, part_mut};
 use crate::edit::properties::is_material;
-use crate::edit::toml_view::{exclusive_keys, field, fields, get, insert_value, read, write};
 use crate::edit::{Edit, EditError, Target};
-use crate::value::{DefaultValue, Field, ValueType};
-use toml::{Table, Value};
+use crate::value::{DefaultValue, Field, KeyNode, KeyValue, ValueType, node_at, node_at_mut};
 
-/// Sets `key` of `subject` to the value in `text`. `key` is the key of one of the
-/// [`Property`](crate::edit::Property) rows of `subject`. For the list of transform steps,
-/// `text` is the kind of a step, which is appended. An empty `text` sets an optional key to its
-/// default, and removes a step of a transform, such as `transform.0.rotate_y`.
-///
-/// # Errors
-/// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
-/// be invalid.
+/// Sets `key` of `subject` to the value in `text`. A kind of transform step is appended to a list.
+/// An empty `text` sets an optional key to its default, and removes a transform step. Returns the
+/// reason and the accepted values if this is refused.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
-    let values = read(scene, subject)?;
+    part(scene, subject)?;
     let field = lookup(subject, key)?;
     let optional = matches!(field.preset, DefaultValue::Without(_));
-    match field.takes {
-        ValueType::OneOf(kinds) if !(text.is_empty() && optional) => {
-            let name = word(field, text, kinds.iter().map(|k| k.name))?;
-            return convert::switch(scene, subject, key, name);
-        }
-        ValueType::ListOf(steps) => {
-            let mut object = values;
-            match text {
-                "" => drop(object.remove(key)),
-                _ => {
-                    let name = word(field, text, steps.iter().map(|k| k.name))?;
-                    convert::append_step(&mut object, key, name);
-                }
-            }
-            return finish(scene, subject, key, object);
-        }
-        _ => {}
+    if text.is_empty() && !matches!(field.takes, ValueType::OneOf(_) if !optional) {
+        return clear(scene, subject, key, field);
     }
-    if text.is_empty() {
-        return clear(scene, subject, key, field, values);
+    if let ValueType::OneOf(kinds) = field.takes {
+        let name = word(field, text, kinds.iter().map(|k| k.name))?;
+        return convert::switch(scene, subject, key, name);
+    }
+    if let (Target::Object(i), ValueType::ListOf(steps)) = (subject, field.takes) {
+        let name = word(field, text, steps.iter().map(|k| k.name))?;
+        let is_named = |step: &TransformOp| step.value() == Some(KeyValue::Text(name.to_string()));
+        let mut next = scene.clone();
+        next.objects[*i].transform.extend(TransformOp::IDENTITIES.into_iter().find(is_named));
+        return Edit::checked(next, subject.clone(), label(scene, subject, key));
     }
     let value = if is_material(subject, field) {
         let names = scene.materials.keys().map(String::as_str);
-        Value::from(word(field, text.trim_matches('"'), names)?)
+        KeyValue::Text(word(field, text.trim_matches('"'), names)?.to_string())
     } else {
         parse(field, text)?
     };
     if let (Target::Light(i), "falloff") = (subject, key) {
-        return convert::switch_falloff(scene, *i, values, value);
+        return convert::switch_falloff(scene, *i, value);
     }
-    replace(scene, subject, key, values, value)
+    replace(scene, subject, key, value)
 }
 
-/// Sets one number of the value of `key` to `text`; `component` is the number's index, counted from
-/// 0.
-///
-/// # Errors
-/// Returns the errors of [`set`].
+/// Sets the number at index `component` of the value of `key`.
 pub fn set_component(
     scene: &Scene,
     subject: &Target,
@@ -68,14 +52,15 @@ pub fn set_component(
     component: usize,
     text: &str,
 ) -> Result<Edit, EditError> {
-    let values = read(scene, subject)?;
-    let list = get(&values, key).and_then(floats).unwrap_or_default();
+    let list = match node_at(part(scene, subject)?, key).and_then(KeyNode::value) {
+        Some(KeyValue::Numbers(list)) => list,
+        Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
+    };
     if component >= list.len() {
         return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
-    // The whole list is parsed again, so that the rules and error messages for lists apply to the
-    // new number, too.
+    // Parsing the whole list applies its rules and messages to the new number.
     let parts: Vec<_> = list
         .iter()
         .enumerate()
@@ -88,8 +73,7 @@ pub fn set_component(
     set(scene, subject, key, &parts.join(" "))
 }
 
-/// Returns the field of `key`, including `kind` of a light and `aim` of a camera, which are no keys
-/// of scene files. Fails if `subject` has no such key.
+/// Returns the field of `key`, including [`KIND`] and [`AIM`].
 pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, EditError> {
     match (subject, key) {
         (Target::Light(_), "kind") => Ok(&KIND),
@@ -99,67 +83,52 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, Edit
     }
 }
 
-/// Sets `key` to `value`, removes the keys that cannot be given together with `key`, and validates
-/// the edited scene. `values` has the present values of the keys of `subject`.
+/// Sets `key` to `value` and removes the keys that cannot be given together with it.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
     key: &str,
-    mut values: Table,
-    value: Value,
+    value: KeyValue,
 ) -> Result<Edit, EditError> {
+    let mut next = scene.clone();
+    let part = part_mut(&mut next, subject)?;
     let mut gone = None;
     let first = key.split('.').next().unwrap_or(key);
-    if exclusive_keys(subject).contains(&first) {
-        for rival in exclusive_keys(subject).iter().filter(|rival| **rival != first) {
-            gone = values.remove(*rival).map(|_| *rival).or(gone);
+    let exclusive = exclusive_keys(subject);
+    if exclusive.contains(&first) {
+        for rival in exclusive.iter().filter(|rival| **rival != first) {
+            if let Some(node) = part.child_mut(rival).filter(|node| !node.is_absent()) {
+                node.make_absent();
+                gone = Some(rival);
+            }
         }
     }
-    if !insert_value(&mut values, key, Some(value)) {
+    if !node_at_mut(part, key).is_some_and(|node| node.set_value(value)) {
         return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
     let note = gone.map(|rival| format!("{first} replaces {rival}."));
-    Ok(finish(scene, subject, key, values)?.with_note(note))
+    Ok(Edit::checked(next, subject.clone(), label(scene, subject, key))?.with_note(note))
 }
 
-/// Removes the optional `key` from `values`, the present values of the keys of `subject`; the key
-/// then has its default. If `key` is a step of a transform, such as `transform.0.rotate_y`, removes
-/// this step from the list instead. `field` describes the key.
-///
-/// # Errors
-/// Fails if the key is required, if there is no such step, or if the edited scene would be invalid.
-fn clear(
-    scene: &Scene,
-    subject: &Target,
-    key: &str,
-    field: &Field,
-    mut values: Table,
-) -> Result<Edit, EditError> {
-    let parts: Vec<_> = key.split('.').collect();
-    if let ["transform", index, ..] = parts[..] {
-        let list = values.get_mut("transform").and_then(Value::as_array_mut);
-        match (list, index.parse::<usize>()) {
-            (Some(list), Ok(i)) if i < list.len() => drop(list.remove(i)),
+/// Gives the optional `key` its default, or removes the transform step that it names.
+fn clear(scene: &Scene, subject: &Target, key: &str, field: &Field) -> Result<Edit, EditError> {
+    let mut next = scene.clone();
+    if let (Target::Object(object), Some(step)) = (subject, key.strip_prefix("transform.")) {
+        let steps = &mut next.objects[*object].transform;
+        match step.split('.').next().and_then(|index| index.parse::<usize>().ok()) {
+            Some(i) if i < steps.len() => drop(steps.remove(i)),
             _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
         }
-    } else if field.preset == DefaultValue::Required {
-        let found = format!("{} must not be left out", field.name);
-        return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
-    } else {
-        insert_value(&mut values, key, None);
+    } else if let Some(node) = node_at_mut(part_mut(&mut next, subject)?, key) {
+        match field.preset {
+            DefaultValue::Required => {
+                let found = format!("{} must not be left out", field.name);
+                return Err(EditError::new(&found, &format!("Expected {}.", field.takes)));
+            }
+            DefaultValue::Is(text) => drop(node.set_value(parse(field, text)?)),
+            DefaultValue::Without(_) => node.make_absent(),
+        }
     }
-    finish(scene, subject, key, values)
-}
-
-/// Creates the edit that replaces the values of the keys of `subject` by `values`, and validates
-/// the edited scene. `key` is the key that changed; it names the edit in the undo history.
-pub(super) fn finish(
-    scene: &Scene,
-    subject: &Target,
-    key: &str,
-    values: Table,
-) -> Result<Edit, EditError> {
-    let next = write(scene, subject, values)?;
     Edit::checked(next, subject.clone(), label(scene, subject, key))
 }
 
@@ -172,20 +141,20 @@ pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::built_in;
     use crate::shape::Shape;
+    use crate::testing::mirror_room;
 
     fn ball() -> Target {
         Target::Object(2)
     }
 
     fn refused(subject: &Target, key: &str, text: &str) -> String {
-        set(&built_in(), subject, key, text).unwrap_err().to_string()
+        set(&mirror_room(), subject, key, text).unwrap_err().to_string()
     }
 
     #[test]
     fn typed_values_are_set() {
-        let scene = built_in();
+        let scene = mirror_room();
         let edit = set(&scene, &ball(), "shape.sphere.radius", " .75").unwrap();
         assert_eq!(edit.label, "radius of ball");
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
@@ -221,15 +190,17 @@ mod tests {
             let message = refused(&subject, key, text);
             assert!(message.contains(words), "{message}");
         }
-        let one = set_component(&built_in(), &ball(), "shape.sphere.center", 3, "1").unwrap_err();
+        let one =
+            set_component(&mirror_room(), &ball(), "shape.sphere.center", 3, "1").unwrap_err();
         assert!(one.found.contains("has no number 4"), "{one}");
-        let two = set_component(&built_in(), &ball(), "shape.sphere.center", 0, "1 2").unwrap_err();
+        let two =
+            set_component(&mirror_room(), &ball(), "shape.sphere.center", 0, "1 2").unwrap_err();
         assert!(two.help.contains("one number"), "{two}");
     }
 
     #[test]
     fn empty_text_restores_the_default() {
-        let scene = built_in();
+        let scene = mirror_room();
         let red = Target::Material("red".into());
         let edit = set(&scene, &red, "exponent", "").unwrap();
         assert_eq!(edit.scene.materials["red"].exponent, 32.0);
@@ -241,7 +212,7 @@ mod tests {
 
     #[test]
     fn setting_a_key_removes_exclusive_keys() {
-        let scene = built_in();
+        let scene = mirror_room();
         let red = Target::Material("red".into());
         let gold = set(&scene, &red, "metal", "gold").unwrap().scene;
         let edit = set(&gold, &red, "f0", "0.5 0.5 0.5").unwrap();
@@ -253,16 +224,16 @@ mod tests {
 
     #[test]
     fn transform_steps_are_appended_and_removed() {
-        let scene = built_in();
-        let turned = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
-        let turned = set(&turned, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
-        let moved = set(&turned, &ball(), "transform", "tr").unwrap().scene;
+        let scene = mirror_room();
+        let rotated = set(&scene, &ball(), "transform", "rotate_y").unwrap().scene;
+        let rotated = set(&rotated, &ball(), "transform.0.rotate_y", "30").unwrap().scene;
+        let moved = set(&rotated, &ball(), "transform", "tr").unwrap().scene;
         let moved = set(&moved, &ball(), "transform", "rotate").unwrap().scene;
         assert_eq!(moved.objects[2].transform.len(), 3);
         let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "5").unwrap().scene;
         let moved = set(&moved, &ball(), "transform.2.rotate.degrees", "").unwrap().scene;
         let back = set(&moved, &ball(), "transform.1.translate", "").unwrap().scene;
-        assert_eq!(back, turned);
+        assert_eq!(back, rotated);
         assert_eq!(set(&back, &ball(), "transform", "").unwrap().scene, scene);
         assert!(set(&back, &ball(), "transform.7.rotate_y", "").is_err());
         assert!(set(&back, &ball(), "transform.7.rotate_y", "1").is_err());

@@ -3,7 +3,6 @@
 pub(crate) mod comments;
 pub(crate) mod emit;
 pub(crate) mod list_diff;
-pub(crate) mod migrate;
 pub(crate) mod parts;
 pub(crate) mod patch;
 pub(crate) mod read;

@@ -1,12 +1,11 @@
 //! Reading of scene files: from text to a validated scene.
 
 use crate::diagnostic::{Diagnostic, FirstDiagnostics, SceneErrors};
-use crate::format::migrate::{self, FormerWord, migrate};
 use crate::format::parts::{PART_BYTES, Part, split};
 use crate::format::schema;
-use crate::format::source_map::{line_column, locate, subject_in};
+use crate::format::source_map::{line_column, locate};
 use crate::process_memory::missing_memory;
-use crate::value::{TomlError, TomlValue, sort_by_number};
+use crate::value::{TomlError, TomlValue};
 use crate::{AssetResolver, Document, Object, Scene};
 use std::fs::File;
 use std::io::{self, Read};
@@ -15,63 +14,42 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Size of the largest scene file that is read [bytes]. A file of this size has about four million
-/// objects.
+/// Size of the largest scene file [bytes]: about four million objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
-/// Estimated peak memory per byte of a scene file, in bytes. The peak occurs while the file is read
-/// and its objects are converted for rendering. A million spheres in 53 MB take 768 MB. Files with
-/// shorter objects take more per byte.
+/// Estimated peak memory per byte of a scene file, while its objects are converted for rendering. A
+/// million spheres in 53 MB take 768 MB; shorter objects take more per byte.
 const SCENE_BYTES: u64 = 20;
 
 impl Scene {
-    /// Reads and validates the scene file at `path`.
-    ///
-    /// # Errors
-    /// Returns the first 100 errors, with line and column: not readable, not UTF-8, not TOML,
-    /// unknown keys, wrong types, values out of range, undefined names. Values are validated only
-    /// if there are no errors in keys and types.
+    /// Reads and validates the scene file at `path`. Returns the first 100 errors, with line and
+    /// column. Values are validated only without errors in keys and types.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         Document::read(path, Arc::default()).map(Document::into_scene)
     }
 
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
-    /// in the scene are relative to the folder of `name`.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics, to whose folder file
+    /// names are relative. Returns the errors of [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    /// Parses and validates a scene like [`Scene::parse`]. `resolver` reads the files that the
-    /// scene refers to.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses a scene like [`Scene::parse`]; `resolver` reads the files that it refers to.
     pub fn parse_in(text: &str, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         SourceScene::parse(text, name, resolver).map(|source| source.scene)
     }
 }
 
-/// Valid scene and the text that describes it. The text has been parsed once, part by part, and the
-/// scene has been validated once.
+/// Valid scene, and the text that describes it.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
-    pub former_words: Vec<FormerWord>,
-    /// First of the `former_words` in the file, with the name of its table in diagnostics. `None`
-    /// if there are no former words.
-    first_word: Option<(FormerWord, String)>,
     name: &'a str,
     text: &'a str,
     parts: Vec<Part>,
 }
 
 impl<'a> SourceScene<'a> {
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics.
     pub(crate) fn parse(
         text: &'a str,
         name: &'a str,
@@ -87,17 +65,9 @@ impl<'a> SourceScene<'a> {
         resolver: AssetResolver,
         parts: Vec<Part>,
     ) -> Result<Self, SceneErrors> {
-        let mut source = Self {
-            scene: Scene::default(),
-            former_words: Vec::new(),
-            first_word: None,
-            name,
-            text,
-            parts,
-        };
+        let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
-            // The objects outside of `[[object]]` sections belong to the same list; the file is
-            // therefore parsed again as a whole.
+            // The other objects belong to the same list: the file is parsed again as a whole.
             return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
@@ -112,9 +82,8 @@ impl<'a> SourceScene<'a> {
         Err(SceneErrors::new(errors.located((name, text))))
     }
 
-    /// Reads the scene from the parts of the text and checks keys and types. Values are validated
-    /// later. Returns `false` if the file has objects outside of `[[object]]` sections and must
-    /// therefore be read as a whole.
+    /// Reads the parts and checks keys and types. Returns `false` if the file has objects outside
+    /// `[[object]]` sections and must be read as a whole.
     fn read_parts(&mut self) -> Result<bool, SceneErrors> {
         let (name, text) = (self.name, self.text);
         let mut errors = FirstDiagnostics::default();
@@ -122,7 +91,7 @@ impl<'a> SourceScene<'a> {
         let is_split = self.parts.len() > 1;
         for (number, part) in self.parts.iter().enumerate() {
             let part_text = part.text(text);
-            let (mut root, part_syntax) = DeTable::parse_recoverable(&part_text);
+            let (root, part_syntax) = DeTable::parse_recoverable(&part_text);
             let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
             if let Some(error) = part_syntax.iter().min_by_key(|error| start(error)) {
                 let at = part.in_file(start(error));
@@ -144,14 +113,6 @@ impl<'a> SourceScene<'a> {
                     "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
                 ));
             }
-            let words = migrate(text, root.get_mut(), part, &mut errors);
-            if let Some(word) = words.iter().min_by_key(|word| word.start)
-                && self.first_word.as_ref().is_none_or(|(first, _)| word.start < first.start)
-            {
-                let subject = subject_in(root.get_ref(), &word.table, part.first_object);
-                self.first_word = Some((word.clone(), subject));
-            }
-            self.former_words.extend(words);
             schema::check(&root, part, &mut errors);
             if !errors.is_empty() {
                 continue;
@@ -177,22 +138,11 @@ impl<'a> SourceScene<'a> {
         Ok(true)
     }
 
-    /// Returns the warnings about doubtful values and about former names of keys and values, sorted
-    /// by location.
+    /// Returns the warnings about doubtful values, sorted by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let mut found = FirstDiagnostics::default();
         locate(self.text, &self.parts, self.scene.warnings(), &mut found);
-        let mut warnings = found.located((self.name, self.text)).0;
-        warnings.extend(self.migration_warning());
-        let place = |(line, column): (usize, usize)| (line << 32 | column) as i64;
-        sort_by_number(&mut warnings, |warning| warning.line_column.map_or(0, place));
-        warnings
-    }
-
-    /// Returns the warning about former names of keys and values; `None` if the file has none.
-    pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
-        let first = self.first_word.as_ref()?;
-        Some(migrate::warning((self.name, self.text), first, self.former_words.len()))
+        found.located((self.name, self.text)).0
     }
 }
 
@@ -241,8 +191,7 @@ pub(crate) fn read_text(
         return Err(fail(&format!("the scene {missing}"), help));
     }
     let mut bytes = Vec::new();
-    // Reading stops one byte above the limit: this byte shows that a file is too large, and an
-    // endless device is not read for ever.
+    // The byte above the limit shows that a file is too large, or an endless device.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(
@@ -314,13 +263,11 @@ mod tests {
     #[test]
     fn parts_agree_with_the_whole_in_special_cases() {
         let ball = "shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
-        let former = "shape.unit_cylinder = { s = 0.5 }\n";
         for text in [
             format!("object = []\n[[object]]\n{ball}"),
             format!("[[object]]\n{ball}[[\"object\"]]\n{ball}"),
             format!("[[object]]\n{ball}[materials.a]\n[object.x]\n"),
             format!("[[object]]\n{ball}[[object]]\nname = 'a\n[[object]]\n{ball}"),
-            format!("[[object]]\n{former}[[object]]\nname = \"b\"\n{former}"),
             format!("[[object]]\nradius = 1\n[[object]]\nname = \"b\"\nsize = 2\n{ball}"),
             format!("[[object]]\n{ball}[[object]]\n{ball}material = \"gold\"\n[[object]]\n"),
             format!("[[object]]\n{ball}name = \"a\"\n[[object]]\n{ball}name = \"a\"\n"),

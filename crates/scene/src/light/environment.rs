@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::Light;
+use crate::light::{Handles, LightDesc, LightForm, LightSample, Placement};
 use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -44,27 +44,12 @@ impl Environment {
     /// Returns the image of the environment; `None` for a gradient, or if no readable file has been
     /// loaded.
     pub fn map(&self) -> Option<&Arc<RadianceMap>> {
-        self.file().and(self.map.content())
+        self.map.content()
     }
 
-    /// Calls `load` with the name of the image and stores the result. Does nothing for a gradient,
-    /// or if an image or an error is stored already.
+    /// Reads the image by `load`, unless it is loaded already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
-        if !self.file.is_empty() {
-            self.map.resolve(|| load(&self.file));
-        }
-    }
-
-    /// Copies the image from `other` if both name the same file.
-    pub fn resolve_as(&mut self, other: &Self) {
-        if self.file == other.file {
-            self.map = other.map.clone();
-        }
-    }
-
-    /// Returns the error of reading the environment image; `None` if there was none.
-    pub(super) fn fault(&self) -> Option<ValidationError> {
-        self.file().and_then(|_| self.map.fault())
+        self.map.resolve(&self.file, load);
     }
 
     /// Returns an image of the gradient, with a single column, because the radiance depends on the
@@ -80,6 +65,25 @@ impl Environment {
     }
 }
 
+impl LightDesc for Environment {
+    fn form(&self) -> LightForm<'_> {
+        LightForm::Environment(self)
+    }
+
+    /// Returns the error of reading the image, if there was one.
+    fn faults(&self) -> Vec<ValidationError> {
+        self.file().and_then(|_| self.map.fault()).into_iter().collect()
+    }
+
+    fn handles(&mut self) -> Handles<'_> {
+        Handles::default()
+    }
+
+    fn placed(_: &Placement) -> Self {
+        Self::default()
+    }
+}
+
 /// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
@@ -87,23 +91,9 @@ pub struct EnvironmentLight {
     rotation: (f64, f64),
 }
 
-/// Light that arrives from sampled directions of an environment, one direction per lane.
-#[derive(Clone, Copy, Debug)]
-pub struct EnvironmentSample<L> {
-    /// Unit vector towards the environment, from which the light arrives.
-    pub wi: Vec3<L>,
-    /// Probability density \[1/sr\] with which the direction `wi` is sampled.
-    pub density: L,
-    /// Estimate of the irradiance from one sample: the radiance of the environment divided by
-    /// `density`.
-    pub irradiance: Vec3<L>,
-}
-
 impl EnvironmentLight {
-    /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
-    /// its image is not loaded.
-    pub fn new(light: &Light) -> Option<Self> {
-        let environment = light.environment.as_ref()?;
+    /// Compiles `environment`. Returns `None` if its image is not loaded.
+    pub fn new(environment: &Environment) -> Option<Self> {
         let map = match environment.file() {
             Some(_) => environment.map()?.clone(),
             None => Arc::new(environment.gradient()),
@@ -145,7 +135,7 @@ impl EnvironmentLight {
     /// Samples a direction for each of `lanes`, with a density in proportion to the environment's
     /// luminance. In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
     #[inline(never)]
-    pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> EnvironmentSample<L> {
+    pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> LightSample<L> {
         let (sin, cos) = self.rotation;
         let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
         let mut density = [1.0; MAX_WIDTH];
@@ -156,10 +146,11 @@ impl EnvironmentLight {
             irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
             density[lane] = p;
         });
-        EnvironmentSample {
+        LightSample {
             wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
-            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
+            distance: L::from_f64(L::MAX),
             irradiance: Vec3::from_fn(|lane| irradiance[lane].map(L::Scalar::from_f64)),
+            density: L::from_fn(|lane| L::Scalar::from_f64(density[lane])),
         }
     }
 }
@@ -180,8 +171,7 @@ mod tests {
     use zerkalo_kernel::lanes::Double;
 
     fn light(environment: Environment) -> EnvironmentLight {
-        let light = Light { environment: Some(environment), ..Light::default() };
-        EnvironmentLight::new(&light).expect("an environment")
+        EnvironmentLight::new(&environment).expect("an environment")
     }
 
     fn radiance(light: &EnvironmentLight, direction: [f64; 3]) -> [f64; 3] {

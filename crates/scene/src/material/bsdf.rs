@@ -1,77 +1,71 @@
-//! Compiled BSDF: its construction from a material, evaluation of highlights, sampling of
-//! reflections. Rough transmission is sampled in `rough_interface.rs`.
+//! Compiled BSDF: its construction from a material, highlights, and the reflection lobe with
+//! `sample`, `eval`, `pdf` and `is_delta`. `rough_interface.rs` adds transmission.
 
 use crate::material::fresnel::Reflectance;
-use crate::material::microfacet::{MicrofacetDistribution, MicrofacetEval, SMOOTH_ALPHA};
+use crate::material::microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
 use crate::material::{Fresnel, Highlight, Lobe, Material};
 use std::f64::consts::FRAC_1_PI;
 use zerkalo_kernel::lanes::{Float, Frame, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
 
-/// Largest Phong exponent alpha for which the power cos^alpha is computed from a cosine. In single
-/// precision the relative error of this power is about alpha times 1.5e-7. For larger exponents the
-/// power is computed from a tangent.
-pub const SHARP_EXPONENT: f64 = 1024.0;
+/// Largest Phong exponent alpha for which the power cos^alpha is computed from a cosine, with a
+/// relative error of about alpha times 1.5e-7 in single precision. For larger exponents the power is
+/// computed from a tangent.
+const SHARP_EXPONENT: f64 = 1024.0;
 
-/// Model of highlights (the reflections of lights in a surface), compiled for the kernels.
+/// Model of highlights, the reflections of lights in a surface.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
     /// No highlights.
     None,
     /// Phong's model: k_s (R.V)^alpha / pi.
     Phong {
-        /// Specular coefficient k_s of Phong's model.
+        /// Specular coefficient k_s.
         strength: S,
-        /// Phong exponent alpha.
+        /// Exponent alpha.
         exponent: S,
-        /// `true` if the exponent alpha exceeds `SHARP_EXPONENT`. The power is then computed from a
-        /// tangent instead of a cosine.
+        /// `true` if alpha exceeds `SHARP_EXPONENT`.
         sharp: bool,
     },
     /// Microfacet model: k_s D G F / (4 N.L N.V).
     MicrofacetDistribution {
-        /// Specular coefficient k_s of the microfacet model.
+        /// Specular coefficient k_s.
         strength: S,
-        /// Microfacet distribution, which gives D and G of the formula.
+        /// Distribution that gives D and G.
         facets: MicrofacetDistribution<S>,
     },
 }
 
-/// Distribution of the directions of reflected rays about the mirror direction, compiled for the
-/// kernels.
+/// Distribution of the directions of reflected rays about the mirror direction, and of transmitted
+/// rays about the refracted direction.
 #[derive(Clone, Copy, Debug)]
 pub enum ReflectionLobe<S> {
-    /// Mirror: all reflected rays have the mirror direction.
+    /// Mirror or clear glass: no spread.
     Mirror,
-    /// Uniform directions in a cone about the mirror direction.
+    /// Uniform directions in a cone.
     Cone {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
     },
-    /// Directions through uniform points of a square. The square is at unit distance along the
-    /// mirror direction and perpendicular to it.
+    /// Directions through uniform points of a square, perpendicular to the axis at unit distance.
     Square {
-        /// Side length of the square at unit distance.
+        /// Side length of the square.
         side: S,
     },
-    /// Mirror reflection at visible microfacets with this distribution of normals.
+    /// Reflection and refraction at visible microfacets.
     MicrofacetDistribution(MicrofacetDistribution<S>),
 }
 
-/// Transmission of light through a surface, compiled for the kernels.
+/// Transmission of light through a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission<S> {
-    /// Transmission coefficient k_t of the material.
+    /// Transmission coefficient k_t.
     pub strength: S,
     /// Index of refraction inside of the solid that the surface bounds.
     pub index: S,
     /// Absorption coefficients [1 / scene unit] inside of the solid; 0 absorbs nothing.
     pub absorption: [S; 3],
-    /// Distribution of the transmitted rays about the refracted direction. With `Mirror`, all of
-    /// them have the refracted direction, as in clear glass.
-    pub lobe: ReflectionLobe<S>,
-    /// `true` if Fresnel's equations split the light between reflection and transmission; `false`
-    /// if k_r and k_t alone are the weights.
+    /// `true` if Fresnel's equations split the light; `false` if k_r and k_t alone are the weights.
     pub dielectric: bool,
 }
 
@@ -82,40 +76,40 @@ pub struct Bsdf<S> {
     pub ambient: [S; 3],
     /// Diffuse coefficient times the material's colour.
     pub diffuse: [S; 3],
-    /// Model of highlights, which are the reflections of lights in the surface.
+    /// Model of highlights.
     pub specular: SpecularModel<S>,
-    /// Reflection coefficient k_r, and the distribution of reflected rays; `None` if the material
-    /// reflects no rays.
-    pub reflection: Option<(S, ReflectionLobe<S>)>,
+    /// Reflection coefficient k_r; `None` if the material reflects no rays.
+    pub reflection: Option<S>,
     /// Transmission through the surface; `None` if the material is opaque.
     pub transmission: Option<Transmission<S>>,
-    /// Fresnel reflectance of the microfacets in a highlight. Highlights by Phong's model do not
-    /// use it.
+    /// Distribution of reflected and transmitted rays.
+    pub lobe: ReflectionLobe<S>,
+    /// Fresnel reflectance of the microfacets in a highlight.
     pub highlight_fresnel: Reflectance<S>,
     /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
-    /// reflectance is computed at each intersection because it depends on the medium on the other
-    /// side of the surface.
+    /// reflectance depends on the medium on the other side of the surface.
     pub reflection_fresnel: Reflectance<S>,
-    /// `true` if the surface has a diffuse part or highlights, so that it reflects light that
-    /// arrives directly from lights.
+    /// `true` if the surface has a diffuse part or highlights.
     pub has_direct: bool,
-    /// `true` if the back of a surface has the same material as its front. `false` if the back has
-    /// no diffuse part, no highlights and no reflection lobe.
+    /// `false` if the back has no diffuse part, no highlights and no reflection lobe.
     pub two_sided: bool,
 }
 
 /// Returns 1 - cos(atan(r)), computed without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
-pub fn one_minus_cos_of_tan(r: f64) -> f64 {
+fn one_minus_cos_of_tan(r: f64) -> f64 {
     let square = r * r;
     if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material` to a BSDF. `reflects` is `true` if the scene traces reflected and
-    /// transmitted rays; otherwise the BSDF has no reflection and no transmission.
+    /// Compiles `material`. Without `reflects`, the BSDF has no reflection and no transmission.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
-        let facets = |ggx| MicrofacetDistribution::new(ggx, alpha, material.masking);
+        let normals = match material.lobe {
+            Lobe::Ggx => FacetNormals::Ggx,
+            Lobe::Mirror | Lobe::Cone | Lobe::Square | Lobe::Beckmann => FacetNormals::Beckmann,
+        };
+        let facets = MicrofacetDistribution::new(normals, alpha, material.masking);
         let strength = S::from_f64(material.specular);
         let specular = match material.highlight {
             _ if material.specular == 0.0 => SpecularModel::None,
@@ -124,10 +118,7 @@ impl<S: Float> Bsdf<S> {
                 exponent: S::from_f64(material.exponent),
                 sharp: material.exponent > SHARP_EXPONENT,
             },
-            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution {
-                strength,
-                facets: facets(material.lobe == Lobe::Ggx),
-            },
+            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution { strength, facets },
         };
         let r = material.roughness;
         let lobe = match material.lobe {
@@ -142,8 +133,7 @@ impl<S: Float> Bsdf<S> {
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
-            Lobe::Beckmann => ReflectionLobe::MicrofacetDistribution(facets(false)),
-            Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets(true)),
+            Lobe::Beckmann | Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets),
         };
         let (k_r, k_t) = (material.reflection, material.transmission);
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
@@ -151,7 +141,6 @@ impl<S: Float> Bsdf<S> {
             strength: S::from_f64(k_t),
             index: S::from_f64(material.ior),
             absorption: material.absorption().map(S::from_f64),
-            lobe,
             dielectric,
         });
         let reflectance = Reflectance::new(material);
@@ -161,8 +150,9 @@ impl<S: Float> Bsdf<S> {
             ambient: material.color.0.map(|c| S::from_f64(c * material.ambient)),
             diffuse: material.color.0.map(|c| S::from_f64(c * material.diffuse)),
             specular,
-            reflection: (reflects && k_r > 0.0).then(|| (S::from_f64(k_r), lobe)),
+            reflection: (reflects && k_r > 0.0).then(|| S::from_f64(k_r)),
             transmission,
+            lobe,
             highlight_fresnel: reflectance,
             reflection_fresnel: if shared { Reflectance::white() } else { reflectance },
             has_direct: !black || material.specular != 0.0,
@@ -171,7 +161,19 @@ impl<S: Float> Bsdf<S> {
     }
 }
 
-/// Direction of a sampled reflected ray, and the factor by which its radiance is multiplied.
+/// Incident rays at surfaces, for which a BSDF is sampled or evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfQuery<L> {
+    /// Unit direction of the incident rays, towards the surface.
+    pub incident: Vec3<L>,
+    /// Unit normal on the side of the incident rays.
+    pub normal: Vec3<L>,
+    /// What happens to directions of a cone or square on the wrong side of the surface: `true`
+    /// mirrors them to the right side, `false` absorbs them.
+    pub fold: bool,
+}
+
+/// Sampled reflected ray.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample<L> {
     /// Unit direction of the reflected ray.
@@ -181,11 +183,19 @@ pub struct BsdfSample<L> {
     pub weight: Vec3<L>,
 }
 
-/// Returns two values: the component of `h` along the unit vector `n`, and the squared tangent of
-/// the angle between `h` and `n`. `h` may have any length.
-///
-/// The tangent is computed from the part of `h` perpendicular to `n`, which keeps full precision at
-/// small angles. It is limited to 1e15, so that terms computed from it are finite.
+/// Value of a BSDF for light from one direction. The weight of a sample in this direction is
+/// `value` divided by `density`.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfValue<L> {
+    /// BSDF [1/sr] times the cosine of the angle of incidence.
+    pub value: Vec3<L>,
+    /// Density [1/sr] with which the direction is sampled.
+    pub density: L,
+}
+
+/// Returns the component of `h`, of any length, along the unit vector `n`, and the squared tangent of
+/// the angle between them. The tangent is computed from the part of `h` perpendicular to `n`, which
+/// keeps full precision at small angles. It is at most 1e15, so that terms of it are finite.
 #[inline(always)]
 pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
@@ -193,11 +203,8 @@ pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
 }
 
-/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and
-/// more.
-///
-/// The cosine is clamped to 1. The dot product of two rounded unit vectors may exceed 1 by a few
-/// rounding errors, and 1.000001^1e6 is 2.7.
+/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and more.
+/// The cosine is clamped to 1, which the dot product of rounded unit vectors may exceed.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
@@ -205,8 +212,7 @@ fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
 }
 
 /// Returns cos^alpha for the angle between the vectors `a` and `b`, which may have any lengths. The
-/// result is 0 for angles of 90 degrees and more. The formula is for alpha above
-/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT).
+/// result is 0 for angles of 90 degrees and more. The formula is for alpha above [`SHARP_EXPONENT`].
 ///
 /// A rounded cosine near 1 determines the angle with low precision. The tangent t = |a x b| / a.b
 /// has full precision there, and cos^alpha = exp(-alpha / 2 ln(1 + t^2)). The logarithm is ln(1 +
@@ -224,9 +230,8 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Samples a unit vector of the lobe `Cone` or `Square` about the direction `axis`. The length of
-/// `axis` is 1 within rounding errors. `u` and `v` are uniform in [0, 1). Returns `axis` for other
-/// lobes.
+/// Samples a unit vector of the lobe `Cone` or `Square` about `axis`, whose length is 1 within
+/// rounding errors. Returns `axis` for other lobes.
 #[inline(always)]
 pub(super) fn spread<L: SimdFloat>(
     lobe: &ReflectionLobe<L::Scalar>,
@@ -242,7 +247,7 @@ pub(super) fn spread<L: SimdFloat>(
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Returns `true` if the surface has highlights, which are reflections of lights.
+    /// Returns `true` if the surface has highlights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
         !matches!(self.specular, SpecularModel::None)
@@ -254,21 +259,28 @@ impl<S: Float> Bsdf<S> {
         absorption.is_some_and(|absorption| absorption != [0.0; 3])
     }
 
-    /// Returns the highlight of a light [1/sr]: the radiance towards `view` divided by the
-    /// irradiance at normal incidence. In the microfacet model it includes the factor `nl`; Phong's
-    /// model has no such factor.
-    ///
-    /// `n`, `view` and `light` are unit vectors away from the surface. `nl` is the cosine between
-    /// `n` and `light`, `nv` that between `n` and `view`.
+    /// Returns `true` if all reflected and transmitted rays have the same direction.
+    #[inline(always)]
+    pub fn is_delta(&self) -> bool {
+        matches!(self.lobe, ReflectionLobe::Mirror)
+    }
+
+    /// Returns k_r.
+    #[inline(always)]
+    pub(super) fn strength<L: SimdFloat<Scalar = S>>(&self) -> L {
+        L::splat(self.reflection.unwrap_or_default())
+    }
+
+    /// Returns the highlight [1/sr] of a light in the unit direction `light`: the radiance that is
+    /// reflected divided by the irradiance at normal incidence. In the microfacet model it includes
+    /// the cosine of the angle of incidence; Phong's model has no such factor.
     #[inline(always)]
     pub fn highlight<L: SimdFloat<Scalar = S>>(
         &self,
-        n: Vec3<L>,
-        view: Vec3<L>,
+        query: &BsdfQuery<L>,
         light: Vec3<L>,
-        nl: L,
-        nv: L,
     ) -> Vec3<L> {
+        let (n, view) = (query.normal, -query.incident);
         match &self.specular {
             SpecularModel::None => Vec3::zero(),
             SpecularModel::Phong { strength, exponent, sharp } => {
@@ -279,10 +291,10 @@ impl<S: Float> Bsdf<S> {
                     let cos = r.dot(view);
                     cosine_power(cos, alpha)
                 };
-                let value = L::splat(*strength) * power * L::from_f64(FRAC_1_PI);
-                Vec3::new(value, value, value)
+                Vec3::gray(L::splat(*strength) * power * L::from_f64(FRAC_1_PI))
             }
             SpecularModel::MicrofacetDistribution { strength, facets } => {
+                let (nl, nv) = (n.dot(light), n.dot(view));
                 // The half vector is not normalised: its squared length is twice its dot product
                 // with `view` or with `light`.
                 let h = view + light;
@@ -290,7 +302,7 @@ impl<S: Float> Bsdf<S> {
                 let h2 = h.length_squared();
                 let (visible, total) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
                 // f N.L = D G F / (4 N.V): the factor N.L cancels.
-                let d: L = facets.density(tan2);
+                let d = facets.density(tan2);
                 let k = L::from_f64(0.25 * strength.to_f64());
                 let value = d * visible * k / (nv * total);
                 let valid = nh.gt(L::zero()) & nv.gt(L::zero());
@@ -299,32 +311,26 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples a reflected ray of `lobe`. Its weight is the product of `strength` (a coefficient of
-    /// the material), the Fresnel reflectance and, for microfacets, the shadowing G / G_1.
-    /// `incident` is the unit direction towards the surface, and `n` is the normal on the viewer's
-    /// side. `uv` are uniform in [0, 1). Directions below the surface have the weight 0. If `fold`
-    /// is `true`, such directions of a cone or square are mirrored to the upper side instead.
+    /// Samples a reflected ray. Its weight is the product of k_r, the Fresnel reflectance and, for
+    /// microfacets, the shadowing G / G_1. `uv` are uniform in [0, 1).
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
-        strength: S,
-        lobe: &ReflectionLobe<S>,
-        incident: Vec3<L>,
-        n: Vec3<L>,
+        query: &BsdfQuery<L>,
         uv: (L, L),
-        fold: bool,
     ) -> BsdfSample<L> {
+        let BsdfQuery { incident, normal: n, fold } = *query;
         let mirror = incident.reflect(n);
-        let k = L::splat(strength);
-        let (direction, weight) = match lobe {
-            ReflectionLobe::Mirror => (mirror, k),
+        let direction = match &self.lobe {
+            ReflectionLobe::Mirror => mirror,
             ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => {
-                (spread(lobe, mirror, uv), k)
+                spread(&self.lobe, mirror, uv)
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
-                return self.sample_microfacet(k, facets, incident, n, uv);
+                return self.sample_microfacet(facets, query, uv);
             }
         };
+        let weight = self.strength();
         let up = direction.dot(n);
         let below = up.le(L::zero());
         let (direction, weight) = if fold {
@@ -332,113 +338,113 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // The normal of the microfacet that reflects this ray is half-way between the direction to
-        // the viewer and that of the reflected ray. The cosine of its angle to either direction is
-        // half the length of the sum of both directions. This length has no cancellation at grazing
-        // angles.
+        // Half the length of the sum of both directions is the cosine of the angle to the normal
+        // half-way between them, without cancellation at grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
     /// Samples the reflection at a visible microfacet of `facets`. The weight of directions below
-    /// the surface is 0, because G is zero there. For other directions it is f N.L / density = k F
-    /// G / G_1, at most `k`. Here `k` is the `strength` of [`Bsdf::sample`], F the Fresnel
-    /// reflectance, and G and G_1 are those of `MicrofacetEval`. The other parameters are those of
-    /// [`Bsdf::sample`].
+    /// the surface is 0, because G is zero there. For other directions it is f N.L / density = k_r
+    /// F G / G_1.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
-        k: L,
         facets: &MicrofacetDistribution<S>,
-        incident: Vec3<L>,
-        n: Vec3<L>,
+        query: &BsdfQuery<L>,
         uv: (L, L),
     ) -> BsdfSample<L> {
-        let frame = Frame::around(n);
-        let view = frame.to_local(-incident);
+        let frame = Frame::around(query.normal);
+        let view = frame.to_local(-query.incident);
         let h = facets.sample_visible(uv, view);
         let vh = view.dot(h);
         let light = h * (vh + vh) - view;
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
-        let weight: L = k * facets.shadowing(h.z, view.z, light.z, vh);
+        let weight = self.strength::<L>() * facets.shadowing(h.z, view.z, light.z, vh);
         BsdfSample {
             direction: frame.to_world(light).renormalize(),
             weight: self.reflection_fresnel.times(|| vh, weight).masked(valid),
         }
     }
 
-    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` if its parameter
-    /// `fold` is `false`, so that no directions are mirrored. Returns `None` for a mirror. All
-    /// directions are unit vectors. The other parameters are those of [`Bsdf::sample`].
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`; 0 for a mirror. If
+    /// the query has no `fold`, it includes directions below the surface, whose weight is 0.
     #[inline(always)]
-    pub fn density<L: SimdFloat<Scalar = S>>(
+    pub fn pdf<L: SimdFloat<Scalar = S>>(&self, query: &BsdfQuery<L>, direction: Vec3<L>) -> L {
+        let density = self.unfolded_pdf(query, direction);
+        match &self.lobe {
+            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } if query.fold => {
+                density + self.unfolded_pdf(query, direction.reflect(query.normal))
+            }
+            ReflectionLobe::Mirror
+            | ReflectionLobe::Cone { .. }
+            | ReflectionLobe::Square { .. }
+            | ReflectionLobe::MicrofacetDistribution(_) => density,
+        }
+    }
+
+    #[inline(always)]
+    fn unfolded_pdf<L: SimdFloat<Scalar = S>>(
         &self,
-        lobe: &ReflectionLobe<S>,
-        incident: Vec3<L>,
-        n: Vec3<L>,
+        query: &BsdfQuery<L>,
         direction: Vec3<L>,
-    ) -> Option<L> {
+    ) -> L {
+        let BsdfQuery { incident, normal: n, .. } = *query;
         let mirror = incident.reflect(n);
-        match lobe {
-            ReflectionLobe::Mirror => None,
+        match &self.lobe {
+            ReflectionLobe::Mirror => L::zero(),
             ReflectionLobe::Cone { one_minus_cos } => {
-                Some(warp::cone_pdf(mirror, direction, L::splat(*one_minus_cos)))
+                warp::cone_pdf(mirror, direction, L::splat(*one_minus_cos))
             }
             ReflectionLobe::Square { side } => {
                 let local = Frame::around(mirror.renormalize()).to_local(direction);
-                Some(warp::square_pdf(local, L::splat(*side)))
+                warp::square_pdf(local, L::splat(*side))
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
                 let h = direction - incident;
                 let (nh, tan2) = along_tan2(h, n);
                 let nv = -incident.dot(n);
-                let d: L = facets.density(tan2);
+                let d = facets.density(tan2);
                 // The squared length of h is twice its dot product with the view.
-                let visible: L = facets.visibility(nh, nv, h.length_squared() * L::from_f64(0.5));
+                let visible = facets.visibility(nh, nv, h.length_squared() * L::from_f64(0.5));
                 let density = d * visible / (nv * L::from_f64(4.0));
-                Some(density.masked(nh.gt(L::zero()) & nv.gt(L::zero())))
+                density.masked(nh.gt(L::zero()) & nv.gt(L::zero()))
             }
         }
     }
 
-    /// Returns two values for light from `direction`: the value [1/sr] of the reflection lobe times
-    /// the cosine between `direction` and the normal, and the density [1/sr] with which
-    /// [`Bsdf::sample`] draws `direction`. The weight of a sample is the first value divided by the
-    /// second. Both are zero for a mirror and for directions below the surface. The other
-    /// parameters are those of [`Bsdf::sample`].
+    /// Returns the value and the density of the reflection lobe for light from `direction`: zero for
+    /// a mirror and for directions below the surface.
     #[inline(always)]
-    pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
+    pub fn eval<L: SimdFloat<Scalar = S>>(
         &self,
-        strength: S,
-        lobe: &ReflectionLobe<S>,
-        incident: Vec3<L>,
-        n: Vec3<L>,
+        query: &BsdfQuery<L>,
         direction: Vec3<L>,
-        fold: bool,
-    ) -> (Vec3<L>, L) {
-        let Some(mut density) = self.density(lobe, incident, n, direction) else {
-            return (Vec3::zero(), L::zero());
-        };
+    ) -> BsdfValue<L> {
+        let BsdfQuery { incident, normal: n, .. } = *query;
+        let density = self.pdf(query, direction);
         let nl = direction.dot(n);
         let above = nl.gt(L::zero());
-        let h = || direction - incident;
-        let k = L::splat(strength);
-        let value = if let ReflectionLobe::MicrofacetDistribution(facets) = lobe {
-            let (h, nv) = (h(), -incident.dot(n));
-            let (nh, tan2) = along_tan2(h, n);
-            let (visible, total) =
-                facets.masking(nh, nv, nl, h.length_squared() * L::from_f64(0.5));
-            let d: L = facets.density(tan2);
-            let value = d * visible * k * L::from_f64(0.25) / (nv * total);
-            value.masked(nh.gt(L::zero()) & nv.gt(L::zero()))
-        } else {
-            if fold && let Some(mirrored) = self.density(lobe, incident, n, direction.reflect(n)) {
-                density += mirrored;
+        let h = direction - incident;
+        let k = self.strength::<L>();
+        let value = match &self.lobe {
+            ReflectionLobe::Mirror => L::zero(),
+            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => k * density,
+            ReflectionLobe::MicrofacetDistribution(facets) => {
+                let nv = -incident.dot(n);
+                let (nh, tan2) = along_tan2(h, n);
+                let (visible, total) =
+                    facets.masking(nh, nv, nl, h.length_squared() * L::from_f64(0.5));
+                let d = facets.density(tan2);
+                let value = d * visible * k * L::from_f64(0.25) / (nv * total);
+                value.masked(nh.gt(L::zero()) & nv.gt(L::zero()))
             }
-            k * density
         };
-        let cos = || (h().length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
-        (self.reflection_fresnel.times(cos, value).masked(above), density.masked(above))
+        let cos = || (h.length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
+        BsdfValue {
+            value: self.reflection_fresnel.times(cos, value).masked(above),
+            density: density.masked(above),
+        }
     }
 }

@@ -23,10 +23,9 @@ pub fn f0_from_index(n: f64) -> f64 {
 pub struct Reflectance<S> {
     mode: Fresnel,
     f0: [S; 3],
-    /// Squared index of refraction minus 1, per channel, for the modes `Exact` and `Dielectric`.
+    /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
-    /// Channels with an infinite index of refraction (F0 = 1), whose reflectance is 1 at every
-    /// angle.
+    /// Channels with an infinite index of refraction (F0 = 1).
     total: [bool; 3],
 }
 
@@ -55,8 +54,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at an angle of incidence. `c` returns the cosine of
-    /// this angle. It is not called if the reflectance is the same at every angle.
+    /// Returns `value` times the reflectance at the angle whose cosine `c` returns. `c` is not called
+    /// if the reflectance is the same at every angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -96,8 +95,7 @@ impl<S: Float> Reflectance<S> {
         }
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
-        // At n = 1 and grazing incidence, g = c = 0: there is no boundary then, and the reflectance
-        // is 0.
+        // At n = 1 and grazing incidence, g = c = 0: there is no boundary.
         let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
         L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)

@@ -10,74 +10,26 @@ use zerkalo_kernel::sampling::warp;
 /// mirror. Highlights of smaller alpha are computed with this value.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
+/// Family of distributions of microfacet normals.
+#[derive(Clone, Copy, Debug)]
+pub enum FacetNormals {
+    /// Beckmann distribution.
+    Beckmann,
+    /// GGX, also known as Trowbridge-Reitz.
+    Ggx,
+}
+
 /// Distribution of microfacet normals, with its masking model.
 #[derive(Clone, Copy, Debug)]
 pub struct MicrofacetDistribution<S> {
-    /// Kind of distribution: `true` for GGX, `false` for Beckmann.
-    pub ggx: bool,
+    /// Family of the distribution.
+    pub normals: FacetNormals,
     /// Roughness parameter alpha, at least [`SMOOTH_ALPHA`].
     pub alpha: S,
-    /// Square of the roughness parameter `alpha`.
-    pub alpha2: S,
-    /// Reciprocal of the square of the roughness parameter `alpha`.
-    pub inverse_alpha2: S,
-    /// Model of masking and shadowing between microfacets.
+    alpha2: S,
+    inverse_alpha2: S,
+    /// Model of masking and shadowing.
     pub masking: Masking,
-}
-
-impl<S: Float> MicrofacetDistribution<S> {
-    /// Creates a microfacet distribution with the roughness parameter `alpha` and the masking model
-    /// `masking`. It is GGX if `ggx` is `true`, otherwise Beckmann.
-    pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
-        let alpha2 = alpha * alpha;
-        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
-        Self { ggx, alpha, alpha2, inverse_alpha2, masking }
-    }
-
-    /// Samples a microfacet normal H that is visible from the direction `view` (V). Both are in the
-    /// frame of the surface normal N. `u` and `v` are uniform in [0, 1). The density of H is G_1 D
-    /// V.H / N.V, with G_1 of `MicrofacetEval::visibility` and D of `MicrofacetEval::density`.
-    #[inline(always)]
-    pub fn sample_visible<L: SimdFloat<Scalar = S>>(
-        &self,
-        (u, v): (L, L),
-        view: Vec3<L>,
-    ) -> Vec3<L> {
-        let alpha = L::splat(self.alpha);
-        let v_cavity = self.masking == Masking::VCavity;
-        match self.ggx {
-            true if v_cavity => warp::ggx_visible_v_cavity(u, v, alpha, view),
-            true => warp::ggx_visible(u, v, alpha, view),
-            false => warp::beckmann_visible(u, v, alpha, view, v_cavity),
-        }
-    }
-}
-
-/// Terms of a microfacet BSDF, evaluated in SIMD lanes.
-pub trait MicrofacetEval<L: SimdFloat> {
-    /// Returns the density D of microfacet normals [1/sr]. `tan2` is the squared tangent of the
-    /// angle between microfacet normal and surface normal.
-    fn density(&self, tan2: L) -> L;
-    /// Returns the numerator and the denominator of G, the fraction of the microfacets with normal
-    /// H that are visible both from the viewer V and from the light L. `nh`, `nv`, `nl` and `vh`
-    /// are the positive cosines N.H, N.V, N.L and V.H. H need not be a unit vector: `nh` and `vh`
-    /// may both be multiplied by its length.
-    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
-    /// Returns G_1, the fraction of the microfacets with normal H that are visible from the viewer.
-    /// The parameters are those of [`MicrofacetEval::masking`].
-    fn visibility(&self, nh: L, nv: L, vh: L) -> L;
-    /// Returns G / G_1 in [0, 1]. It is the weight of a reflected ray if visible normals are
-    /// sampled and the reflectance is 1. The parameters are those of [`MicrofacetEval::masking`].
-    fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L;
-    /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side. It is the weight
-    /// of a transmitted ray if visible normals are sampled and the transmittance is 1. `view` has
-    /// the cosines (`nh`, `nv`, `vh`) of [`MicrofacetEval::masking`]. `transmitted` has two
-    /// positive cosines: those between the transmitted ray and the reversed surface normal, and
-    /// between the ray and the reversed microfacet normal.
-    fn shadowing_behind(&self, view: (L, L, L), transmitted: (L, L)) -> L;
-    /// Returns the function Lambda of Smith's masking model for one direction. `c` > 0 is the
-    /// cosine of the angle between this direction and the surface normal.
-    fn lambda(&self, c: L) -> L;
 }
 
 /// Value of a = 1 / (alpha tan theta) from which on masking by microfacets is neglected; theta is
@@ -112,34 +64,74 @@ fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     (-a2).exp() * k / below
 }
 
-impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
-    #[inline(always)]
-    fn density(&self, tan2: L) -> L {
-        let inverse_alpha2 = L::splat(self.inverse_alpha2);
-        if self.ggx { ggx_d(tan2, inverse_alpha2) } else { beckmann_d(tan2, inverse_alpha2) }
+impl<S: Float> MicrofacetDistribution<S> {
+    /// Creates a distribution of `normals` with the roughness parameter `alpha`.
+    pub fn new(normals: FacetNormals, alpha: f64, masking: Masking) -> Self {
+        let alpha2 = alpha * alpha;
+        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
+        Self { normals, alpha, alpha2, inverse_alpha2, masking }
     }
 
-    /// Returns the numerator and the denominator of G. For V-cavities G is min(1, 2 N.H min(N.V,
-    /// N.L) / V.H) (Torrance and Sparrow 1967). For height-correlated Smith masking it is 1 / (1 +
-    /// Lambda(V) + Lambda(L)) (Heitz 2014, *Understanding the Masking-Shadowing Function*).
+    /// Samples a microfacet normal H that is visible from the direction `view` (V). Both are in the
+    /// frame of the surface normal N. `u` and `v` are uniform in [0, 1). The density of H is G_1 D
+    /// V.H / N.V, with G_1 of [`visibility`](Self::visibility) and D of [`density`](Self::density).
     #[inline(always)]
-    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
+    pub fn sample_visible<L: SimdFloat<Scalar = S>>(
+        &self,
+        (u, v): (L, L),
+        view: Vec3<L>,
+    ) -> Vec3<L> {
+        let alpha = L::splat(self.alpha);
+        match (self.normals, self.masking) {
+            (FacetNormals::Ggx, Masking::VCavity) => warp::ggx_visible_v_cavity(u, v, alpha, view),
+            (FacetNormals::Ggx, Masking::Smith) => warp::ggx_visible(u, v, alpha, view),
+            (FacetNormals::Beckmann, masking) => {
+                warp::beckmann_visible(u, v, alpha, view, masking == Masking::VCavity)
+            }
+        }
+    }
+
+    /// Returns the density D of microfacet normals [1/sr]. `tan2` is the squared tangent of the
+    /// angle between microfacet normal and surface normal.
+    #[inline(always)]
+    pub fn density<L: SimdFloat<Scalar = S>>(&self, tan2: L) -> L {
+        let inverse_alpha2 = L::splat(self.inverse_alpha2);
+        match self.normals {
+            FacetNormals::Beckmann => beckmann_d(tan2, inverse_alpha2),
+            FacetNormals::Ggx => ggx_d(tan2, inverse_alpha2),
+        }
+    }
+
+    /// Returns the numerator and the denominator of G, the fraction of the microfacets with normal
+    /// H that are visible both from the viewer V and from the light L. `nh`, `nv`, `nl` and `vh`
+    /// are the positive cosines N.H, N.V, N.L and V.H. H need not be a unit vector: `nh` and `vh`
+    /// may both be multiplied by its length.
+    ///
+    /// For V-cavities G is min(1, 2 N.H min(N.V, N.L) / V.H) (Torrance and Sparrow 1967). For
+    /// height-correlated Smith masking it is 1 / (1 + Lambda(V) + Lambda(L)) (Heitz 2014,
+    /// *Understanding the Masking-Shadowing Function*).
+    #[inline(always)]
+    pub fn masking<L: SimdFloat<Scalar = S>>(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
         match self.masking {
             Masking::VCavity => ((L::from_f64(2.0) * nh * nv.min(nl)).min(vh), vh),
             Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
         }
     }
 
+    /// Returns G_1, the fraction of the microfacets with normal H that are visible from the viewer,
+    /// for the cosines of [`masking`](Self::masking).
     #[inline(always)]
-    fn visibility(&self, nh: L, nv: L, vh: L) -> L {
+    pub fn visibility<L: SimdFloat<Scalar = S>>(&self, nh: L, nv: L, vh: L) -> L {
         match self.masking {
             Masking::VCavity => (L::from_f64(2.0) * nh * nv / vh).min(L::one()),
             Masking::Smith => L::one() / (L::one() + self.lambda(nv)),
         }
     }
 
+    /// Returns G / G_1 in [0, 1], the weight of a reflected ray if visible normals are sampled and
+    /// the reflectance is 1, for the cosines of [`masking`](Self::masking).
     #[inline(always)]
-    fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L {
+    pub fn shadowing<L: SimdFloat<Scalar = S>>(&self, nh: L, nv: L, nl: L, vh: L) -> L {
         match self.masking {
             Masking::VCavity => {
                 let twice = L::from_f64(2.0) * nh;
@@ -153,37 +145,48 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns G / G_1 of transmitted rays. Let G_1' be the G_1 of the transmitted ray. The result
-    /// is G_1' for Smith's masking (Walter et al. 2007, eq. 23). For V-cavities G is G_1 + G_1' -
-    /// 1, because the sides of a groove that are visible from above and from below overlap (Heitz
-    /// and d'Eon 2014).
+    /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side: the weight of a
+    /// transmitted ray if visible normals are sampled and the transmittance is 1. The first cosines
+    /// are N.H, N.V and V.H. The second are positive: those of the transmitted ray with -N and -H.
+    ///
+    /// Let G_1' be the G_1 of the transmitted ray. The result is G_1' for Smith's masking (Walter et
+    /// al. 2007, eq. 23). For V-cavities G is G_1 + G_1' - 1, because the sides of a groove that are
+    /// visible from above and from below overlap (Heitz and d'Eon 2014).
     #[inline(always)]
-    fn shadowing_behind(&self, (nh, nv, vh): (L, L, L), (nt, lh): (L, L)) -> L {
+    pub fn shadowing_behind<L: SimdFloat<Scalar = S>>(
+        &self,
+        (nh, nv, vh): (L, L, L),
+        (nt, lh): (L, L),
+    ) -> L {
         match self.masking {
             Masking::VCavity => {
-                let visible: L = self.visibility(nh, nv, vh);
-                let behind: L = self.visibility(nh, nt, lh);
+                let visible = self.visibility(nh, nv, vh);
+                let behind = self.visibility(nh, nt, lh);
                 (L::one() - (L::one() - behind) / visible).max(L::zero())
             }
             Masking::Smith => L::one() / (L::one() + self.lambda(nt)),
         }
     }
 
-    /// Returns the function Lambda of Smith's masking model, for directions whose angle theta from
-    /// the surface normal has the cosine `c`. It depends on a = 1 / (alpha tan theta).
+    /// Returns the function Lambda of Smith's masking model for a direction whose angle theta from
+    /// the surface normal has the cosine `c` > 0. It depends on a = 1 / (alpha tan theta).
     #[inline(always)]
-    fn lambda(&self, c: L) -> L {
+    fn lambda<L: SimdFloat<Scalar = S>>(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);
         let (cos2, sin2) = (c * c, (L::one() - c * c).max(L::zero()));
-        if self.ggx {
-            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
+        match self.normals {
+            FacetNormals::Ggx => {
+                ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5)
+            }
+            FacetNormals::Beckmann => {
+                // In most packets every lane hits the surface so steeply that masking is neglected.
+                let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
+                if grazing.none() {
+                    return L::zero();
+                }
+                beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(grazing)
+            }
         }
-        // In most packets every lane hits the surface so steeply that masking is neglected.
-        let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
-        if grazing.none() {
-            return L::zero();
-        }
-        beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(grazing)
     }
 }
 

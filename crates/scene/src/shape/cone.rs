@@ -19,6 +19,9 @@ description! {
 }
 
 impl ShapeDesc for Cone {
+    const EXAMPLE: &str =
+        "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
+
     fn form(&self) -> Form {
         frustum_between(self.base, self.apex, self.radius, 0.0)
     }

@@ -1,116 +1,59 @@
-//! Compound objects: union, intersection and difference of solids, nested up to 64 deep.
-//!
-//! A part is written like an object, with `shape` and optionally `material` and `transform`, so
-//! that users can copy the text of an object into a compound, and the text of a part into an
-//! object.
+//! Compound objects: union, intersection and difference of solids, nested up to 64 deep. A part is
+//! written like an object, so that users can copy the text of one into the other.
 
-use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
-    written,
+    Description, Field, FieldValue, KeyNode, KeyValue, TomlValue, ValidationError, Validator,
+    ValueType, description,
 };
 use glam::DVec3;
-use toml::de::DeValue;
-use toml::{Spanned, Value};
 use zerkalo_kernel::primitive::{CsgSolid, CsgTree, Form};
 
 /// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
 
-/// Part of a compound: a solid with its own material and transform.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CsgOperand {
-    /// Solid of the part. A plane stands for the half-space behind it.
-    pub shape: Shape,
-    /// Name of one of the scene's materials; empty for the material of the whole compound.
-    pub material: String,
-    /// Steps that move, rotate and scale the part inside the whole compound, in order.
-    pub transform: Vec<TransformOp>,
+description! {
+    /// Part of a compound: a solid with its own material and transform.
+    pub struct CsgOperand {
+        /// Shape of the part: a solid, or a plane for the half-space behind it.
+        shape: Shape;
+        /// Name of one of the `[materials.NAME]`.
+        material: String, or "that of the whole";
+        /// Steps that move, rotate and scale it, in order.
+        transform: Vec<TransformOp>, or "it stays as its shape says";
+    }
 }
 
-// These fields are a static. The macro `description!` would declare a constant, and constants
-// cannot refer to each other in a cycle. The fields of shapes contain the fields of parts, and the
-// fields of parts contain those of shapes.
-static PART_FIELDS: [Field; 3] = [
-    Field::required(
-        "shape",
-        ValueType::OneOf(&KIND_TABLE),
-        "",
-        "Shape of the part: a solid, or a plane for the half-space behind it.",
-    ),
-    Field::optional(
-        "material",
-        ValueType::Text,
-        "",
-        "that of the whole",
-        "Name of one of the `[materials.NAME]`.",
-    ),
-    Field::optional(
-        "transform",
-        ValueType::ListOf(TransformOp::FIELDS),
-        "",
-        "it stays as its shape says",
-        "Steps that move, rotate and scale it, in order.",
-    ),
-];
+impl FieldValue for Vec<CsgOperand> {
+    const TYPE: ValueType = ValueType::Tables(|| CsgOperand::FIELDS);
 
-/// Keys of a compound (a union, an intersection or a difference): its list of parts.
-pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
-    "of",
-    ValueType::Tables(&PART_FIELDS),
-    "",
-    "Two parts or more, each written like an object: `shape`, `material`, `transform`.",
-)];
-
-impl TomlValue for CsgOperand {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        let table = TableReader::new(value, &PART_FIELDS)?;
-        Ok(Self {
-            shape: table.required("shape")?,
-            material: table.optional("material")?.unwrap_or_default(),
-            transform: table.optional("transform")?.unwrap_or_default(),
-        })
+    fn errors(&self, _: &Field) -> Vec<ValidationError> {
+        part_faults(self, 1)
     }
+}
 
-    fn to_toml(&self) -> Value {
-        let material = (!self.material.is_empty()).then_some(&self.material as &dyn TomlValue);
-        let transform = (!self.transform.is_empty()).then_some(&self.transform as &dyn TomlValue);
-        written(&[("shape", Some(&self.shape)), ("material", material), ("transform", transform)])
+/// List of parts, which edits can only read, as TOML.
+impl KeyNode for Vec<CsgOperand> {
+    fn value(&self) -> Option<KeyValue> {
+        let parts: Vec<_> = self.iter().map(|part| part.to_toml().to_string()).collect();
+        Some(KeyValue::Text(parts.join(", ")))
     }
 }
 
 macro_rules! compounds {
-    ($($kind:ident, $doc:literal);+ $(;)?) => {$(
-        #[doc = $doc]
-        #[derive(Clone, Debug, PartialEq)]
-        pub struct $kind {
-            /// Parts of the compound, two or more.
-            pub of: Vec<CsgOperand>,
-        }
-
-        impl TomlValue for $kind {
-            fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-                TableReader::new(value, &OF_FIELDS)?.required("of").map(|of| Self { of })
-            }
-
-            fn to_toml(&self) -> Value {
-                written(&[("of", Some(&self.of))])
-            }
-        }
-
-        impl Description for $kind {
-            const DOC: &'static str = $doc;
-            const FIELDS: &'static [Field] = &OF_FIELDS;
-
-            fn validator(&self) -> Validator {
-                let errors = part_faults(&self.of, 1).into_iter().map(Some);
-                errors.fold(Validator::new(Self::FIELDS), Validator::and)
+    ($($kind:ident, $doc:literal, $example:literal;)+) => {$(
+        description! {
+            #[doc = $doc]
+            pub struct $kind {
+                /// Two parts or more, each written like an object: `shape`, `material`, `transform`.
+                of: Vec<CsgOperand>;
             }
         }
 
         impl ShapeDesc for $kind {
+            const EXAMPLE: &str = $example;
+
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }
@@ -131,24 +74,41 @@ macro_rules! compounds {
                 Self { of: fitted_to(base, size).map(CsgOperand::new).into() }
             }
 
+            fn parts(&self) -> Option<&[CsgOperand]> {
+                Some(&self.of)
+            }
+
+            fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                &mut self.of
+            }
         }
     )+};
 }
 
 compounds! {
     Union,
-    "Solids joined into one: every point that is in any part.";
+    " Solids joined into one: every point that is in any part.",
+    "shape.union.of = [
+    { shape.sphere = { center = [0.0, 0.4, 0.0], radius = 0.4 } },
+    { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
+]";
     Intersection,
-    "The common part of solids: every point that is in all parts.";
+    " The common part of solids: every point that is in all parts.",
+    "shape.intersection.of = [
+    { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
+    { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
+]";
     Difference,
-    "The first part without the others: every point of it that is in none of them. A cut shows \
-     the material of the part that cut it.";
+    " The first part without the others: every point of it that is in none of them. A cut shows \
+     the material of the part that cut it.",
+    "shape.difference.of = [
+    { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
+    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
+]";
 }
 
-/// Returns the example parts of a new compound that fills a box. `base` is the centre of the lower
-/// side of this box, and `size` is its size. The first part is a block that stands on `base` and
-/// has nine tenths of `size`. The second is a ball that protrudes from the upper right near corner
-/// of the block.
+/// Returns the parts of a new compound that fills a box on `base`: a block of nine tenths of
+/// `size`, and a ball at its upper right near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -164,43 +124,19 @@ impl CsgOperand {
     }
 }
 
-/// Returns the parts of a compound; `None` if the shape is no compound.
-pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
-    match shape {
-        Shape::Union(Union { of })
-        | Shape::Intersection(Intersection { of })
-        | Shape::Difference(Difference { of }) => Some(of),
-        _ => None,
-    }
-}
-
-/// Returns the mutable parts of a compound; empty if the shape is no compound.
-fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
-    match shape {
-        Shape::Union(Union { of })
-        | Shape::Intersection(Intersection { of })
-        | Shape::Difference(Difference { of }) => of,
-        _ => &mut [],
-    }
-}
-
-/// Combines the parts of a compound into one solid. `join` creates the CSG tree of the compound
-/// from the CSG trees of its parts.
+/// Combines the parts of a compound; `join` creates its tree from those of the parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
     for part in of {
-        match part.shape.form().transformed(&compose(&part.transform)) {
-            Form::Csg(inner) => {
-                trees.push(inner.tree.shifted(parts.len()));
-                parts.extend(inner.parts);
-            }
+        let form = part.shape.form().transformed(&compose(&part.transform));
+        if let Form::Csg(inner) = form {
+            trees.push(inner.tree.shifted(parts.len()));
+            parts.extend(inner.parts);
+        } else if let Some(solid) = form.into_solid() {
             // Other geometry is left out; `unfit_reason` reports it.
-            simple => {
-                let Some(solid) = simple.into_solid() else { continue };
-                trees.push(CsgTree::Part(parts.len()));
-                parts.push(solid);
-            }
+            trees.push(CsgTree::Part(parts.len()));
+            parts.push(solid);
         }
     }
     CsgSolid { parts, tree: join(trees) }
@@ -213,12 +149,26 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
             Some("is flat: nothing is inside it")
         }
         Shape::MeshDesc(_) => Some("cannot be a part of a compound"),
-        _ => None,
+        // A plane stands for a half-space.
+        Shape::Sphere(_)
+        | Shape::Cube(_)
+        | Shape::Cuboid(_)
+        | Shape::Pyramid(_)
+        | Shape::Prism(_)
+        | Shape::Cylinder(_)
+        | Shape::Cone(_)
+        | Shape::TaperedCylinder(_)
+        | Shape::UnitFrustum(_)
+        | Shape::Torus(_)
+        | Shape::Plane(_)
+        | Shape::Union(_)
+        | Shape::Intersection(_)
+        | Shape::Difference(_) => None,
     }
 }
 
-/// Returns the validation errors of `of`, the parts of a compound. `depth` is the nesting depth of
-/// the compound: 1 if it is no part of another one.
+/// Returns the validation errors of the parts of a compound. Its `depth` is 1 if it is no part of
+/// another.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -234,7 +184,7 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
         return faults;
     }
     for (i, part) in of.iter().enumerate() {
-        let inner = match parts_of(&part.shape) {
+        let inner = match part.shape.parts() {
             Some(of) => part_faults(of, depth + 1)
                 .into_iter()
                 .map(|fault| fault.prefixed(part.shape.key()))
@@ -245,7 +195,7 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
             let found = format!("a {} {reason}", part.shape.key());
             ValidationError::new("shape", found, "a solid")
         });
-        let checks = Validator::new(&PART_FIELDS)
+        let checks = Validator::new(CsgOperand::FIELDS)
             .nested("shape", inner)
             .and(unfit)
             .field("transform", &part.transform);
@@ -258,18 +208,14 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// Material that a part of a compound names, as `(key, material)`. `key` is the dotted key of the
-/// name in scene files, relative to the shape, such as `union.of.0.material`. `material` is the
-/// name.
+/// Material that a part names: the dotted key, such as `union.of.0.material`, and the name.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// Returns the material name of each solid in the shape, in the order of [`CsgSolid::parts`]. A
-    /// solid without a material of its own has the material of the innermost enclosing compound
-    /// that has one. If there is no such compound, its material is `whole`. A shape that is no
-    /// compound is one solid.
+    /// Returns the material of each solid in the shape, in the order of [`CsgSolid::parts`]: its
+    /// own, or that of the innermost compound that has one, or `whole`.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
-        match parts_of(self) {
+        match self.parts() {
             None => vec![whole],
             Some(of) => of
                 .iter()
@@ -281,22 +227,20 @@ impl Shape {
         }
     }
 
-    /// Returns the mutable material names of all parts; the name of a part without a material is
-    /// empty.
+    /// Returns the material names of all parts, which may be empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
-        for part in parts_of_mut(self) {
+        for part in self.parts_mut() {
             names.push(&mut part.material);
             names.extend(part.shape.part_names_mut());
         }
         names
     }
 
-    /// Returns the references to materials in all nested parts of a compound, except for parts
-    /// without a material of their own. Empty if the shape is no compound.
+    /// Returns the materials that nested parts name.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
-        for (i, part) in parts_of(self).into_iter().flatten().enumerate() {
+        for (i, part) in self.parts().into_iter().flatten().enumerate() {
             let key = format!("{}.of.{i}", self.key());
             if !part.material.is_empty() {
                 named.push((format!("{key}.material"), part.material.as_str()));
@@ -305,5 +249,21 @@ impl Shape {
             named.extend(inner.map(|(tail, name)| (format!("{key}.shape.{tail}"), name)));
         }
         named
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::EXAMPLES;
+
+    #[test]
+    fn shapes_that_fit_into_compounds_are_solids() {
+        for (key, _) in EXAMPLES {
+            let shape = Shape::fitted_to(key, DVec3::ZERO, DVec3::ONE).unwrap();
+            let form = shape.form();
+            let is_solid = matches!(form, Form::Csg(_)) || form.into_solid().is_some();
+            assert_eq!(unfit_reason(&shape).is_none(), is_solid, "{key}");
+        }
     }
 }

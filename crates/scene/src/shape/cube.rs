@@ -19,6 +19,8 @@ description! {
 }
 
 impl ShapeDesc for Cube {
+    const EXAMPLE: &str = "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
+
     fn form(&self) -> Form {
         let e = self.edge;
         prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
@@ -38,7 +40,6 @@ impl ShapeDesc for Cube {
 }
 
 /// Returns the corners of a square, as (x, z) offsets from its lower left near corner (near is +z).
-/// `side` is the length of a side.
 pub(super) fn square(side: f64) -> [DVec2; 4] {
     [(0.0, 0.0), (side, 0.0), (side, -side), (0.0, -side)].map(DVec2::from)
 }

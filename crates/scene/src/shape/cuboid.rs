@@ -1,8 +1,4 @@
-//! Box with sides parallel to the axes.
-//!
-//! A box is described by its centre and size, like the shapes `platform` and `rectangle`. A change
-//! of the key `center` alone moves the box. Two opposite corners would need two changes, and could
-//! be given in the wrong order. A `transform` rotates the box.
+//! Box with sides parallel to the axes, described by centre and size, so that one key moves it.
 
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::prismoid;
@@ -21,6 +17,8 @@ description! {
 }
 
 impl ShapeDesc for Cuboid {
+    const EXAMPLE: &str = "shape.box = { center = [0.0, 0.5, 0.0], size = [2.0, 1.0, 0.5] }";
+
     fn form(&self) -> Form {
         let [x, y, z] = self.size;
         let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;

@@ -19,6 +19,9 @@ description! {
 }
 
 impl ShapeDesc for Cylinder {
+    const EXAMPLE: &str =
+        "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
+
     fn form(&self) -> Form {
         frustum_between(self.base, self.top, self.radius, self.radius)
     }

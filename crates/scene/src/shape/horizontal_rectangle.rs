@@ -17,6 +17,8 @@ description! {
 }
 
 impl ShapeDesc for HorizontalRectangle {
+    const EXAMPLE: &str = "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
+
     fn form(&self) -> Form {
         let [x, z] = self.size;
         Form::Parallelogram(ParallelogramForm {

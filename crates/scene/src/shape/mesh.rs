@@ -42,8 +42,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // The edges of the icosahedron have the squared length 4; all other pairs of corners have a
-    // squared distance above 10. Every three corners that are pairwise neighbours form a triangle.
+    // The edges have the squared length 4; other pairs of corners are farther apart than 10.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -86,6 +85,9 @@ impl MeshDesc {
 }
 
 impl ShapeDesc for MeshDesc {
+    const EXAMPLE: &str =
+        "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
+
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
         Form::Mesh(MeshForm {
@@ -99,48 +101,30 @@ impl ShapeDesc for MeshDesc {
         self.content.fault().into_iter().collect()
     }
 
-    /// Creates a mesh without a file: the placeholder at the origin. The box to fill is ignored,
-    /// because only a transform moves a mesh.
+    /// Creates the placeholder, because only a transform moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
     }
 }
 
 impl Shape {
-    /// Reads the mesh file that the shape names: calls `load` with the file's name and stores the
-    /// result. Does nothing if a result is stored already, or if the shape names no file.
+    /// Reads the mesh file that the shape names by `load`, unless it is loaded already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
-        if let Self::MeshDesc(mesh) = self
-            && !mesh.file.is_empty()
-        {
-            mesh.content.resolve(|| load(&mesh.file));
-        }
-    }
-
-    /// Copies the loaded mesh from `other`, if both shapes name the same file.
-    pub fn resolve_as(&mut self, other: &Self) {
-        if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
-            && new.file == old.file
-        {
-            new.content.clone_from(&old.content);
+        if let Self::MeshDesc(mesh) = self {
+            mesh.content.resolve(&mesh.file, load);
         }
     }
 
     /// Returns the mesh file that the shape names; `None` if the shape is no mesh or names no file.
     pub fn file(&self) -> Option<&str> {
-        match self {
-            Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
-            _ => None,
-        }
+        let Self::MeshDesc(mesh) = self else { return None };
+        Some(mesh.file.as_str()).filter(|file| !file.is_empty())
     }
 
-    /// Returns the mesh that was read from the file that the shape names. Returns `None` if the
-    /// shape names no file or the file could not be read.
+    /// Returns the mesh that was read from the file.
     pub fn mesh(&self) -> Option<&Arc<Mesh>> {
-        match self {
-            Self::MeshDesc(mesh) => mesh.content.content(),
-            _ => None,
-        }
+        let Self::MeshDesc(mesh) = self else { return None };
+        mesh.content.content()
     }
 }
 

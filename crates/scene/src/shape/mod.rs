@@ -1,7 +1,7 @@
-//! Shapes: descriptions of geometry in scene files, one kind per file, with keys, ranges and help.
-//! Rays do not intersect descriptions. Each description is converted to a canonical form: one of a
-//! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
-//! intersection kernels.
+//! Shapes: descriptions of geometry in scene files, one kind per file. Each becomes a canonical
+//! form of the module `primitive`, which rays intersect.
+
+#![deny(clippy::wildcard_enum_match_arm)]
 
 mod axial;
 mod cone;
@@ -35,7 +35,7 @@ pub use plane::Plane;
 pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
-pub use registry::{KINDS, Shape, ShapeDesc};
+pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
 pub use texture_space::TextureSpace;
@@ -48,9 +48,3 @@ pub use zerkalo_kernel::primitive::DefaultMapping;
 mod normals_at_test;
 #[cfg(test)]
 mod ray_query_test;
-#[cfg(test)]
-#[path = "../../../../tests/common/shape_examples.rs"]
-mod shape_examples;
-
-#[cfg(test)]
-pub use shape_examples::EXAMPLES;

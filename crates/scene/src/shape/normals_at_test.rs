@@ -51,9 +51,10 @@ fn normals_at_corners_and_tips_are_several() {
 fn normals_at_points_beside_a_turned_rectangle_are_none() {
     let platform = Shape::fitted_to("platform", DVec3::ZERO, DVec3::ONE).unwrap().form();
     let (low, high) = platform.bounds().unwrap();
-    let turn = DAffine3::from_rotation_y(0.25 * PI);
-    let turned = platform.transformed(&(turn * DAffine3::from_translation(-0.5 * (low + high))));
-    let count_at = |x: f64, z: f64| turned.normals_at(DVec3::new(x, 0.0, z), 1e-9).concat().len();
+    let rotation = DAffine3::from_rotation_y(0.25 * PI);
+    let rotated =
+        platform.transformed(&(rotation * DAffine3::from_translation(-0.5 * (low + high))));
+    let count_at = |x: f64, z: f64| rotated.normals_at(DVec3::new(x, 0.0, z), 1e-9).concat().len();
     let half_diagonal = 0.5f64.sqrt();
     for (x, z) in [(0.0, 0.0), (0.35, -0.35), (half_diagonal, 0.0), (0.0, -half_diagonal)] {
         assert_eq!(count_at(x, z), 1, "{x} {z}");

@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{description, turned, unit};
+use crate::value::{description, rotated_y, unit};
 use glam::{DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, PlaneForm};
 
@@ -17,6 +17,8 @@ description! {
 }
 
 impl ShapeDesc for Plane {
+    const EXAMPLE: &str = "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
+
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane(PlaneForm { normal, offset: normal.dot(DVec3::from_array(self.point)) })
@@ -32,14 +34,11 @@ impl ShapeDesc for Plane {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.normal = turned(self.normal, degrees);
+        self.normal = rotated_y(self.normal, degrees);
         true
     }
 
     fn texture_axes(&self) -> DMat3 {
-        match self.form() {
-            Form::Plane(PlaneForm { normal, .. }) => on_plane(normal),
-            _ => DMat3::IDENTITY,
-        }
+        on_plane(unit(self.normal).unwrap_or(DVec3::Y))
     }
 }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
 description! {
-    /// A right prism on a base with three equal sides. Unturned, the base has an edge along +x from
+    /// A right prism on a base with three equal sides. Without a rotation, the base has an edge along +x from
     /// `corner` and its third vertex towards -z.
     pub struct Prism {
         /// Lower left near corner of the base, before the rotation (near is +z).
@@ -23,6 +23,8 @@ description! {
 }
 
 impl ShapeDesc for Prism {
+    const EXAMPLE: &str = "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
+
     fn form(&self) -> Form {
         let s = self.side;
         let base = [(0.0, 0.0), (s, 0.0), (s / 2.0, -s * 0.75f64.sqrt())].map(DVec2::from);

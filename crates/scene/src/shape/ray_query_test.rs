@@ -45,7 +45,7 @@ fn ray_query_returns_known_distances() {
     assert_eq!(cube.cast(DVec3::Y * 3.0, DVec3::NEG_Y), Some(2.0));
     assert_eq!(cube.cast(DVec3::Y * 0.5, DVec3::NEG_Y), Some(0.5), "from inside");
     assert_eq!(cube.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y), None);
-    let turned = cube.transformed(&DAffine3::from_quat(DQuat::from_rotation_y(FRAC_PI_4)));
-    let t = turned.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y).unwrap();
-    assert!((t - 2.0).abs() < 1e-12, "a turned cube reaches further: {t}");
+    let rotated = cube.transformed(&DAffine3::from_quat(DQuat::from_rotation_y(FRAC_PI_4)));
+    let t = rotated.cast(DVec3::new(0.6, 3.0, 0.0), DVec3::NEG_Y).unwrap();
+    assert!((t - 2.0).abs() < 1e-12, "a rotated cube reaches further: {t}");
 }

@@ -1,7 +1,7 @@
 //! Rectangle in any orientation, such as a flat mirror.
 
 use crate::shape::ShapeDesc;
-use crate::value::{Description, ValidationError, description, turned, unit};
+use crate::value::{Description, ValidationError, description, rotated_y, unit};
 use glam::{DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, ParallelogramForm};
 
@@ -15,17 +15,13 @@ description! {
         /// Direction in which the front faces.
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`; not parallel to it.
-        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
     }
 }
 
-fn up() -> [f64; 3] {
-    [0.0, 1.0, 0.0]
-}
-
 impl Rectangle {
-    /// Returns the rectangle's axes as unit vectors: to the right (seen from the front), up and to
-    /// the front. Returns `None` if `up` is parallel to the normal.
+    /// Returns the unit vectors to the right (seen from the front), up and to the front; `None` if
+    /// `up` is parallel to the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);
@@ -38,6 +34,9 @@ impl Rectangle {
 }
 
 impl ShapeDesc for Rectangle {
+    const EXAMPLE: &str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
+        normal = [0.0, 0.0, 1.0] }";
+
     fn form(&self) -> Form {
         let [right, up, _] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
         let (u, v) = (right * self.size[0], up * self.size[1]);
@@ -67,7 +66,7 @@ impl ShapeDesc for Rectangle {
             center: [base.x, base.y + size.y / 2.0, base.z],
             size: [size.x, size.y],
             normal: [0.0, 0.0, 1.0],
-            up: up(),
+            up: [0.0, 1.0, 0.0],
         }
     }
 
@@ -76,8 +75,8 @@ impl ShapeDesc for Rectangle {
     }
 
     fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.normal = turned(self.normal, degrees);
-        self.up = turned(self.up, degrees);
+        self.normal = rotated_y(self.normal, degrees);
+        self.up = rotated_y(self.up, degrees);
         true
     }
 
@@ -104,7 +103,12 @@ mod tests {
         for normal in
             [[0.0, 0.0, 1.0], [0.3, -0.2, -1e-200], [-2e150, 1e150, 1e150], [0.0, 0.1, 3.0]]
         {
-            let mirror = Rectangle { center: [1.0, 2.0, 3.0], size: [4.0, 3.0], normal, up: up() };
+            let mirror = Rectangle {
+                center: [1.0, 2.0, 3.0],
+                size: [4.0, 3.0],
+                normal,
+                up: [0.0, 1.0, 0.0],
+            };
             assert_eq!(mirror.faults(), []);
             let (corner, u, v) = sides(mirror.form());
             let front = unit(normal).unwrap();
@@ -123,7 +127,7 @@ mod tests {
             ([1e-9, 1.0, 0.0], false),
             ([1e-3, 1.0, 0.0], true),
         ] {
-            let lying = Rectangle { center: [0.0; 3], size: [1.0; 2], normal, up: up() };
+            let lying = Rectangle { center: [0.0; 3], size: [1.0; 2], normal, up: [0.0, 1.0, 0.0] };
             let keys: Vec<_> = lying.faults().into_iter().map(|f| f.key).collect();
             assert_eq!(keys.is_empty(), sound, "{normal:?} {keys:?}");
         }

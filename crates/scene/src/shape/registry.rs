@@ -1,12 +1,10 @@
 //! Table of shape kinds. A new kind needs a file of its own and one line in this table.
-//! Tests then demand an example of it, in `tests/common/shape_examples.rs`.
 
-use crate::shape::csg::OF_FIELDS;
 use crate::shape::{
-    Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
-    Prism, Pyramid,
+    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,
+    MeshDesc, Plane, Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
 use crate::value::{
     Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
 };
@@ -15,8 +13,10 @@ use zerkalo_kernel::primitive::Form;
 
 /// Description of one kind of shape, with the keys that users write in scene files.
 pub trait ShapeDesc: Description {
-    /// Converts the description to its canonical form: the geometry as one of the kinds of
-    /// primitives, in double precision. The description must be valid.
+    /// Example of an `[[object]]` in TOML, for the manual and for tests.
+    const EXAMPLE: &str;
+
+    /// Converts the valid description to its canonical form.
     fn form(&self) -> Form;
 
     /// Returns the validation errors of the description.
@@ -24,54 +24,58 @@ pub trait ShapeDesc: Description {
         self.validator().errors()
     }
 
-    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's
-    /// lower side. `size` is its lengths along x, y and z, all greater than 0.
+    /// Creates an upright instance that roughly fills a box. `base` is the centre of its lower
+    /// side.
     fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
-    /// Returns the points that determine the shape's position: adding a vector to all of them moves
-    /// the shape by that vector. Empty if only a transform can move the shape.
+    /// Returns the points that move the shape if a vector is added to all of them; empty if only a
+    /// transform can.
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         Vec::new()
     }
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
-    /// from above. Returns `false`, without a change, if the keys of the kind cannot express the
-    /// rotation.
+    /// from above. Returns `false`, without a change, if its keys cannot express that.
     fn rotate_y(&mut self, _degrees: f64) -> bool {
         false
     }
 
-    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
-    /// matrix. They are right-handed, orthonormal vectors in the shape's space.
+    /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
+    fn rotation(&self) -> f64 {
+        0.0
+    }
+
+    /// Returns the step that makes the kind stand upright, if its axis is not y.
+    fn upright(&self) -> Option<TransformOp> {
+        None
+    }
+
+    /// Returns the parts of a compound; `None` for any other kind.
+    fn parts(&self) -> Option<&[CsgOperand]> {
+        None
+    }
+
+    /// Returns the parts of a compound; empty for any other kind.
+    fn parts_mut(&mut self) -> &mut [CsgOperand] {
+        &mut []
+    }
+
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace): right-handed,
+    /// orthonormal columns.
     fn texture_axes(&self) -> DMat3 {
         DMat3::IDENTITY
     }
 }
 
-/// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
-/// than -180 and at most 180 degrees.
-pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
+/// Returns `rotation + degrees`, above -180 and at most 180, rounded to a millionth.
+pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Expands to the keys of the shape kind `$kind`, for the table of kinds. The keys of a compound
-/// are in the static `$fields`. These keys refer to the table of kinds, because the parts of a
-/// compound can be of any kind. Such a cycle is possible between statics, but not between
-/// constants.
-macro_rules! keys {
-    ($kind:ident) => {
-        $kind::FIELDS
-    };
-    ($kind:ident $fields:path) => {
-        &$fields
-    };
-}
-
 macro_rules! kinds {
-    ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
-        /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
-        /// with one key, the name of the kind.
+    ($($key:literal => $kind:ident),+ $(,)?) => {
+        /// Shape of an object. In scene files it is a table with one key, the kind.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Shape {
             $(
@@ -84,14 +88,16 @@ macro_rules! kinds {
             Shape { $($key => $kind),+ }
         }
 
-        // A static instead of a constant, because the table refers to itself through the keys of
-        // compounds: their parts are shapes of any kind in this table.
-        pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
-            $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
+        // A static, because the table refers to itself through the parts of compounds.
+        static KIND_TABLE: [Field; [$($key),+].len()] = [
+            $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
         ];
 
         /// Every kind of shape, with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
+
+        /// Key and example of every kind of shape, in the order of [`KINDS`].
+        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
 
         impl Shape {
             /// Returns the key of the shape's kind.
@@ -101,16 +107,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// Converts the shape to its canonical form in double precision, without the object's
-            /// transform. The shape must be valid.
+            /// Converts the valid shape to its canonical form, without the object's transform.
             pub fn form(&self) -> Form {
                 match self {
                     $(Self::$kind(kind) => kind.form(),)+
                 }
             }
 
-            /// Returns the validation errors of the shape. Each key begins with the key of the
-            /// shape's kind.
+            /// Returns the validation errors; each key begins with the kind.
             pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
@@ -125,8 +129,35 @@ macro_rules! kinds {
                 }
             }
 
-            /// Creates a shape of the kind `key` that roughly fills a box, see
-            /// [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
+            /// Returns [`ShapeDesc::rotation`].
+            pub fn rotation(&self) -> f64 {
+                match self {
+                    $(Self::$kind(kind) => kind.rotation(),)+
+                }
+            }
+
+            /// Returns [`ShapeDesc::upright`].
+            pub fn upright(&self) -> Option<TransformOp> {
+                match self {
+                    $(Self::$kind(kind) => kind.upright(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; `None` for any other kind.
+            pub(super) fn parts(&self) -> Option<&[CsgOperand]> {
+                match self {
+                    $(Self::$kind(kind) => kind.parts(),)+
+                }
+            }
+
+            /// Returns the parts of a compound; empty for any other kind.
+            pub(super) fn parts_mut(&mut self) -> &mut [CsgOperand] {
+                match self {
+                    $(Self::$kind(kind) => kind.parts_mut(),)+
+                }
+            }
+
+            /// Creates a shape by [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
@@ -134,17 +165,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the points that determine the shape's position: adding a vector to all of
-            /// them moves the shape by that vector. Empty if only a transform can move the shape.
+            /// Returns [`ShapeDesc::anchor_points_mut`].
             pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
                     $(Self::$kind(kind) => kind.anchor_points_mut(),)+
                 }
             }
 
-            /// Rotates the shape by `degrees` about the vertical through its centre,
-            /// counter-clockwise seen from above. Returns `false`, without a change, if the keys of
-            /// its kind cannot express the rotation.
+            /// Rotates the shape by [`ShapeDesc::rotate_y`].
             pub fn rotate_y(&mut self, degrees: f64) -> bool {
                 match self {
                     $(Self::$kind(kind) => kind.rotate_y(degrees),)+
@@ -169,9 +197,9 @@ kinds! {
     "rectangle" => Rectangle,
     "plane" => Plane,
     "mesh" => MeshDesc,
-    "union" => Union with OF_FIELDS,
-    "intersection" => Intersection with OF_FIELDS,
-    "difference" => Difference with OF_FIELDS,
+    "union" => Union,
+    "intersection" => Intersection,
+    "difference" => Difference,
 }
 
 impl FieldValue for Shape {
@@ -183,8 +211,7 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the position of the shape: the first of its anchor points, or the origin if it has
-    /// none. Moving all anchor points by a vector moves the shape by that vector.
+    /// Returns the first anchor point, or the origin.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

@@ -16,6 +16,8 @@ description! {
 }
 
 impl ShapeDesc for Sphere {
+    const EXAMPLE: &str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
+
     fn form(&self) -> Form {
         Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
     }

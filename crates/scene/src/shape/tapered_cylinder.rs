@@ -21,6 +21,9 @@ description! {
 }
 
 impl ShapeDesc for TaperedCylinder {
+    const EXAMPLE: &str = "shape.tapered_cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], \
+        base_radius = 0.5, top_radius = 0.3 }";
+
     fn form(&self) -> Form {
         frustum_between(self.base, self.top, self.base_radius, self.top_radius)
     }

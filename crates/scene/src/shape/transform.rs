@@ -2,13 +2,11 @@
 
 use crate::shape::Shape;
 use crate::value::{
-    Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, ValueType, description,
-    one_of, sin_cos_degrees, unit,
+    Field, FieldValue, KeyNode, KeyValue, NumberRange, ValidationError, ValueType, description,
+    one_of, sin_cos_degrees, single_value, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
-use toml::de::DeValue;
-use toml::{Spanned, Value};
-use zerkalo_kernel::primitive::{Form, PlaneForm};
+use zerkalo_kernel::primitive::Form;
 
 one_of! {
     /// One step of a transform. Angles are counter-clockwise for a viewer at whom the axis points.
@@ -42,30 +40,29 @@ description! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
-impl TomlValue for Scale {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        if value.get_ref().is_array() {
-            return TomlValue::from_toml(value).map(Self);
-        }
-        f64::from_toml(value).map(|factor| Self([factor; 3]))
-    }
-
-    fn to_toml(&self) -> Value {
-        let [x, y, z] = self.0;
-        if x == y && y == z { x.to_toml() } else { self.0.to_toml() }
-    }
-}
-
-impl FieldValue for Scale {
-    const TYPE: ValueType = ValueType::Factor;
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let [x, y, z] = &self.0;
-        if x == y && y == z { x.errors(field) } else { self.0.errors(field) }
-    }
+single_value! {
+    [] Scale: ValueType::Factor,
+        |scale| {
+            let [x, y, z] = scale.0;
+            KeyValue::Numbers(if x == y && y == z { vec![x] } else { vec![x, y, z] })
+        },
+        |value| {
+            let uniform = value.clone().numbers().map(|[factor]| [factor; 3]);
+            uniform.or_else(|| value.numbers()).map(Self)
+        };
 }
 
 impl TransformOp {
+    /// Steps of every kind that change nothing.
+    pub const IDENTITIES: [Self; Self::FIELDS.len()] = [
+        Self::Translate([0.0; 3]),
+        Self::RotateX(0.0),
+        Self::RotateY(0.0),
+        Self::RotateZ(0.0),
+        Self::Rotate(Rotate { axis: [0.0, 1.0, 0.0], degrees: 0.0 }),
+        Self::Scale(Scale([1.0; 3])),
+    ];
+
     /// Returns the transform step as an affine map. The step must be valid.
     pub fn map(&self) -> DAffine3 {
         match *self {
@@ -91,24 +88,36 @@ impl FieldValue for Vec<TransformOp> {
         };
         self.iter().enumerate().flat_map(errors).collect()
     }
+}
 
+impl KeyNode for Vec<TransformOp> {
     fn is_absent(&self) -> bool {
         self.is_empty()
     }
+
+    fn make_absent(&mut self) {
+        self.clear();
+    }
+
+    fn child(&self, index: &str) -> Option<&dyn KeyNode> {
+        Some(self.get(index.parse::<usize>().ok()?)?)
+    }
+
+    fn child_mut(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.get_mut(index.parse::<usize>().ok()?)?)
+    }
 }
 
-/// Returns the rotation by `degrees` about the unit vector `axis` (Rodrigues' formula). Quarter
-/// turns about the coordinate axes are exact.
+/// Returns the rotation about the unit vector `axis` (Rodrigues' formula), exact for quarter turns
+/// about coordinate axes.
 fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = sin_cos_degrees(degrees);
     let rotated = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
     DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Returns `true` if an affine map can be inverted with usable precision. Three conditions must
-/// hold. The map is finite. The largest absolute element `m` of its matrix is within 1e-12..=1e12.
-/// The product of `m` and the largest absolute element of the inverse is at most 1e12, which leaves
-/// about 4 of the 16 decimal digits of `f64`.
+/// Returns `true` if the map is finite, its largest element `m` is within 1e-12..=1e12, and `m`
+/// times the largest element of the inverse is at most 1e12, which leaves 4 of 16 digits.
 fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -124,10 +133,9 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if the composition of `steps` is not usable for `shape`, otherwise `None`.
-/// There are four errors: the composition flattens the shape, stretches it out of range, moves it
-/// beyond the largest coordinate, or makes it too small for its distance from the origin. A
-/// compound without points is never too small. Each single step must be valid.
+/// Returns an error if the composition of the valid `steps` flattens `shape`, stretches it out of
+/// range, moves it beyond the largest coordinate, or makes it too small for its distance from the
+/// origin. A compound without points is never too small.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;
@@ -141,15 +149,9 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
         ));
     }
     let form = shape.form().transformed(&map);
-    let (max_coordinate, extent) = match (&form, form.bounds()) {
-        (_, Some((low, high))) => {
-            let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
-            let size = if is_empty { f64::INFINITY } else { (high - low).max_element() };
-            (low.abs().max(high.abs()).max_element(), size)
-        }
-        (Form::Plane(PlaneForm { offset, .. }), None) => (offset.abs(), f64::INFINITY),
-        (_, None) => (0.0, f64::INFINITY),
-    };
+    let max_coordinate = form.max_coordinate();
+    let is_empty = matches!(&form, Form::Csg(solid) if solid.is_empty());
+    let is_tiny = |(low, high): (DVec3, DVec3)| (high - low).max_element() < 1e-12 * max_coordinate;
     if !NumberRange::COORDINATE.holds(max_coordinate) {
         return Some(ValidationError::new(
             "transform",
@@ -157,7 +159,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
             "coordinates from -1e9 to 1e9",
         ));
     }
-    (extent < 1e-12 * max_coordinate).then(|| {
+    (!is_empty && form.bounds().is_some_and(is_tiny)).then(|| {
         ValidationError::new(
             "transform",
             "transform makes the object too small for its distance from the origin",

@@ -1,8 +1,8 @@
 //! Canonical tapered cylinder, with radius 1 at z = 0 and radius s at z = 1:
 //!   x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1
 
-use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
+use crate::shape::{ShapeDesc, TransformOp};
 use crate::value::description;
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::Form;
@@ -17,14 +17,19 @@ description! {
 }
 
 impl ShapeDesc for UnitFrustum {
+    const EXAMPLE: &str = "shape.unit_frustum = { s = 0.5 }";
+
     fn form(&self) -> Form {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }
 
-    /// Creates a cylinder at the origin. The box to fill is ignored, because only a transform can
-    /// move and scale this shape.
+    /// Creates a cylinder at the origin, because only a transform moves this shape.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { s: 1.0 }
+    }
+
+    fn upright(&self) -> Option<TransformOp> {
+        Some(TransformOp::RotateX(-90.0))
     }
 
     fn texture_axes(&self) -> DMat3 {

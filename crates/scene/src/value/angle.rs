@@ -1,15 +1,14 @@
 //! Angles as users write them: in degrees.
 
-/// Returns sine and cosine of an angle in degrees. They are exact at every multiple of 90, so that
-/// a quarter turn has no rounding error.
+/// Returns sine and cosine of an angle in degrees, exact at multiples of 90.
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
-    let turn = degrees.rem_euclid(360.0);
-    match turn {
+    let angle = degrees.rem_euclid(360.0);
+    match angle {
         0.0 | 360.0 => (0.0, 1.0),
         90.0 => (1.0, 0.0),
         180.0 => (0.0, -1.0),
         270.0 => (-1.0, 0.0),
-        _ => turn.to_radians().sin_cos(),
+        _ => angle.to_radians().sin_cos(),
     }
 }
 

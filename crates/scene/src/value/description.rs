@@ -1,47 +1,46 @@
-//! Macros that declare the tables of scene files.
-//!
-//! [`description!`] generates a struct from one declaration, with its conversion from and to TOML,
-//! its defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an
-//! enum for a key that accepts a fixed set of words.
+//! Macros that declare the tables of scene files: [`description!`] a struct for a table of keys,
+//! [`choices!`] an enum for a key that accepts a set of words.
 
-use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{
+    Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
+};
 
 /// Table of a scene file: the keys that it has and the checks of their values.
-pub trait Description {
+pub trait Description: KeyNode {
     /// Help text of the table, for the dashboard and the documentation.
     const DOC: &'static str;
     /// Keys of this kind of table, in the order of their declaration.
     const FIELDS: &'static [Field];
 
-    /// Returns a validator that has checked each value of the table against the range of its key.
-    /// Callers can add checks that involve several keys.
+    /// Returns a validator that has checked each value against the range of its key.
     fn validator(&self) -> Validator;
 }
 
 /// Rust type to which the values of keys in scene files are converted.
-pub trait FieldValue {
-    /// Type of the values in scene files. The range of numbers is [`NumberRange::FINITE`] unless
-    /// the declaration of a key gives another.
+pub trait FieldValue: KeyNode {
+    /// Type of the values in scene files, without the range of a declaration.
     const TYPE: ValueType;
 
-    /// Returns the validation errors of `self`, the value of the key that `field` describes. The
-    /// dotted key of each error begins with `field.name`.
-    fn errors(&self, field: &Field) -> Vec<ValidationError>;
+    /// Returns the validation errors of the value. Their keys begin with `field.name`.
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        match self.value() {
+            Some(KeyValue::Numbers(numbers)) => field.check(&numbers).into_iter().collect(),
+            Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
+        }
+    }
 
-    /// Returns `true` if the value stands for an omitted key. Files are then written without the
-    /// key.
-    fn is_absent(&self) -> bool {
-        false
+    /// Converts `value`; `None` if it has another type, or if this is a table.
+    fn from_value(_value: KeyValue) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
     }
 }
 
-/// Conversion of a default value in a `description!` declaration, such as `[f64; 3]` for a colour,
-/// to the Rust type of its key.
+/// Conversion of a default in a declaration, such as `[f64; 3]` for a colour.
 pub trait FromWritten<W> {
-    /// Converts a default value of a declaration to this type.
-    ///
-    /// # Panics
-    /// Panics if `written` is not valid for the type, which is an error in the declaration.
+    /// Converts a default. Panics if the declaration is wrong.
     fn from_written(written: W) -> Self;
 }
 
@@ -63,60 +62,81 @@ impl FromWritten<&'static str> for String {
     }
 }
 
-/// Returns the text of a doc comment without its leading space. `doc` is the text as the attribute
-/// `#[doc]` holds it.
+/// Returns the text of a `#[doc]` attribute without its leading space.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements [`FieldValue`] for number types. Declarations write the default values of number keys
-/// as Rust literals.
-macro_rules! numeric {
-    ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
-        impl $(<const $n: usize>)? FieldValue for $type {
-            const TYPE: ValueType = $value_type;
+/// Implements the traits of values for types by their conversions to and from [`KeyValue`].
+macro_rules! single_value {
+    ($(
+        [$($n:ident)?] $type:ty: $value_type:expr, $to:expr, $from:expr
+        $(, absent $is_absent:expr, $make_absent:expr)?;
+    )+) => {$(
+        impl $(<const $n: usize>)? $crate::value::FieldValue for $type {
+            const TYPE: $crate::value::ValueType = $value_type;
 
-            fn errors(&self, field: &Field) -> Vec<ValidationError> {
-                let numbers: fn(&Self) -> Vec<f64> = $numbers;
-                field.check(&numbers(self)).into_iter().collect()
+            fn from_value(value: $crate::value::KeyValue) -> Option<Self> {
+                let from: fn($crate::value::KeyValue) -> Option<Self> = $from;
+                from(value)
+            }
+        }
+
+        impl $(<const $n: usize>)? $crate::value::KeyNode for $type {
+            fn value(&self) -> Option<$crate::value::KeyValue> {
+                let to: fn(&Self) -> $crate::value::KeyValue = $to;
+                Some(to(self))
+            }
+
+            fn set_value(&mut self, value: $crate::value::KeyValue) -> bool {
+                let new = <Self as $crate::value::FieldValue>::from_value(value);
+                new.map(|new| *self = new).is_some()
+            }
+
+            $(
+                fn is_absent(&self) -> bool {
+                    let is_absent: fn(&Self) -> bool = $is_absent;
+                    is_absent(self)
+                }
+
+                fn make_absent(&mut self) {
+                    let make_absent: fn(&mut Self) = $make_absent;
+                    make_absent(self);
+                }
+            )?
+        }
+
+        impl $(<const $n: usize>)? $crate::value::TomlValue for $type {
+            fn from_toml(
+                value: &::toml::Spanned<::toml::de::DeValue>,
+            ) -> Result<Self, $crate::value::TomlError> {
+                $crate::value::read_single(value)
+            }
+
+            fn to_toml(&self) -> ::toml::Value {
+                $crate::value::write_single(self)
             }
         }
     )+};
 }
+pub(crate) use single_value;
 
-numeric! {
-    [] f64 => ValueType::Number(NumberRange::FINITE), |x| vec![*x];
-    [N] [f64; N] => ValueType::Numbers(N, NumberRange::FINITE), |list| list.to_vec();
-    [] u32 => ValueType::Whole(NumberRange::FINITE), |x| vec![f64::from(*x)];
-    [N] [u32; N] => ValueType::Wholes(N, NumberRange::FINITE), |list| list.map(f64::from).to_vec();
-}
-
-impl FieldValue for Color {
-    const TYPE: ValueType = ValueType::Color(NumberRange::FINITE);
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.0.errors(field)
-    }
-}
-
-impl FieldValue for bool {
-    const TYPE: ValueType = ValueType::Switch;
-
-    fn errors(&self, _: &Field) -> Vec<ValidationError> {
-        Vec::new()
-    }
-}
-
-impl FieldValue for String {
-    const TYPE: ValueType = ValueType::Text;
-
-    fn errors(&self, _: &Field) -> Vec<ValidationError> {
-        Vec::new()
-    }
-
-    fn is_absent(&self) -> bool {
-        self.is_empty()
-    }
+single_value! {
+    [] f64: ValueType::Number(NumberRange::FINITE),
+        |x| KeyValue::Numbers(vec![*x]), |value| value.numbers().map(|[x]| x);
+    [N] [f64; N]: ValueType::Numbers(N, NumberRange::FINITE),
+        |list| KeyValue::Numbers(list.to_vec()), |value| value.numbers();
+    [] u32: ValueType::Whole(NumberRange::FINITE),
+        |x| KeyValue::Numbers(vec![f64::from(*x)]), |value| value.wholes().map(|[x]| x);
+    [N] [u32; N]: ValueType::Wholes(N, NumberRange::FINITE),
+        |list| KeyValue::Numbers(list.map(f64::from).to_vec()), |value| value.wholes();
+    [] Color: ValueType::Color(NumberRange::FINITE),
+        |color| KeyValue::Numbers(color.0.to_vec()), |value| value.numbers().map(Color);
+    [] bool: ValueType::Switch,
+        |on| KeyValue::Switch(*on), |value| value.switch();
+    [] String: ValueType::Text,
+        |text| KeyValue::Text(text.clone()), |value| value.text(),
+        absent String::is_empty, String::clear;
 }
 
 impl<T: FieldValue> FieldValue for Option<T> {
@@ -125,9 +145,31 @@ impl<T: FieldValue> FieldValue for Option<T> {
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.as_ref().map(|value| value.errors(field)).unwrap_or_default()
     }
+}
+
+impl<T: FieldValue> KeyNode for Option<T> {
+    fn value(&self) -> Option<KeyValue> {
+        self.as_ref()?.value()
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        T::from_value(value).map(|new| *self = Some(new)).is_some()
+    }
 
     fn is_absent(&self) -> bool {
         self.is_none()
+    }
+
+    fn make_absent(&mut self) {
+        *self = None;
+    }
+
+    fn child(&self, key: &str) -> Option<&dyn KeyNode> {
+        self.as_ref()?.child(key)
+    }
+
+    fn child_mut(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        self.as_mut()?.child_mut(key)
     }
 }
 
@@ -178,18 +220,6 @@ macro_rules! choices {
             pub const ALL: [Self; Self::CHOICES.len()] = [$(Self::$variant),+];
         }
 
-        impl $crate::value::TomlValue for $name {
-            fn from_toml(
-                value: &::toml::Spanned<::toml::de::DeValue>,
-            ) -> Result<Self, $crate::value::TomlError> {
-                $crate::value::choice(value, Self::CHOICES).map(|index| Self::ALL[index])
-            }
-
-            fn to_toml(&self) -> ::toml::Value {
-                ::toml::Value::String(Self::CHOICES[*self as usize].name.to_string())
-            }
-        }
-
         impl $crate::value::FromWritten<&'static str> for $name {
             fn from_written(written: &'static str) -> Self {
                 match written {
@@ -199,13 +229,13 @@ macro_rules! choices {
             }
         }
 
-        impl $crate::value::FieldValue for $name {
-            const TYPE: $crate::value::ValueType =
-                $crate::value::ValueType::Choice(Self::CHOICES);
-
-            fn errors(&self, _: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
-                Vec::new()
-            }
+        $crate::value::single_value! {
+            [] $name: $crate::value::ValueType::Choice(Self::CHOICES),
+                |choice| $crate::value::KeyValue::Text(Self::CHOICES[*choice as usize].name.into()),
+                |value| match value.text()?.as_str() {
+                    $($word => Some(Self::$variant),)+
+                    _ => None,
+                };
         }
     };
 }
@@ -233,26 +263,22 @@ pub(crate) use choices;
 /// ```
 ///
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default`, and its `Default` consists of the declared defaults. If some key is
-/// required, a default declared by `=` must equal the default of the key's Rust type. Any other
-/// default is declared in the form `up: [f64; 3] => up "[0.0, 1.0, 0.0]"`: the function `up`
-/// returns the default, and the string is the same default as TOML.
+/// `Example: Default`, and its `Default` consists of the declared defaults. A default whose Rust
+/// expression is not TOML is declared as `=> expression, written "TOML"`.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [all] [$($doc)+] [] $name $($fields)+);
+        $crate::value::description!(@struct [$($doc)+] [] $name $($fields)+);
         $crate::value::description!(@default $name $($fields)+);
     };
     ($(#[doc = $doc:literal])+ pub struct $name:ident $(: $derived:ident)? { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [] [$($doc)+] [$($derived)?] $name $($fields)+);
+        $crate::value::description!(@struct [$($doc)+] [$($derived)?] $name $($fields)+);
     };
 
-    // `$all` is given if the declaration has `: Default`. The values of missing keys are then taken
-    // from the `Default` of the struct.
     (
-        @struct [$($all:ident)?] [$($doc:literal)+] [$($derived:ident)?] $name:ident
+        @struct [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(
             $(#[doc = $help:literal])+
-            $key:ident: $type:ty $(= $default:expr)? $(=> $function:ident $toml:literal)?
+            $key:ident: $type:ty $(= $default:expr)? $(=> $value:expr, written $toml:literal)?
             $(, or $absent:literal)?
             $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
             $(, as $value_type:ident)?;
@@ -295,18 +321,39 @@ macro_rules! description {
             }
         }
 
+        impl $crate::value::KeyNode for $name {
+            fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
+                match key {
+                    $(stringify!($key) => Some(&self.$key),)+
+                    _ => None,
+                }
+            }
+
+            fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+                match key {
+                    $(stringify!($key) => Some(&mut self.$key),)+
+                    _ => None,
+                }
+            }
+        }
+
         impl $crate::value::TomlValue for $name {
             fn from_toml(
                 value: &::toml::Spanned<::toml::de::DeValue>,
             ) -> Result<Self, $crate::value::TomlError> {
                 let fields = <Self as $crate::value::Description>::FIELDS;
                 let table = $crate::value::TableReader::new(value, fields)?;
-                $crate::value::description!(@read [$($all)?] [$($hidden)?] table $(
-                    $key
-                    $([Default::default; $default])?
-                    $([$function; $toml])?
-                    $([Default::default; $absent])?,
-                )+)
+                Ok(Self {
+                    $(
+                        $key: $crate::value::description!(
+                            @read table $key
+                            $(, $crate::value::FromWritten::from_written($default))?
+                            $(, $value)?
+                            $(, { let _ = $absent; Default::default() })?
+                        ),
+                    )+
+                    $($hidden: Default::default(),)?
+                })
             }
 
             fn to_toml(&self) -> ::toml::Value {
@@ -320,34 +367,19 @@ macro_rules! description {
         }
     };
 
-    (@read [all] [$($hidden:ident)?] $table:ident $($key:ident $([$($default:tt)+])?,)+) => {{
-        let mut new = Self::default();
-        $($table.replace(stringify!($key), &mut new.$key)?;)+
-        Ok(new)
-    }};
-    (
-        @read [] [$($hidden:ident)?] $table:ident
-        $($key:ident $([$($function:ident)::+; $unused:tt])?,)+
-    ) => {
-        Ok(Self {
-            $($key: $crate::value::description!(@value_of $table $key $($($function)::+)?),)+
-            $($hidden: Default::default(),)?
-        })
-    };
-    (@value_of $table:ident $key:ident) => {
+    (@read $table:ident $key:ident) => {
         $table.required(stringify!($key))?
     };
-    (@value_of $table:ident $key:ident $($function:ident)::+) => {
-        $table.optional(stringify!($key))?.unwrap_or_else($($function)::+)
+    (@read $table:ident $key:ident, $default:expr) => {
+        $table.optional(stringify!($key))?.unwrap_or_else(|| $default)
     };
 
-    // The first rule is for keys that are always written. The second is for keys declared with
-    // `or`, which may be left out: their values are written only if they are present.
+    // Keys with `or` are written only if they are present.
     (@write ($value:expr)) => {
         Some($value as &dyn $crate::value::TomlValue)
     };
     (@write ($value:expr) $absent:literal) => {
-        (!$crate::value::FieldValue::is_absent($value))
+        (!$crate::value::KeyNode::is_absent($value))
             .then_some($value as &dyn $crate::value::TomlValue)
     };
 

@@ -1,6 +1,5 @@
-//! Values of scene files: colours, number ranges, validation errors, and the tables of keys that
-//! describe them. Every description (shape, material, light, camera, scene) uses this module, which
-//! depends on none of them.
+//! Values of scene files, and the tables of keys that describe them. Every description uses this
+//! module, which depends on none of them.
 
 mod angle;
 mod color;
@@ -8,6 +7,7 @@ mod description;
 mod direction;
 mod field;
 mod hash;
+mod key_node;
 mod number_range;
 mod order;
 mod round;
@@ -18,15 +18,16 @@ mod validation;
 pub use angle::sin_cos_degrees;
 pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use description::{Description, FieldValue, FromWritten};
-pub(crate) use description::{choices, description, doc_text};
+pub(crate) use description::{choices, description, doc_text, single_value};
 pub use direction::unit;
 pub(crate) use field::names;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::{Fnv1a64, fnv1a64};
+pub use key_node::{KeyNode, KeyValue, node_at, node_at_mut};
 pub use number_range::{NumberRange, number};
 pub use order::{ascending, sort_by_number, total_order};
-pub use round::{floor_log10, round_fine, round_nice, round_significant, rounded_to, turned};
+pub use round::{floor_log10, rotated_y, round_fine, round_nice, round_significant, rounded_to};
 pub use text::{sanitized, truncated};
-pub(crate) use toml_value::{TableReader, choice, one_of, only_entry, written};
+pub(crate) use toml_value::{TableReader, one_of, only_entry, read_single, write_single, written};
 pub use toml_value::{TomlError, TomlValue};
 pub use validation::{ValidationError, Validator};

@@ -1,10 +1,7 @@
-//! Conversion of descriptions from and to the values of scene files.
-//!
-//! This module replaces `serde`, whose conversions would be compiled again for each description and
-//! each kind of input. Here, code that does not depend on the type is compiled once, in shared
-//! functions.
+//! Conversion of descriptions from and to the values of scene files. Unlike with `serde`, code that
+//! does not depend on the type is compiled once.
 
-use crate::value::{Choice, Color, Field};
+use crate::value::{Color, Field, FieldValue, KeyValue, ValueType};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -12,11 +9,7 @@ use toml::{Spanned, Table, Value};
 
 /// Type with a conversion from and to the values of scene files.
 pub trait TomlValue {
-    /// Converts a value of a scene file to this type.
-    ///
-    /// # Errors
-    /// Fails if `value` has the wrong type, if a key is unknown or missing, or if a number is too
-    /// large for its type. Ranges are not checked.
+    /// Converts a value of a scene file, without a check of ranges.
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError>
     where
         Self: Sized;
@@ -24,10 +17,7 @@ pub trait TomlValue {
     /// Converts `self` to a value of a scene file.
     fn to_toml(&self) -> Value;
 
-    /// Parses `text` as a value of this type. `text` holds the keys and values of one table.
-    ///
-    /// # Errors
-    /// Fails if `text` is not TOML, or for the reasons of [`TomlValue::from_toml`].
+    /// Parses the keys and values of one table.
     fn from_text(text: &str) -> Result<Self, TomlError>
     where
         Self: Sized,
@@ -89,8 +79,7 @@ fn unknown(span: Range<usize>, what: &str, found: &str, known: &[&str]) -> TomlE
     TomlError::new(span, format!("unknown {what} `{found}`, {expected}"))
 }
 
-/// Reader of a table of a scene file. All keys of the table are known, because the creation of the
-/// reader fails for an unknown key.
+/// Reader of a table whose keys are all known.
 pub(crate) struct TableReader<'a> {
     table: &'a DeTable<'a>,
     span: Range<usize>,
@@ -166,15 +155,6 @@ pub(crate) fn only_entry<'a>(
         Some(index) => Ok((index, inner)),
         None => Err(unknown(key.span(), "variant", key.get_ref(), names)),
     }
-}
-
-/// Returns the index of the choice in `choices` whose name is the string `value`.
-pub(crate) fn choice(value: &Spanned<DeValue>, choices: &[Choice]) -> Result<usize, TomlError> {
-    let word = value.get_ref().as_str().ok_or_else(|| wrong(value, "a string"))?;
-    choices.iter().position(|choice| choice.name == word).ok_or_else(|| {
-        let names: Vec<_> = choices.iter().map(|choice| choice.name).collect();
-        unknown(value.span(), "variant", word, &names)
-    })
 }
 
 /// Implements [`TomlValue`] for an enum whose variants have one value each. In scene files such an
@@ -266,100 +246,95 @@ macro_rules! one_of {
                 $crate::value::written(&[(key, Some(value))])
             }
         }
+
+        impl $crate::value::KeyNode for $name {
+            fn value(&self) -> Option<$crate::value::KeyValue> {
+                let kind = match self {
+                    $(Self::$variant(_) => $key,)+
+                };
+                Some($crate::value::KeyValue::Text(kind.to_string()))
+            }
+
+            fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
+                let (kind, value): (&str, &dyn $crate::value::KeyNode) = match self {
+                    $(Self::$variant(value) => ($key, value),)+
+                };
+                (kind == key).then_some(value)
+            }
+
+            fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+                let (kind, value): (&str, &mut dyn $crate::value::KeyNode) = match self {
+                    $(Self::$variant(value) => ($key, value),)+
+                };
+                (kind == key).then_some(value)
+            }
+        }
     };
 }
 pub(crate) use one_of;
-
-fn integer(value: &Spanned<DeValue>) -> Result<i64, TomlError> {
-    let digits = value.get_ref().as_integer().ok_or_else(|| wrong(value, "an integer"))?;
-    let number = i64::from_str_radix(digits.as_str(), digits.radix());
-    number.map_err(|_| TomlError::new(value.span(), "integer number overflowed"))
-}
 
 /// Returns the entries of the list `value`.
 fn entries<'a>(value: &'a Spanned<DeValue<'a>>) -> Result<&'a [Spanned<DeValue<'a>>], TomlError> {
     value.get_ref().as_array().map(|list| &list[..]).ok_or_else(|| wrong(value, "a list"))
 }
 
-/// Returns the entries of the list `value`, which must have `length` of them.
-fn exactly<'a>(
-    value: &'a Spanned<DeValue<'a>>,
-    length: usize,
-) -> Result<&'a [Spanned<DeValue<'a>>], TomlError> {
-    let list = entries(value)?;
-    let error = || {
-        let message =
-            format!("invalid length {}, expected an array of length {length}", list.len());
-        TomlError::new(value.span(), message)
+/// Reads a value that is not a table.
+pub(crate) fn read_single<T: FieldValue>(value: &Spanned<DeValue>) -> Result<T, TomlError> {
+    let list = || entries(value)?.iter().map(number).collect::<Result<_, _>>();
+    let read = match (T::TYPE, value.get_ref()) {
+        (ValueType::Color(_), DeValue::String(text)) => {
+            Color::from_hex(text).map(|color| KeyValue::Numbers(color.0.to_vec()))
+        }
+        (_, DeValue::String(text)) => Some(KeyValue::Text(text.to_string())),
+        (_, DeValue::Boolean(on)) => Some(KeyValue::Switch(*on)),
+        (_, DeValue::Array(_)) => Some(KeyValue::Numbers(list()?)),
+        (_, DeValue::Integer(_) | DeValue::Float(_)) => {
+            Some(KeyValue::Numbers(vec![number(value)?]))
+        }
+        (_, DeValue::Datetime(_) | DeValue::Table(_)) => None,
     };
-    if list.len() == length { Ok(list) } else { Err(error()) }
+    read.and_then(T::from_value).ok_or_else(|| match (T::TYPE, value.get_ref()) {
+        (ValueType::Choice(choices), DeValue::String(word)) => {
+            let names: Vec<_> = choices.iter().map(|choice| choice.name).collect();
+            unknown(value.span(), "variant", word, &names)
+        }
+        _ => wrong(value, &T::TYPE.to_string()),
+    })
 }
 
-impl TomlValue for f64 {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        match value.get_ref() {
-            DeValue::Float(digits) => {
-                let digits = digits.as_str();
-                let number = digits.parse().ok();
-                // A number too large for the type is parsed as infinite.
-                number
-                    .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
-                    .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
-            }
-            DeValue::Integer(_) => integer(value).map(|number| number as f64),
-            _ => Err(wrong(value, "a number")),
-        }
-    }
-
-    fn to_toml(&self) -> Value {
+/// Writes a value that is not a table.
+pub(crate) fn write_single<T: FieldValue>(value: &T) -> Value {
+    let one = |x: f64| match T::TYPE {
+        ValueType::Whole(_) | ValueType::Wholes(..) => Value::Integer(x as i64),
         // NaN is written without a sign.
-        Value::Float(if self.is_nan() { self.copysign(1.0) } else { *self })
+        _ => Value::Float(if x.is_nan() { x.copysign(1.0) } else { x }),
+    };
+    match (T::TYPE, value.value()) {
+        (_, None) => Value::Table(Table::new()),
+        (_, Some(KeyValue::Text(text))) => Value::String(text),
+        (_, Some(KeyValue::Switch(on))) => Value::Boolean(on),
+        (ValueType::Number(_) | ValueType::Whole(_), Some(KeyValue::Numbers(list))) => one(list[0]),
+        (ValueType::Factor, Some(KeyValue::Numbers(list))) if list.len() == 1 => one(list[0]),
+        (_, Some(KeyValue::Numbers(list))) => Value::Array(list.into_iter().map(one).collect()),
     }
 }
 
-impl TomlValue for u32 {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        let number = integer(value)?;
-        let message = || format!("invalid value: integer `{number}`, expected u32");
-        Self::try_from(number).map_err(|_| TomlError::new(value.span(), message()))
-    }
-
-    fn to_toml(&self) -> Value {
-        Value::Integer(i64::from(*self))
-    }
-}
-
-impl TomlValue for bool {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        value.get_ref().as_bool().ok_or_else(|| wrong(value, "a boolean"))
-    }
-
-    fn to_toml(&self) -> Value {
-        Value::Boolean(*self)
-    }
-}
-
-impl TomlValue for String {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        value.get_ref().as_str().map(str::to_string).ok_or_else(|| wrong(value, "a string"))
-    }
-
-    fn to_toml(&self) -> Value {
-        Value::String(self.clone())
-    }
-}
-
-impl<T: TomlValue + Copy + Default, const N: usize> TomlValue for [T; N] {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        let mut array = [T::default(); N];
-        for (place, entry) in array.iter_mut().zip(exactly(value, N)?) {
-            *place = T::from_toml(entry)?;
+fn number(value: &Spanned<DeValue>) -> Result<f64, TomlError> {
+    match value.get_ref() {
+        DeValue::Float(digits) => {
+            let digits = digits.as_str();
+            let number = digits.parse().ok();
+            // A number too large for the type is parsed as infinite.
+            number
+                .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
+                .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
         }
-        Ok(array)
-    }
-
-    fn to_toml(&self) -> Value {
-        Value::Array(self.iter().map(T::to_toml).collect())
+        DeValue::Integer(digits) => {
+            let number = i64::from_str_radix(digits.as_str(), digits.radix());
+            let number = number.map(|number| number as f64);
+            number.map_err(|_| TomlError::new(value.span(), "integer number overflowed"))
+        }
+        _ => Err(wrong(value, "a number")),
     }
 }
 
@@ -388,8 +363,7 @@ impl<T: TomlValue> TomlValue for BTreeMap<String, T> {
     }
 }
 
-/// Value of an optional key. Callers leave out a key whose value is `None`, so the empty table that
-/// stands for `None` is never written.
+/// Value of an optional key; that of `None` is never written.
 impl<T: TomlValue> TomlValue for Option<T> {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
         T::from_toml(value).map(Some)
@@ -397,21 +371,5 @@ impl<T: TomlValue> TomlValue for Option<T> {
 
     fn to_toml(&self) -> Value {
         self.as_ref().map_or(Value::Table(Table::new()), T::to_toml)
-    }
-}
-
-/// Colour in scene files. It is read from `[r, g, b]` or `"#rrggbb"`, and written as `[r, g, b]`.
-impl TomlValue for Color {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        match value.get_ref() {
-            DeValue::String(text) => {
-                Self::from_hex(text).ok_or_else(|| wrong(value, "a string \"#rrggbb\""))
-            }
-            _ => TomlValue::from_toml(value).map(Self),
-        }
-    }
-
-    fn to_toml(&self) -> Value {
-        self.0.to_toml()
     }
 }

@@ -1,30 +1,94 @@
-//! Direct lighting by ambient light, and by shadow rays to lights without a size.
+//! Direct lighting: the estimator that all kinds of lights share, ambient light, and lights without
+//! a size.
 
-use crate::culling::tile::TileCandidates;
-use crate::integrator::interaction::SurfaceInteraction;
-use crate::integrator::nested_dielectrics::Media;
-use crate::integrator::path::{Counts, Path, Radiance};
-use crate::world::World;
+use crate::integrator::vertex::Vertex;
+use crate::lights::choice::LightChoice;
 use std::f64::consts::FRAC_1_PI;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
-use zerkalo_scene::light::DeltaLight;
+use zerkalo_scene::light::{DeltaLight, LightSample};
 
-/// Adds to `out` the radiance that surfaces reflect in ambient light and in the light of
-/// `world.sources` (lights without a size). Ambient light approximates indirect light. Lanes in
-/// `bouncing` get no ambient light, because their diffuse bounces compute the indirect light.
-/// `media` are the media of the paths; `None` in worlds without transmission.
+/// Returns the density \[1/sr\] of cosine-weighted directions whose angle to the normal has the
+/// cosine `cos`.
 #[inline(always)]
-pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
-    world: &World<L>,
-    path: &Path<L>,
-    interaction: &SurfaceInteraction<L>,
-    candidates: &TileCandidates,
-    bouncing: Option<L::Mask>,
-    media: Option<Media<'_, L>>,
-    (out, counts): (&mut Radiance<L>, &mut Counts),
-) {
-    if let Some(group) = world.ambient {
+pub(crate) fn cosine_density<L: SimdFloat>(cos: L) -> L {
+    cos * L::from_f64(FRAC_1_PI)
+}
+
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Estimate of the light of one sample (`SampleLd` of pbrt), added to a light group. `lit` are
+    /// the lanes that the light reaches if nothing occludes it. `occluded` traces the shadow rays
+    /// of its lanes. `radiance` returns the radiance that surfaces reflect or transmit.
+    #[inline(always)]
+    pub fn add_light(
+        &mut self,
+        group: usize,
+        mut lit: L::Mask,
+        occluded: impl FnOnce(L::Mask) -> L::Mask,
+        radiance: impl FnOnce(&Self, L::Mask) -> Vec3<L>,
+    ) {
+        if lit.none() {
+            return;
+        }
+        if self.world.shadows {
+            self.out.counts.add_rays(lit);
+            lit = lit.and_not(occluded(lit));
+            if lit.none() {
+                return;
+            }
+        }
+        let radiance = radiance(self, lit).masked(lit);
+        self.out.groups[group] += radiance;
+    }
+
+    /// Returns the radiance at the eye of light of unit emission, where `value` is the BSDF
+    /// \[1/sr\] times the cosine of the angle of incidence.
+    #[inline(always)]
+    pub fn unoccluded(&self, value: Vec3<L>, light: &LightSample<L>) -> Vec3<L> {
+        let radiance = self.path.throughput.component_mul(value).component_mul(light.irradiance);
+        self.attenuated(radiance, light.distance)
+    }
+
+    /// Returns what the medium in front of the surface lets through of `radiance` from a light at
+    /// `distance`.
+    #[inline(always)]
+    fn attenuated(&self, radiance: Vec3<L>, distance: L) -> Vec3<L> {
+        match self.media.and_then(|media| media.transmittance(distance)) {
+            Some(left) => radiance.component_mul(left),
+            None => radiance,
+        }
+    }
+
+    /// Returns the lanes with a diffuse part or highlights that face the light from `wi`.
+    #[inline(always)]
+    fn facing<const SIMPLE: bool>(&self, wi: Vec3<L>) -> L::Mask {
+        let interaction = self.interaction;
+        let mut facing = interaction.direct_mask & interaction.normal.dot(wi).gt(L::zero());
+        if !SIMPLE && self.world.smooth {
+            facing = facing & interaction.geometric.dot(wi).gt(L::zero());
+        }
+        facing
+    }
+
+    /// Returns the diffuse part and, in `lanes`, the highlights for light from `wi`: the BSDF
+    /// \[1/sr\] times the cosine of the angle of incidence. `diffuse` is this product for the
+    /// diffuse part of a white surface.
+    #[inline(always)]
+    pub fn direct_value(&self, wi: Vec3<L>, diffuse: L, lanes: L::Mask) -> Vec3<L> {
+        let interaction = self.interaction;
+        let mut value = interaction.diffuse * diffuse;
+        for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & lanes) {
+            value += self.world.bsdfs[index].highlight(&self.query(), wi).masked(lanes);
+        }
+        value
+    }
+
+    /// Adds ambient light, which approximates indirect light, except in the lanes `bouncing`, whose
+    /// diffuse bounces compute it.
+    #[inline(always)]
+    pub fn ambient_light<const SIMPLE: bool>(&mut self, bouncing: Option<L::Mask>) {
+        let (world, interaction) = (self.world, self.interaction);
+        let Some(group) = world.ambient else { return };
         let lanes = match bouncing {
             Some(bouncing) => interaction.has_bsdf.and_not(bouncing),
             None => interaction.has_bsdf,
@@ -34,59 +98,87 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             if !SIMPLE && world.colored {
                 ambient = ambient.component_mul(interaction.albedo_factor);
             }
-            out.groups[group] += path.throughput.component_mul(ambient).masked(lanes);
+            self.out.groups[group] += self.path.throughput.component_mul(ambient).masked(lanes);
         }
     }
-    if interaction.direct_mask.none() {
-        return;
-    }
-    let origin = interaction.ray_origin();
-    for (index, (source, occluders)) in world.sources.iter().zip(&candidates.occluders).enumerate()
-    {
-        let target = &source.light;
-        let light = target.light.sample_li(origin);
-        let cos_light = interaction.normal.dot(light.wi);
-        let mut lit = interaction.direct_mask & cos_light.gt(L::zero());
-        if !SIMPLE && world.smooth {
-            lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
+
+    /// Adds the light of the lights without a size to which all paths trace shadow rays.
+    #[inline(always)]
+    pub fn delta_lights<const SIMPLE: bool>(&mut self) {
+        let (world, interaction) = (self.world, self.interaction);
+        if interaction.direct_mask.none() {
+            return;
         }
-        if let DeltaLight::Point { cone: Some(_), .. } = target.light {
-            lit = lit & light.irradiance.gt(L::zero());
-        }
-        if lit.none() {
-            continue;
-        }
-        if world.shadows {
-            counts.rays += u64::from(lit.bits().count_ones());
-            let (direction, t_max) = match &target.on_surface {
-                None => (light.wi, light.distance),
-                Some(on_surface) => on_surface.end(origin),
-            };
-            let ray = Ray { origin, direction };
-            let occluded = if SIMPLE {
-                world.geometry.occluded_linear(&ray, t_max, lit, occluders)
-            } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                let start = (interaction.primitive, interaction.front);
-                buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
-            } else {
-                world.geometry.occluded(&ray, t_max, lit, occluders)
-            };
-            lit = lit.and_not(occluded);
-            if lit.none() {
-                continue;
+        let origin = interaction.ray_origin();
+        let lights = world.sources.iter().zip(&self.candidates.occluders);
+        for (index, (source, occluders)) in lights.enumerate() {
+            let target = &source.light;
+            let light = target.light.sample_li(origin);
+            let mut lit = self.facing::<SIMPLE>(light.wi);
+            if let DeltaLight::Point { cone: Some(_), .. } = target.light {
+                lit = lit & light.irradiance.x.gt(L::zero());
             }
+            let occluded = |lit| {
+                let (direction, t_max) = match &target.on_surface {
+                    None => (light.wi, light.distance),
+                    Some(on_surface) => on_surface.end(origin),
+                };
+                let ray = Ray { origin, direction };
+                if SIMPLE {
+                    world.geometry.occluded_linear(&ray, t_max, lit, occluders)
+                } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
+                    let start = (interaction.primitive, interaction.front);
+                    buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
+                } else {
+                    world.geometry.occluded(&ray, t_max, lit, occluders)
+                }
+            };
+            self.add_light(source.group, lit, occluded, |vertex, lit| {
+                let diffuse = cosine_density(interaction.normal.dot(light.wi));
+                let value = vertex.direct_value(light.wi, diffuse, lit);
+                source.emitted(vertex.unoccluded(value, &light))
+            });
         }
-        let mut value = interaction.diffuse * (cos_light * L::from_f64(FRAC_1_PI));
-        for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & lit) {
-            let (bsdf, view) = (&world.bsdfs[index], -path.ray.direction);
-            let cos_view = interaction.normal.dot(view);
-            let highlight = bsdf.highlight(interaction.normal, view, light.wi, cos_light, cos_view);
-            value += highlight.masked(lanes);
+    }
+
+    /// Adds an estimate of the light of all lights in `choice`: each lane chooses a few of them.
+    #[inline(never)]
+    pub fn chosen_lights<const SIMPLE: bool>(&mut self, choice: &LightChoice<L::Scalar>) {
+        let (world, interaction) = (self.world, self.interaction);
+        if interaction.direct_mask.none() {
+            return;
         }
-        let mut value = path.throughput.component_mul(value) * light.irradiance;
-        if let Some(left) = media.and_then(|media| media.transmittance(light.distance)) {
-            value = value.component_mul(left);
+        self.out.counts.glossy = true;
+        let origin = interaction.ray_origin();
+        let lights = choice.choose(self.sampler.light_choice_1d(self.bounce));
+        let occluders = &self.candidates.occluders[world.first_stratum()..];
+        for (stratum, occluders) in occluders.iter().enumerate() {
+            let to_light = lights.positions(stratum) - origin;
+            let distance = to_light.length_squared().sqrt();
+            let inverse = L::one() / distance;
+            let wi = to_light * inverse;
+            let mut lit = self.facing::<SIMPLE>(wi);
+            let cone = lights.cone(stratum, wi);
+            if let Some(factor) = cone {
+                lit = lit & factor.gt(L::zero());
+            }
+            let occluded = |lit| {
+                let ray = Ray { origin, direction: wi };
+                match SIMPLE {
+                    true => world.geometry.occluded_linear(&ray, distance, lit, occluders),
+                    false => world.geometry.occluded(&ray, distance, lit, occluders),
+                }
+            };
+            self.add_light(choice.group, lit, occluded, |vertex, lit| {
+                let diffuse = cosine_density(interaction.normal.dot(wi));
+                let value = vertex.direct_value(wi, diffuse, lit);
+                let mut radiance = vertex.path.throughput.component_mul(value);
+                radiance = radiance * lights.irradiance(stratum, inverse);
+                if let Some(factor) = cone {
+                    radiance = radiance * factor;
+                }
+                vertex.attenuated(radiance, distance).component_mul(lights.emission(stratum))
+            });
         }
-        out.groups[source.group] += source.emitted(value).masked(lit);
     }
 }

@@ -2,32 +2,31 @@
 //!
 //! Three strategies find the light of an environment. The first samples a direction with a density
 //! in proportion to the luminance of the environment. The second is the reflected ray of a glossy
-//! lobe. The third samples a cosine-weighted direction at a matt surface. Glossy lobes combine the
-//! first and the second by the power heuristic, matt surfaces the first and the third. Highlights
-//! of lights use only the first. Mirrors and the camera use only the light at the end of their ray.
+//! lobe. The third samples a cosine-weighted direction at a diffuse surface. Glossy lobes combine
+//! the first and the second by the power heuristic, diffuse surfaces the first and the third.
+//! Highlights use only the first. Mirrors and the camera use only the light at the end of their ray.
 //!
 //! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
 //! the start of the ray already includes all environments.
 
-use crate::integrator::emitter_lighting::{ReflectingLobes, lobe_value, power_heuristic};
+use crate::integrator::direct_lighting::cosine_density;
+use crate::integrator::emitter_lighting::{ReflectedRays, power_heuristic};
 use crate::integrator::indirect_diffuse::NO_DENSITY;
-use crate::integrator::interaction::SurfaceInteraction;
-use crate::integrator::path::{Counts, Path, Radiance};
-use crate::world::{EnvironmentSource, World};
-use std::f64::consts::FRAC_1_PI;
+use crate::integrator::path::{Path, Radiance};
+use crate::integrator::vertex::Vertex;
+use crate::world::{EnvironmentSource, LightSource, World};
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
-use zerkalo_kernel::sampling::{PacketSampler, warp};
+use zerkalo_kernel::sampling::warp;
+use zerkalo_scene::light::LightSample;
 
-/// First salt of the random numbers for environments. A salt is a number that scrambles random
-/// numbers. Each emitter has a salt of its own and each environment has two, so that their random
-/// numbers are independent. The salts of emitters are smaller than this one.
-pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
+/// First salt of the random numbers for environments. Each emitter has a salt of its own, smaller
+/// than this one, and each environment has two, so that their random numbers are independent.
+const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments, weighted for multiple importance sampling, to
-/// `out`. The rays of `lanes` must hit no surface; other lanes are unchanged. `transmittance` is
-/// the fraction of light that the medium around the rays lets through. If it is `None`, the medium
-/// lets all light through.
+/// `out`. The rays of `lanes` hit no surface. `transmittance` is that of the medium around the rays;
+/// `None` if no medium absorbs light.
 pub(crate) fn visible_environments<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
@@ -50,87 +49,79 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     }
 }
 
-/// Adds to `out` the radiance that surfaces reflect in the light of all environments. `bounce` is
-/// the number of earlier surfaces of the path. `glossy` selects lanes with a glossy lobe, which
-/// samples directions with a finite density; mirrors do not.
-#[inline(never)]
-pub(crate) fn environment_lighting<L: SimdFloat>(
-    world: &World<L>,
-    path: &Path<L>,
-    interaction: &SurfaceInteraction<L>,
-    (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    (glossy, lobes): (L::Mask, &ReflectingLobes<L>),
-    (out, counts): (&mut Radiance<L>, &mut Counts),
-) {
-    let normal = interaction.normal;
-    let view = -path.ray.direction;
-    let cosine_density = |cos: L| cos * L::from_f64(FRAC_1_PI);
-    let is_matt = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
-    for (index, source) in (0..).zip(&world.environments) {
-        let salt = ENVIRONMENT_SALT + 2 * index;
-        let numbers = sampler.light_2d(bounce, salt);
-        let light = source.light.sample(numbers, interaction.direct_mask | glossy);
-        let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
-        let cos_light = normal.dot(light.wi);
-        let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
-        let mut value = Vec3::zero();
-        if direct.any() {
-            let density = cosine_density(cos_light);
-            value = interaction.diffuse * (density * power_heuristic(light.density, density));
-            for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & direct) {
-                let (bsdf, cos_view) = (&world.bsdfs[index], normal.dot(view));
-                let highlight = bsdf.highlight(normal, view, light.wi, cos_light, cos_view);
-                value += highlight.masked(lanes);
-            }
-            value = value.masked(direct);
-        }
-        if source.visible {
-            for (index, lanes) in interaction.bsdfs(glossy & arrives) {
-                let incident = &path.ray.direction;
-                let (lobe, density) = lobe_value(world, incident, interaction, index, light.wi);
-                let weight = power_heuristic(light.density, density) * lobes.share;
-                value += (lobe * weight).masked(lanes);
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Adds the light of all environments that the surfaces reflect. `glossy` are the reflected rays
+    /// with a finite density, which find it, too.
+    #[inline(never)]
+    pub fn environment_lighting(&mut self, glossy: &ReflectedRays<L>) {
+        let interaction = self.interaction;
+        self.out.counts.glossy = true;
+        let is_diffuse = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
+        for (index, environment) in self.world.environments.iter().enumerate() {
+            let source = self.sample_environment(index, interaction.direct_mask | glossy.lanes);
+            let light = &source.light;
+            let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
+            let rays = source.visible.then_some(glossy);
+            let value = self.reflected(light, arrives, rays, |density| {
+                density * power_heuristic(light.density, density)
+            });
+            self.add_environment(environment, light.wi, value.component_mul(light.irradiance));
+            if is_diffuse.any() {
+                self.add_cosine_sample(index, environment, is_diffuse);
             }
         }
-        let value = value.component_mul(light.irradiance);
-        add(world, path, interaction, source, light.wi, value, (out, counts));
-        if is_matt.none() {
-            continue;
-        }
-        let (u, v) = sampler.light_2d(bounce, salt + 1);
+    }
+
+    /// Samples a direction of the environment with the number `index`, in `lanes`.
+    #[inline(always)]
+    pub fn sample_environment(
+        &self,
+        index: usize,
+        lanes: L::Mask,
+    ) -> LightSource<LightSample<L>, L::Scalar> {
+        let numbers = self.sampler.light_2d(self.bounce, ENVIRONMENT_SALT + 2 * index as u32);
+        let source = &self.world.environments[index];
+        source.with_light(source.light.sample(numbers, lanes))
+    }
+
+    /// Adds light of an environment from a cosine-weighted direction, in `lanes`.
+    #[inline(always)]
+    fn add_cosine_sample(
+        &mut self,
+        index: usize,
+        environment: &EnvironmentSource<L::Scalar>,
+        lanes: L::Mask,
+    ) {
+        let interaction = self.interaction;
+        let salt = ENVIRONMENT_SALT + 2 * index as u32 + 1;
+        let (u, v) = self.sampler.light_2d(self.bounce, salt);
         let (x, y, r2) = warp::disk(u, v);
         let cos = (L::one() - r2).max(L::zero()).sqrt();
-        let wi = Frame::around(normal).to_world(Vec3::new(x, y, cos)).renormalize();
-        let arrives = is_matt & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
-        let (radiance, density) = source.light.radiance(wi, arrives);
+        let wi = Frame::around(interaction.normal).to_world(Vec3::new(x, y, cos)).renormalize();
+        let arrives = lanes & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let (radiance, density) = environment.light.radiance(wi, arrives);
         let weight = power_heuristic(cosine_density(cos), density).masked(arrives);
         let value = interaction.diffuse.component_mul(radiance) * weight;
-        let value = value.masked(arrives);
-        add(world, path, interaction, source, wi, value, (out, counts));
+        self.add_environment(environment, wi, value.masked(arrives));
     }
-}
 
-/// Adds reflected light of the environment to `out`, in lanes whose shadow ray reaches the
-/// environment. `wi` are the directions from which the light arrives. `value` is the reflected
-/// radiance if nothing occludes these directions.
-#[inline(always)]
-fn add<L: SimdFloat>(
-    world: &World<L>,
-    path: &Path<L>,
-    interaction: &SurfaceInteraction<L>,
-    source: &EnvironmentSource<L::Scalar>,
-    wi: Vec3<L>,
-    value: Vec3<L>,
-    (out, counts): (&mut Radiance<L>, &mut Counts),
-) {
-    let mut lit = value.max_element().gt(L::zero());
-    if lit.any() && world.shadows {
-        counts.rays += u64::from(lit.bits().count_ones());
-        let ray = Ray { origin: interaction.ray_origin(), direction: wi };
-        let (t_max, occluders) = (L::from_f64(L::MAX), world.geometry.all());
-        let occluded = world.geometry.occluded(&ray, t_max, lit, occluders);
-        lit = lit.and_not(occluded);
+    /// Adds reflected light of an environment. `wi` are the directions from which it arrives, and
+    /// `value` is the reflected radiance if nothing occludes them.
+    #[inline(always)]
+    fn add_environment(
+        &mut self,
+        environment: &EnvironmentSource<L::Scalar>,
+        wi: Vec3<L>,
+        value: Vec3<L>,
+    ) {
+        let (geometry, origin) = (&self.world.geometry, self.interaction.ray_origin());
+        let occluded = |lit| {
+            let ray = Ray { origin, direction: wi };
+            geometry.occluded(&ray, L::from_f64(L::MAX), lit, geometry.all())
+        };
+        let lit = value.max_element().gt(L::zero());
+        self.add_light(environment.group, lit, occluded, |vertex, _| {
+            environment.emitted(vertex.path.throughput.component_mul(value))
+        });
     }
-    let radiance = path.throughput.component_mul(value);
-    out.groups[source.group] += source.emitted(radiance).masked(lit);
 }

@@ -1,16 +1,94 @@
 //! Integrators: radiance along camera rays.
 
-pub(crate) mod chosen_lights;
 pub(crate) mod coincident_surfaces;
-pub(crate) mod direct_lighting;
-pub(crate) mod emitter_lighting;
-pub(crate) mod environment_lighting;
+mod direct_lighting;
+mod emitter_lighting;
+mod environment_lighting;
 pub(crate) mod first_hit;
 pub(crate) mod indirect_diffuse;
-pub(crate) mod interaction;
-pub(crate) mod interface_lighting;
+mod interaction;
+mod interface_lighting;
 pub(crate) mod nested_dielectrics;
-pub(crate) mod opaque;
+mod opaque;
 pub(crate) mod path;
 pub(crate) mod surface_textures;
-pub(crate) mod transmission;
+mod transmission;
+mod vertex;
+
+use crate::culling::tile::TileCandidates;
+use crate::integrator::first_hit::FirstHit;
+use crate::integrator::path::{Path, Radiance};
+use crate::integrator::transmission::{Branch, TransmissionIntegrator};
+use crate::world::World;
+use zerkalo_kernel::lanes::{Double, SimdFloat, Single, Vec3};
+use zerkalo_kernel::sampling::PacketSampler;
+
+/// Inputs that all paths of a packet share.
+#[derive(Clone, Copy)]
+pub(crate) struct Integrator<'a, L: SimdFloat> {
+    pub world: &'a World<L>,
+    pub sampler: &'a PacketSampler<'a, L>,
+    /// Primitives that the first rays, and the shadow rays from their hit points, are tested
+    /// against.
+    pub candidates: &'a TileCandidates,
+    /// Largest number of surfaces on a path after the first.
+    pub depth: u32,
+}
+
+impl<L: SimdFloat> World<L> {
+    /// Traces one packet of paths from the camera, and overwrites `path`. Lanes outside of `active`
+    /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
+    /// their hit points are tested against; `None` means all primitives.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        path: &mut Path<L>,
+        candidates: Option<&TileCandidates>,
+        sampler: &PacketSampler<'_, L>,
+        active: L::Mask,
+        out: &mut Radiance<L>,
+    ) {
+        for group in &mut out.groups[..self.groups()] {
+            *group = Vec3::zero();
+        }
+        let candidates = candidates.unwrap_or(&self.all_candidates);
+        let integrator = Integrator { world: self, sampler, candidates, depth: self.depth };
+        if let Some(limits) = self.diffuse_limits {
+            integrator.trace_generations(limits, path.ray, active, out);
+        } else if let Some(nested_dielectrics) = &self.nested_dielectrics {
+            let mut start = Branch::camera(path.ray, active);
+            nested_dielectrics.add_at_start(&path.ray, &mut start.media);
+            TransmissionIntegrator { base: integrator, nested_dielectrics }
+                .trace(&mut start, None, out);
+        } else {
+            match (self.simple, !self.has_emitters()) {
+                (true, true) => integrator.trace_opaque::<true, false>(path, active, None, out),
+                (false, true) => integrator.trace_opaque::<false, false>(path, active, None, out),
+                (_, false) => integrator.trace_opaque::<false, true>(path, active, None, out),
+            }
+        }
+    }
+
+    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
+    /// same length. A point is a position in the picture: a column and a row in pixels, with
+    /// fractions.
+    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
+        first_hit::trace_first_hits(self, points, hits);
+    }
+}
+
+/// Type of [`World::trace`] for the SIMD type `L`.
+type Trace<L> = fn(
+    &World<L>,
+    &mut Path<L>,
+    Option<&TileCandidates>,
+    &PacketSampler<'_, L>,
+    <L as SimdFloat>::Mask,
+    &mut Radiance<L>,
+);
+
+/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate the
+/// machine code of the kernels in this crate, so that other crates call it instead of generating
+/// their own.
+#[doc(hidden)]
+pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

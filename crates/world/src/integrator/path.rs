@@ -1,19 +1,27 @@
 //! State of a packet of paths, and the result of tracing it.
 
-use crate::light_groups::MAX_GROUPS;
+use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 
-/// Radiance of a packet's samples in each light group (part of the picture that the film stores
-/// separately). The radiance of a light with a group of its own is that of a white light of
-/// intensity 1.
+/// Radiance of a packet's samples in each light group. The radiance of a light with a group of its
+/// own is that of a white light of intensity 1.
 pub struct Radiance<L> {
     /// Radiance of each light group. Only the first [`World::groups`](crate::World::groups)
     /// entries are in use.
     pub groups: [Vec3<L>; MAX_GROUPS],
+    /// Work of all packets that were traced so far.
+    pub(crate) counts: Counts,
 }
 
-/// Number of rays traced, and a flag that is `true` if a random choice was made.
+impl<L: SimdFloat> Radiance<L> {
+    /// Returns black samples.
+    pub fn black() -> Self {
+        Self { groups: [Vec3::zero(); MAX_GROUPS], counts: Counts::default() }
+    }
+}
+
+/// Number of rays traced, and whether paths made random choices.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
@@ -21,6 +29,14 @@ pub struct Counts {
     /// `true` if a path sampled a glossy lobe or a point of an emitter, or chose between reflection
     /// and transmission at random.
     pub glossy: bool,
+}
+
+impl Counts {
+    /// Adds one ray for each of `lanes`.
+    #[inline(always)]
+    pub(crate) fn add_rays(&mut self, lanes: impl Mask) {
+        self.rays += u64::from(lanes.bits().count_ones());
+    }
 }
 
 /// Packet of paths, each at its current vertex (the camera or a surface).

@@ -9,7 +9,7 @@ mod robust;
 mod states;
 mod styles;
 
-use crate::dashboard::model::Model;
+use crate::dashboard::Model;
 use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
@@ -34,7 +34,7 @@ fn row_text(buffer: &Buffer, y: u16) -> String {
             continue;
         }
         let symbol = buffer[(x, y)].symbol();
-        hidden = crate::dashboard::view::text::columns(symbol).saturating_sub(1);
+        hidden = crate::dashboard::text::columns(symbol).saturating_sub(1);
         text += symbol;
     }
     text.trim_end().to_string()

@@ -1,14 +1,15 @@
 //! Models of the dashboard in every state that looks different on the screen.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{DisplayChannel, Message, OrphanedEdits};
-use crate::dashboard::model::{CompareView, FieldList, Mode, Model, Notice, RunningExport, Tone};
-use crate::dashboard::overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question};
-use crate::dashboard::panel_lines::{PanelLine, scrolled};
+use crate::dashboard::model::{Notice, RunningExport, Tone};
+use crate::dashboard::panel_lines::scrolled;
+use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
+use crate::dashboard::{
+    Answer, CommandPalette, CompareView, DisplayChannel, Editor, FieldList, Focus, Form, Message,
+    Mode, Model, OrphanedEdits, Overlay, PanelLine, Pick, Prompt, Question,
+};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};
@@ -16,8 +17,8 @@ use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
     Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
 };
+use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{self, Target};
-use zerkalo_scene::{Scene, built_in};
 
 /// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
@@ -27,7 +28,7 @@ pub type Named = (&'static str, fn(&mut Model));
 pub fn tracing(screen: [u16; 2]) -> Model {
     let path = Some("scenes/mirror-room.toml".into());
     let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
-    let mut model = Model::new(path, "", Ok(Arc::new(built_in())), stop, 2);
+    let mut model = Model::new(path, "", Ok(Arc::new(mirror_room())), stop, 2);
     model.screen = screen;
     model.first_time = false;
     for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
@@ -255,7 +256,7 @@ pub const STATES: &[Named] = &[
         select_first(m);
         m.mode = Mode::Move;
     }),
-    ("turning", |m| {
+    ("rotating", |m| {
         select_first(m);
         m.mode = Mode::Rotate;
     }),
@@ -365,7 +366,7 @@ pub const STATES: &[Named] = &[
     }),
     ("orphaned-edits", |m| {
         let age = Duration::from_secs(720);
-        let left = OrphanedEdits { scene: Arc::new(built_in()), age, changed: true };
+        let left = OrphanedEdits { scene: Arc::new(mirror_room()), age, changed: true };
         update(m, Message::OrphanedEdits(left), Duration::ZERO);
     }),
     ("file-became-unreadable", broken),
@@ -376,7 +377,7 @@ pub const STATES: &[Named] = &[
         m.convergence = Default::default();
     }),
     ("names-from-elsewhere", |m| {
-        let mut scene = built_in();
+        let mut scene = mirror_room();
         scene.objects[0].name = "鏡の部屋\u{1b}[31m\u{202e} with a name that never ends".into();
         scene.lights[0].name = "\t\n\u{7}".into();
         m.file.name = zerkalo_scene::value::sanitized("鏡\u{1b}]0;evil\u{7}.toml");

@@ -163,8 +163,8 @@ fn chance_in_estimates_of_equal_tiles_draws_no_samples() {
     );
 }
 
-/// Checks that no tile gets more than [`MAX_SAMPLES`] samples per replicate (half of the samples),
-/// and that twice this number fits 32 bits.
+/// Checks that no tile gets more than [`MAX_SAMPLES`] samples per replicate, and that twice this
+/// number fits 32 bits.
 #[test]
 fn full_tiles_have_a_count_that_fits_32_bits() {
     let mut model = Model::exact(vec![CALM; 2]);

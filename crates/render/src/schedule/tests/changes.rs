@@ -1,12 +1,12 @@
-//! Tests of changes during a render: other stop criteria, other noise estimates, and waves (sets of
-//! concurrent jobs) of which only a part is traced.
+//! Tests of changes during a render: other stop criteria, other noise estimates, and waves of which
+//! only a part is traced.
 
 use crate::schedule::tests::*;
 
-/// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
-/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel. It then keeps
-/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. Later
-/// waves have the samples that were cut off.
+/// Renders the simulated picture to the end in pieces. Before each wave is traced, [`Wave::cut`]
+/// shortens its jobs to at most `longest` samples per pixel. It then keeps only so many jobs that
+/// they have about `tiles` times `longest` samples per pixel in total. Later waves have the samples
+/// that were cut off.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,

@@ -14,14 +14,13 @@ use crate::wave::JobReport;
 /// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
 /// over very many pixels.
 const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
-/// Light period of the simulated pictures, in samples per replicate (half of the samples). From
-/// this count on, the tiles in [`Model::periodic`] have no error.
+/// Light period of the simulated pictures, in samples per replicate. From this count on, the tiles
+/// in [`Model::periodic`] have no error.
 const PERIOD: f64 = 16.0;
 /// Number of pixels of each simulated tile.
 const PIXELS: u32 = 256;
 
-/// Simulated tile. After n samples in a replicate (half of the samples), the RMSE of the replicate
-/// is `sigma * n^-slope`.
+/// Simulated tile. After n samples in a replicate, the RMSE of the replicate is `sigma * n^-slope`.
 #[derive(Clone, Copy)]
 struct Truth {
     sigma: f64,
@@ -33,12 +32,11 @@ struct Truth {
 const CALM: Truth = Truth { sigma: 0.0, slope: 0.5, glossy: false, rays_per_sample: 2 };
 const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sample: 3 };
 
-/// Simulated picture. After each wave (set of concurrent tracing jobs) it reports the estimated
-/// errors of tiles, as a film does.
+/// Simulated picture. After each wave it reports the estimated errors of tiles, as a film does.
 struct Model {
     truth: Vec<Truth>,
     pixels: Vec<u32>,
-    /// Samples per pixel of each simulated tile: `[replicate (half of the samples)][tile]`.
+    /// Samples per pixel of each simulated tile: `[replicate][tile]`.
     counts: [Vec<u32>; 2],
     /// Independent errors of each simulated tile: `[replicate][tile][error]`. Each is a random
     /// walk, the sum of the errors of all samples so far. The innermost lists are empty if the
@@ -52,8 +50,7 @@ struct Model {
     /// Numbers of the tiles with errors only in their validation pixels, which do not select tiles
     /// for samples. The allocation estimate of these tiles is 0.
     hidden: Vec<usize>,
-    /// Numbers of the tiles that have no error from [`PERIOD`] samples per replicate (half of the
-    /// samples) on.
+    /// Numbers of the tiles that have no error from [`PERIOD`] samples per replicate on.
     periodic: Vec<usize>,
     /// Number of samples that together trace a shadow ray to each light once; see
     /// [`Schedule::with_light_period`].
@@ -106,8 +103,7 @@ impl Model {
         TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS, samples }
     }
 
-    /// Returns the true mean squared error of the mean of both replicates (halves of the samples)
-    /// in a tile.
+    /// Returns the true mean squared error of the mean of both replicates in a tile.
     fn true_mse(&self, tile: usize) -> f64 {
         let t = self.truth[tile];
         let n = f64::from(self.counts[0][tile]);

@@ -15,8 +15,8 @@ fn rmse_at(model: &mut Model, prediction: &Prediction) -> f64 {
     for replicate in [0, 1] {
         let jobs = prediction.tiles.iter().zip(0..).map(|(t, tile)| Job {
             tile,
-            first: t.done,
-            count: t.count - t.done,
+            first: t.base,
+            count: t.end - t.base,
         });
         let jobs = jobs.filter(|job| job.count > 0).collect();
         model.run(&Wave { replicate, jobs, estimate: false });
@@ -57,18 +57,18 @@ fn predicted_blocks_are_aligned_and_never_below_the_counts_at_hand() {
     let mut model = Model::random(clustered(100, 0.5), 16, 9);
     let prediction = predicted(&mut model, 2.0, 0.5);
     for tile in &prediction.tiles {
-        assert!(tile.count >= tile.done, "{tile:?}");
-        let aligned = tile.count.is_multiple_of(SAMPLE_ALIGNMENT) || tile.count.is_power_of_two();
+        assert!(tile.end >= tile.base, "{tile:?}");
+        let aligned = tile.end.is_multiple_of(SAMPLE_ALIGNMENT) || tile.end.is_power_of_two();
         assert!(aligned, "{tile:?}");
     }
-    assert!(prediction.tiles.iter().any(|tile| tile.count > tile.done));
+    assert!(prediction.tiles.iter().any(|tile| tile.end > tile.base));
 }
 
 #[test]
 fn reached_target_needs_no_samples_beyond_exploration() {
     let mut model = Model::exact(clustered(100, 0.5));
     let prediction = predicted(&mut model, 0.5, 0.55);
-    assert!(prediction.tiles.iter().all(|tile| tile.count == tile.done), "{prediction:?}");
+    assert!(prediction.tiles.iter().all(|tile| tile.end == tile.base), "{prediction:?}");
 }
 
 #[test]
@@ -92,6 +92,6 @@ fn schedule_of_samples_predicts_what_the_schedule_does() {
     assert_eq!(again.noise(), schedule.noise());
     let slopes = schedule.predict([0.5; 2]).unwrap().slopes;
     let (a, b) = (schedule.predict(slopes).unwrap(), again.predict(slopes).unwrap());
-    let total = |p: &Prediction| p.tiles.iter().map(|tile| tile.count).sum::<u32>() as f64;
+    let total = |p: &Prediction| p.tiles.iter().map(|tile| tile.end).sum::<u32>() as f64;
     assert!((total(&a) / total(&b) - 1.0).abs() < 0.1, "{} {}", total(&a), total(&b));
 }

@@ -1,5 +1,4 @@
-//! Tests of the numbers of samples in a wave (a set of concurrent jobs), of stop criteria and of
-//! estimated remaining times.
+//! Tests of the numbers of samples in a wave, of stop criteria and of estimated remaining times.
 
 use crate::schedule::tests::*;
 

@@ -19,9 +19,6 @@ use std::borrow::Cow;
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Parses a glTF or GLB file.
-///
-/// # Errors
-/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
@@ -279,7 +276,7 @@ impl<'a> Part<'a> {
 
     /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
     /// (such as a vector of three) and components of the type `kind`, and that all elements are
-    /// inside of their buffer.
+    /// inside their buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -328,7 +325,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside of the accessor's
+/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside the accessor's
 /// buffer.
 #[derive(Clone, Copy)]
 struct Slice<'a> {

@@ -24,9 +24,6 @@ const MAX_MTL_FILES: usize = 64;
 const UNCOLORED: [f32; 3] = [1.0; 3];
 
 /// Parses an OBJ file.
-///
-/// # Errors
-/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let counts = check_faces(source)?;

@@ -14,9 +14,6 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Parses an STL file.
-///
-/// # Errors
-/// Fails if the file is not valid, or has no triangles.
 pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let bytes = &mut source.bytes;
     let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));

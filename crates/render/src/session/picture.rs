@@ -1,0 +1,61 @@
+//! Picture of a session at the moment at which a task runs.
+
+use crate::export::{Provenance, film_header};
+use crate::film::file::FilmFileHeader;
+use crate::film::{Film, LightWeights};
+use crate::session::active_render::ActiveRender;
+use crate::session::report::Report;
+use crate::{EncodedCheckpoint, RenderState};
+use zerkalo_scene::Scene;
+
+/// Film of a session with its report.
+pub struct Picture<'a> {
+    /// Film with the samples so far.
+    pub film: &'a Film,
+    /// Weight of each light group in the picture.
+    pub mix: &'a LightWeights,
+    /// Report on the film.
+    pub report: &'a Report,
+    pub(super) source: Source<'a>,
+}
+
+/// Source of a session's samples.
+pub(super) enum Source<'a> {
+    /// Render, and the threads that encode its checkpoints.
+    Render(&'a ActiveRender, &'a rayon::ThreadPool),
+    /// Header of the sum of watched films.
+    Files(&'a FilmFileHeader),
+}
+
+impl<'a> Picture<'a> {
+    /// Creates the header of a film file, which also writes the picture as an image. `provenance`
+    /// gives the origin of a rendered scene; watched films state their own.
+    pub fn header(&self, provenance: impl FnOnce(&Scene) -> Provenance) -> FilmFileHeader {
+        match self.source {
+            Source::Render(render, _) => {
+                film_header(&render.state, self.report, &provenance(render.state.scene()))
+            }
+            Source::Files(header) => header.clone(),
+        }
+    }
+
+    /// Returns the state of the render. Returns `None` if the session watches films.
+    pub(super) fn state(&self) -> Option<&'a RenderState> {
+        match self.source {
+            Source::Render(render, _) => Some(&render.state),
+            Source::Files(_) => None,
+        }
+    }
+
+    /// Encodes the render as a checkpoint. Returns `None` before the first picture, or if the
+    /// session watches films.
+    pub(super) fn checkpoint(&self, provenance: &Provenance) -> Option<EncodedCheckpoint> {
+        match self.source {
+            Source::Render(ActiveRender { state, schedule, first_picture_after, .. }, pool) => {
+                first_picture_after
+                    .map(|_| EncodedCheckpoint::new(state, schedule, self.report, provenance, pool))
+            }
+            Source::Files(_) => None,
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! Access to the values of edit targets by key path.
+
+use crate::camera;
+use crate::edit::{EditError, Target};
+use crate::light;
+use crate::material;
+use crate::value::{Description, Field, KeyNode, ValueType};
+use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object, Scene};
+
+/// Returns the keys that scene files permit for `subject`, with their types and defaults.
+pub(super) fn fields(subject: &Target) -> &'static [Field] {
+    match subject {
+        Target::Camera | Target::View(_) => camera::FIELDS,
+        Target::Ambient => Ambient::FIELDS,
+        Target::Background => Background::FIELDS,
+        Target::Light(_) => light::FIELDS,
+        Target::Object(_) => Object::FIELDS,
+        Target::Material(_) => material::FIELDS,
+        Target::Film => FilmSettings::FIELDS,
+        Target::IntegratorSettings => IntegratorSettings::FIELDS,
+    }
+}
+
+/// Returns the keys of which at most one may be given.
+pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
+    match subject {
+        Target::Camera | Target::View(_) => &["target", "direction"],
+        Target::Light(_) => light::KIND_KEYS,
+        Target::Material(_) => &["f0", "metal"],
+        Target::Ambient
+        | Target::Background
+        | Target::Object(_)
+        | Target::Film
+        | Target::IntegratorSettings => &[],
+    }
+}
+
+/// Expands to the part of `$scene` that `$subject` names.
+macro_rules! part {
+    ($scene:ident, $subject:ident, $get:ident, $($reference:tt)+) => {{
+        let part: Option<$($reference)+ dyn KeyNode> = match $subject {
+            Target::Camera => Some($($reference)+ $scene.camera),
+            Target::View(name) => $scene.cameras.$get(name).map(|camera| camera as _),
+            Target::Ambient => Some($($reference)+ $scene.ambient),
+            Target::Background => Some($($reference)+ $scene.background),
+            Target::Light(i) => $scene.lights.$get(*i).map(|light| light as _),
+            Target::Object(i) => $scene.objects.$get(*i).map(|object| object as _),
+            Target::Material(name) => $scene.materials.$get(name).map(|material| material as _),
+            Target::Film => Some($($reference)+ $scene.film),
+            Target::IntegratorSettings => Some($($reference)+ $scene.trace),
+        };
+        part.ok_or_else(|| EditError::gone($subject))
+    }};
+}
+
+/// Returns the part of `scene` that `subject` names.
+pub(super) fn part<'a>(scene: &'a Scene, subject: &Target) -> Result<&'a dyn KeyNode, EditError> {
+    part!(scene, subject, get, &)
+}
+
+/// Returns [`part`] as a mutable reference.
+pub(super) fn part_mut<'a>(
+    scene: &'a mut Scene,
+    subject: &Target,
+) -> Result<&'a mut dyn KeyNode, EditError> {
+    part!(scene, subject, get_mut, &mut)
+}
+
+/// Returns the given one of the [`exclusive_keys`].
+pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static str> {
+    let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
+    exclusive_keys(subject).iter().find(is_given).copied()
+}
+
+/// Returns the description of the dotted key `key`; its parts are keys and list indices.
+pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
+    let (first, rest) = match key.split_once('.') {
+        Some((first, rest)) => (first, Some(rest)),
+        None => (key, None),
+    };
+    let found = fields.iter().find(|f| f.name == first)?;
+    match (rest, found.takes) {
+        (None, _) => Some(found),
+        (Some(rest), ValueType::Table(inner) | ValueType::OneOf(inner)) => field(inner, rest),
+        (Some(rest), ValueType::ListOf(inner)) => {
+            let (index, rest) = rest.split_once('.')?;
+            index.parse::<usize>().ok()?;
+            field(inner, rest)
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,77 @@
+//! Access to the values of a description by key path, such as `shape.sphere.radius`.
+
+/// Value of a key as edits read and write it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum KeyValue {
+    /// One number, or those of a list or a colour.
+    Numbers(Vec<f64>),
+    /// Switch: `true` or `false`.
+    Switch(bool),
+    /// String, word of a choice, or kind of a value that has one of several kinds.
+    Text(String),
+}
+
+impl KeyValue {
+    /// Returns the value as `N` numbers, if it has this type.
+    pub(crate) fn numbers<const N: usize>(self) -> Option<[f64; N]> {
+        if let Self::Numbers(list) = self { list.try_into().ok() } else { None }
+    }
+
+    /// Returns the value as `N` whole numbers, if it has this type.
+    pub(crate) fn wholes<const N: usize>(self) -> Option<[u32; N]> {
+        let list: [f64; N] = self.numbers()?;
+        let wholes = list.map(|x| x as u32);
+        (wholes.map(f64::from) == list).then_some(wholes)
+    }
+
+    /// Returns the value as a switch, if it is one.
+    pub(crate) fn switch(self) -> Option<bool> {
+        if let Self::Switch(on) = self { Some(on) } else { None }
+    }
+
+    /// Returns the value as text, if it is one.
+    pub(crate) fn text(self) -> Option<String> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+}
+
+/// Node of a description: a table, an entry of a list, or a single value.
+pub trait KeyNode {
+    /// Returns the value of the node; `None` for tables and absent values.
+    fn value(&self) -> Option<KeyValue> {
+        None
+    }
+
+    /// Sets the value, without a check of ranges. Returns `false` if the node cannot have it.
+    fn set_value(&mut self, _: KeyValue) -> bool {
+        false
+    }
+
+    /// Returns `true` if the value stands for an omitted key.
+    fn is_absent(&self) -> bool {
+        false
+    }
+
+    /// Makes an optional value absent.
+    fn make_absent(&mut self) {}
+
+    /// Returns the node of `key`: a key of a table, the kind of a value, or an index from 0.
+    fn child(&self, _key: &str) -> Option<&dyn KeyNode> {
+        None
+    }
+
+    /// Returns [`KeyNode::child`] as a mutable reference.
+    fn child_mut(&mut self, _key: &str) -> Option<&mut dyn KeyNode> {
+        None
+    }
+}
+
+/// Returns the node at the dotted `path` below `root`.
+pub fn node_at<'a>(root: &'a dyn KeyNode, path: &str) -> Option<&'a dyn KeyNode> {
+    path.split('.').try_fold(root, |node, key| node.child(key))
+}
+
+/// Returns [`node_at`] as a mutable reference.
+pub fn node_at_mut<'a>(root: &'a mut dyn KeyNode, path: &str) -> Option<&'a mut dyn KeyNode> {
+    path.split('.').try_fold(root, |node, key| node.child_mut(key))
+}

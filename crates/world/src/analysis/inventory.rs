@@ -1,0 +1,99 @@
+//! Inventory: list of the features that a compiled scene contains, such as numbers of primitives
+//! and kinds of materials, for the user.
+
+use crate::integrator::surface_textures::SurfaceTextures;
+use crate::lights::groups::LightGroupSource;
+use crate::world::World;
+use zerkalo_kernel::lanes::SimdFloat;
+use zerkalo_scene::light::KIND_KEYS;
+use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel, Transmission};
+use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
+
+/// Returns the list of the features of `world`, which was compiled from `scene`: separated by
+/// commas, in one line.
+pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
+    let (bsdfs, groups) = (&world.bsdfs, &world.groups.members);
+    let (emissive, unsampled) = world.emitters.object_counts();
+    let any_specular =
+        |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
+    let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
+        bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
+    };
+    let any_transmission = |dielectric: bool| {
+        let is_kind = |t: &Transmission<L::Scalar>| t.dielectric == dielectric;
+        bsdfs.iter().any(|bsdf| bsdf.transmission.as_ref().is_some_and(is_kind))
+    };
+    let any_facets = |test: fn(&FacetNormals) -> bool| {
+        let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
+        bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
+            ReflectionLobe::MicrofacetDistribution(facets) => test(&facets.normals),
+            ReflectionLobe::Mirror
+            | ReflectionLobe::Cone { .. }
+            | ReflectionLobe::Square { .. } => false,
+        })
+    };
+    let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
+    let mut parts = vec![world.geometry.to_string()];
+    let textures = world.surface_textures.as_ref().map(SurfaceTextures::features);
+    parts.extend(textures.into_iter().flatten().map(String::from));
+    parts.extend(present([
+        (any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong"),
+        (
+            any_specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
+            "Cook-Torrance",
+        ),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Beckmann)), "Beckmann lobe"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Ggx)), "GGX lobe"),
+        (any_transmission(false), "transmission"),
+        (any_transmission(true), "dielectric"),
+        (bsdfs.iter().any(|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
+        (bsdfs.iter().any(Bsdf::absorbs), "absorption"),
+        (absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)), "absorbing horizon"),
+    ]));
+    let counted = |n: usize, name: &str| match n {
+        0 => None,
+        1 => Some(format!("1 {name}")),
+        n => Some(format!("{n} {name}s")),
+    };
+    let light_count = |kind: &str| {
+        let is_kind = |source: &&LightGroupSource| match source {
+            LightGroupSource::Light(i) => scene.lights[*i].kind.key() == kind,
+            _ => false,
+        };
+        groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
+    };
+    for kind in KIND_KEYS {
+        parts.extend(counted(light_count(kind), &format!("{kind} light")));
+    }
+    parts.extend(present([(world.light_choice.is_some(), "choice of lights")]));
+    parts.extend(counted(emissive, "emissive object"));
+    if unsampled > 0 {
+        parts.push(format!("{unsampled} of them without sampled points"));
+    }
+    parts.extend(present([(scene.camera.lens_radius() > 0.0, "thin lens")]));
+    if let Some(limits) = &world.diffuse_limits {
+        parts.extend(counted(limits.depth as usize, "diffuse bounce"));
+        parts.extend(present([(!limits.caustics, "no caustics")]));
+    }
+    let ray_types = scene.trace.ray_types;
+    let has_lights = world.light_lists() > 0 || !world.environments.is_empty();
+    let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
+    parts.extend(present([
+        (groups.iter().any(is_shared), "shared light group"),
+        (groups.contains(&LightGroupSource::Ambient), "ambient"),
+        (groups.contains(&LightGroupSource::Background), "background"),
+        (ray_types == RayTypes::Primary, "no shadows"),
+        (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
+        (scene.film.filter == Filter::Point, "no anti-aliasing"),
+    ]));
+    parts.push(format!("{} precision", if L::EPSILON > 1e-10 { "single" } else { "double" }));
+    parts.join(", ")
+}
+
+/// Returns the names in `features` whose flag is `true`: the features that are present.
+fn present<const N: usize>(features: [(bool, &str); N]) -> impl Iterator<Item = String> {
+    features.into_iter().filter(|(present, _)| *present).map(|(_, name)| name.to_string())
+}

@@ -1,0 +1,494 @@
+//! Range of the radiance of a light group's samples. It determines the scale of the group: the
+//! number of integer steps per unit of radiance in the film.
+//!
+//! A pixel's sum has 63 bits, a sample at most 49 bits (`SimdFloat::fixed_sum`). Each sample is
+//! rounded to whole steps. If all samples of a pixel are equal, as on a matt surface, their mean
+//! has an error of up to half a step, which more samples do not reduce. The size of a step
+//! therefore has two bounds:
+//!
+//! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
+//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
+//!   levels.
+//! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
+//!   holds 2^19 samples in each replicate before its sum saturates. A replicate is one half of the
+//!   samples, so a pixel holds a million samples. Five bits remain for single samples that are
+//!   brighter.
+//!
+//! The two bounds are 28 bits apart. By default the typical radiance has 2^28 steps. The brightest
+//! spot may then be up to 2^16 times as bright as the typical radiance. The brightest spot of the
+//! dimmest surface may be down to 2^-12 times as bright as the typical radiance. If a scene exceeds
+//! both bounds, the bright end has precedence: a saturated sample changes the picture visibly, a
+//! sample smaller than a step does not. The dim end has precedence over two kinds of bright light:
+//! spots narrower than a quarter of a pixel, and light amplified by mirrors. Such samples may
+//! saturate; the film counts saturated samples.
+
+use crate::analysis::clearance::clearance;
+use crate::compile::RecenteredGeometry;
+use glam::DVec3;
+use std::f64::consts::{FRAC_1_PI, PI};
+use zerkalo_kernel::lanes::Float;
+use zerkalo_kernel::primitive::{Bounds, Form, box_distance};
+use zerkalo_scene::asset::RadianceMap;
+use zerkalo_scene::camera::PerspectiveCamera;
+use zerkalo_scene::light::{CompiledLight, DeltaLight, Emitter};
+use zerkalo_scene::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
+use zerkalo_scene::{RayTypes, Scene};
+
+/// Number of bits of an integer sample whose radiance is typical of the scene.
+const TYPICAL_BITS: f64 = 28.0;
+
+/// Smallest number of bits of an integer sample at the brightest spot of the dimmest surface.
+const DIM_BITS: f64 = 16.0;
+
+/// Largest number of bits of an integer sample at the brightest of all spots that are at least a
+/// quarter of a pixel wide.
+const BRIGHT_BITS: f64 = 44.0;
+
+/// Largest number of bits of any integer sample.
+const SAMPLE_BITS: f64 = 49.0;
+
+/// Largest number of bits by which the integer scale of samples is lowered for bright spots
+/// narrower than a quarter of a pixel.
+const SPOT_BITS: f64 = 12.0;
+
+/// Estimates of the radiance of a light group's samples at several places of the scene. The integer
+/// scale of the film is chosen for this range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RadianceRange {
+    /// Radiance of a white surface in the middle of the scene, lit by the light group.
+    pub typical: f64,
+    /// Radiance of the brightest spot of the dimmest surface: the minimum, over all surfaces, of
+    /// the radiance of their brightest spots.
+    pub dimmest: f64,
+    /// Radiance of the brightest spot of the brightest surface: the maximum, over all surfaces, of
+    /// the radiance of their brightest spots. Spots smaller than a quarter of a pixel are ignored.
+    pub brightest: f64,
+    /// Radiance of the brightest spot of the picture outside of highlights, however small the spot
+    /// is.
+    pub spots: f64,
+    /// Largest radiance of highlights, and of light amplified by mirrors.
+    pub extreme: f64,
+}
+
+impl RadianceRange {
+    /// Returns this range of radiance for the same light with another emission. `least` and `most`
+    /// are the factors of the emission in the darkest and in the brightest channel.
+    pub fn times(self, least: f64, most: f64) -> Self {
+        Self {
+            typical: self.typical * most,
+            dimmest: self.dimmest * least,
+            brightest: self.brightest * most,
+            spots: self.spots * most,
+            extreme: self.extreme * most,
+        }
+    }
+
+    /// Returns the range of radiance that covers `self` and `other`, the ranges of two sources in
+    /// one light group.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            typical: self.typical.max(other.typical),
+            dimmest: self.dimmest.min(other.dimmest),
+            brightest: self.brightest.max(other.brightest),
+            spots: self.spots.max(other.spots),
+            extreme: self.extreme.max(other.extreme),
+        }
+    }
+
+    /// Returns the base-2 logarithm of the number of integer steps per unit of radiance.
+    pub fn scale_exponent(&self) -> f64 {
+        let bits_above_bright_end = |bright: f64| {
+            let excess = ceil_log2(bright / self.typical) - (BRIGHT_BITS - TYPICAL_BITS);
+            excess.max(0.0)
+        };
+        let lost = bits_above_bright_end(self.spots)
+            .min(SPOT_BITS)
+            .max(bits_above_bright_end(self.brightest));
+        let exponent = TYPICAL_BITS - ceil_log2(self.typical) - lost;
+        let dim_end = DIM_BITS + ceil_log2(self.dimmest.recip());
+        let room_for_extremes = SAMPLE_BITS - ceil_log2(self.extreme);
+        let exponent = exponent.min(room_for_extremes.max(exponent.min(dim_end)));
+        exponent.max(dim_end.min(BRIGHT_BITS - ceil_log2(self.brightest)))
+    }
+}
+
+/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. If `x` is
+/// multiplied by 2^k, the result is larger by exactly k.
+fn ceil_log2(x: f64) -> f64 {
+    if x.is_nan() || x < f64::MIN_POSITIVE {
+        return -1022.0;
+    }
+    let bits = x.to_bits();
+    let floor = (bits >> 52) as f64 - 1023.0;
+    floor + f64::from(u8::from(bits << 12 != 0))
+}
+
+/// Factors by which the materials of an object reflect direct light, relative to a white diffuse
+/// surface.
+#[derive(Clone, Copy, Debug)]
+struct Response {
+    /// Smallest factor by which the material reflects light, over all channels that are not black.
+    least: f64,
+    /// Largest factor by which the material reflects light outside of highlights, over all
+    /// channels.
+    most: f64,
+    /// Largest factor by which the highlights of a material reflect light.
+    peak: f64,
+}
+
+impl Response {
+    /// Computes the factors by which a material reflects direct light. Returns `None` if it
+    /// reflects none.
+    fn new(material: &Material) -> Option<Self> {
+        let diffuse = material.color.0.map(|c| c * material.diffuse);
+        let specular = material.specular;
+        let highlight = match material.highlight {
+            Highlight::Phong => 1.0,
+            // D F G / 4 of microfacets at normal incidence and view, with D = 1 / (pi alpha^2).
+            Highlight::CookTorrance => 0.25 / material.microfacet_alpha().max(SMOOTH_ALPHA).powi(2),
+        };
+        let most = diffuse.into_iter().fold(0.0, f64::max) + specular;
+        let least = least_of(diffuse).or_else(|| least_of([specular]))?;
+        Some(Self { least, most, peak: most.max(specular * highlight) })
+    }
+
+    fn or(self, other: Self) -> Self {
+        Self {
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
+            peak: self.peak.max(other.peak),
+        }
+    }
+}
+
+/// Returns the smallest number above 0. Returns `None` if there is none.
+fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
+    numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
+}
+
+/// Returns the distance of a light at `point` from the bounding box `bounds` of an object. For a
+/// light inside of the box, it is half of the box's diagonal.
+fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
+    match box_distance(bounds, point) {
+        away if away > 0.0 => away,
+        _ => 0.5 * bounds.0.distance(bounds.1),
+    }
+}
+
+/// Distances and reflection factors of a scene without its lights, from which the
+/// [`RadianceRange`] of each light group is computed.
+pub(crate) struct SceneDistances<'a> {
+    forms: &'a [Form],
+    /// Factors by which each object reflects direct light, over all its parts. `None` if it
+    /// reflects none.
+    responses: Vec<Option<Response>>,
+    /// Factors by which the materials reflect ambient light: one for each material and channel.
+    ambient: Vec<f64>,
+    /// Smallest factor by which a mirror or glass surface multiplies light, at most 1. Materials
+    /// that reflect direct light are not included.
+    faintest: f64,
+    /// Largest factor by which all mirrors of a path together multiply light; at least 1.
+    gain: f64,
+    /// Lower limit of the distance between a light and the scene's centre in the computation of the
+    /// typical radiance: a nearer light counts as if it were at this distance.
+    radius: f64,
+    /// Position of the eye, and the side of a pixel at unit distance from it.
+    eye: (DVec3, f64),
+    /// Distance below which a light counts as on a surface: half of the largest distance above a
+    /// surface at which rays start.
+    ray_offset: f64,
+}
+
+impl<'a> SceneDistances<'a> {
+    /// Computes the properties of `scene` that determine the ranges of radiance of its light
+    /// groups. `materials_of` returns the materials of the parts of an object. `epsilon` is the
+    /// rounding error of the world's precision.
+    pub fn new(
+        scene: &Scene,
+        geometry: &'a RecenteredGeometry,
+        materials_of: impl Fn(usize) -> Vec<&'a Material>,
+        camera: &PerspectiveCamera,
+        epsilon: f64,
+    ) -> Self {
+        let (forms, extent) = (&geometry.forms[..], geometry.extent);
+        let response_of_form = |form: usize| {
+            let parts = materials_of(form);
+            parts.into_iter().filter_map(Response::new).reduce(Response::or)
+        };
+        let responses = (0..forms.len()).map(response_of_form).collect();
+        let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
+        let ambient = materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient)).collect();
+        let reflects = scene.trace.ray_types == RayTypes::Full && scene.trace.max_depth > 0;
+        let passed_on = |m: &Material| {
+            let mirrored = m.f0().0.map(|f0| f0 * m.reflection);
+            reflects.then_some(mirrored.into_iter().chain([m.transmission]))
+        };
+        let without_direct = materials.iter().filter(|m| Response::new(m).is_none());
+        let faintest = least_of(without_direct.copied().filter_map(passed_on).flatten());
+        // Fresnel's equations for a dielectric divide the light between reflection and
+        // transmission. In the other modes the coefficients of both may have a sum above 1.
+        let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
+            Fresnel::Dielectric => m.reflection.max(m.transmission),
+            _ => m.reflection + m.transmission,
+        });
+        let gain = match reflects {
+            true => max_factors.fold(1.0, f64::max).powf(f64::from(scene.trace.max_depth)),
+            false => 1.0,
+        };
+        Self {
+            forms,
+            responses,
+            ambient,
+            faintest: faintest.unwrap_or(1.0).min(1.0),
+            gain,
+            radius: 0.1 * extent,
+            eye: (camera.eye(), camera.pixel()),
+            ray_offset: 4.0 * epsilon * extent,
+        }
+    }
+
+    /// Returns the smallest and the largest factors by which objects of the scene reflect direct
+    /// light; all factors are 1 if no object reflects direct light.
+    fn response(&self) -> Response {
+        let all = self.responses.iter().flatten().copied().reduce(Response::or);
+        all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 })
+    }
+
+    /// Returns the range of the radiance that ambient light of intensity 1 causes.
+    pub fn ambient(&self) -> RadianceRange {
+        let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
+        let most = self.ambient.iter().copied().fold(0.0, f64::max);
+        self.range_of(1.0, (least, most, most))
+    }
+
+    /// Returns the range of the radiance of a background with intensity 1.
+    pub fn background(&self) -> RadianceRange {
+        self.range_of(1.0, (1.0, 1.0, 1.0))
+    }
+
+    /// Returns the range of the radiance that `light` causes at intensity 1. `visible` is `true` if
+    /// the camera and mirrors see it.
+    pub fn light<S: Float>(&self, light: &CompiledLight<S>, visible: bool) -> RadianceRange {
+        match light {
+            CompiledLight::Delta(delta) => self.delta(delta),
+            CompiledLight::Emitter(emitter) => self.emitter(emitter, visible),
+            CompiledLight::Environment(sky) => self.environment(sky.map(), visible),
+        }
+    }
+
+    /// Returns the range of the radiance that surfaces reflect in the light of `light` alone, at
+    /// intensity 1.
+    fn delta<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
+        let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
+        let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
+            let Response { least, most, peak } = self.response();
+            return self.range_of(typical, (least, most, peak));
+        };
+        let radiance_at = |distance: f64| (distance * distance * PI).recip();
+        let (eye, pixel) = self.eye;
+        // The bright spot on a surface below a light is about as wide as the distance between light
+        // and surface. Spots smaller than a quarter of a pixel are ignored.
+        let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
+        let spots = radiance_at(clearance(self.forms, position));
+        let mut out =
+            RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
+        for (form, response) in self.forms.iter().zip(&self.responses) {
+            let Some(response) = response else { continue };
+            // A light on a surface does not illuminate that surface, because shadow rays from the
+            // surface start above the light.
+            if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
+                let radiance = radiance_at(distance.max(min_distance));
+                out.brightest = out.brightest.max(radiance * response.most);
+                out.spots = out.spots.max(radiance_at(distance) * response.most);
+                out.extreme = out.extreme.max(radiance * response.peak * self.gain);
+            }
+            let far = form.bounds().map_or_else(
+                || form.clearance(position).unwrap_or(0.0),
+                |bounds| distance_to_box(bounds, position),
+            );
+            let radiance = radiance_at(far.max(min_distance));
+            out.dimmest = out.dimmest.min(radiance * response.least * self.faintest);
+        }
+        let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
+        RadianceRange {
+            dimmest: or_typical(out.dimmest),
+            brightest: or_typical(out.brightest),
+            extreme: or_typical(out.extreme),
+            ..out
+        }
+    }
+
+    /// Returns the range of the radiance that a light with a size causes at intensity 1. `visible`
+    /// is `true` if the camera and mirrors see it.
+    fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
+        if emitter.is_distant() {
+            return self.distant_disk(emitter.radiance.to_f64(), visible);
+        }
+        let ball = (emitter.center, emitter.radius);
+        self.emitting_surface(ball, emitter.area, emitter.radiance.to_f64(), visible)
+    }
+
+    /// Returns the range of the radiance that a disk at an infinite distance causes, of which surfaces
+    /// have the irradiance pi. `emitted` is its own radiance, seen if it is `visible`.
+    fn distant_disk(&self, emitted: f64, visible: bool) -> RadianceRange {
+        let Response { least, most, peak } = self.response();
+        let range = self.range_of(1.0, (least, most, peak));
+        if !visible {
+            return range;
+        }
+        // The angular radius, of whose sine `emitted` is the inverse square, is compared with a
+        // quarter of a pixel.
+        let is_wide = emitted.sqrt().recip() > 0.25 * self.eye.1;
+        RadianceRange {
+            brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },
+            spots: range.spots.max(emitted),
+            extreme: range.extreme.max(emitted * self.gain),
+            ..range
+        }
+    }
+
+    /// Returns the range of the radiance that object `index` causes if it emits radiance 1. The
+    /// estimate uses the area of the bounding sphere in place of the object's area.
+    pub fn object(&self, index: usize) -> RadianceRange {
+        match self.forms[index].bounds() {
+            Some((low, high)) => {
+                let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high));
+                self.emitting_surface((center, radius), 4.0 * PI * radius * radius, 1.0, true)
+            }
+            // The irradiance from an infinite emissive plane is the same at every distance.
+            None => {
+                let Response { least, most, peak } = self.response();
+                self.range_of(1.0, (least, most.max(1.0), peak.max(1.0)))
+            }
+        }
+    }
+
+    /// Returns the range of the radiance that an emissive surface causes: the radiance that the
+    /// surfaces of the scene reflect towards the camera, from the dimmest to the brightest place.
+    /// The emissive surface is inside of the sphere with `center` and `radius`. `area` is the area
+    /// of the surface, and `emitted` is its radiance. If the camera and mirrors see the surface
+    /// itself (`visible`), the range also includes `emitted`.
+    fn emitting_surface(
+        &self,
+        (center, radius): (DVec3, f64),
+        area: f64,
+        emitted: f64,
+        visible: bool,
+    ) -> RadianceRange {
+        // Radiance of a white surface that faces the emitter at `distance` from the emitter's
+        // centre.
+        let radiance_at = |distance: f64| {
+            emitted * (area / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
+        };
+        let typical = radiance_at(center.length().max(self.radius));
+        let (mut dimmest, mut brightest, mut extreme) = (f64::INFINITY, 0.0f64, 0.0f64);
+        for (form, response) in self.forms.iter().zip(&self.responses) {
+            let Some(response) = response else { continue };
+            let near = form.clearance(center).unwrap_or(0.0) - radius;
+            let far = form.bounds().map_or(near, |bounds| distance_to_box(bounds, center));
+            let nearest = radiance_at(near.max(0.0));
+            brightest = brightest.max(nearest * response.most);
+            extreme = extreme.max(nearest * response.peak * self.gain);
+            dimmest = dimmest.min(radiance_at(far.max(radius)) * response.least * self.faintest);
+        }
+        let mut spots = brightest;
+        if visible {
+            // The radiance of the emitting surface itself counts, too. It counts as `brightest`
+            // only if the surface is larger than a quarter of a pixel.
+            let (eye, pixel) = self.eye;
+            spots = spots.max(emitted);
+            extreme = extreme.max(emitted * self.gain);
+            if radius > 0.25 * pixel * eye.distance(center) {
+                brightest = brightest.max(emitted);
+            }
+        }
+        let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
+        RadianceRange {
+            typical,
+            dimmest: or_typical(dimmest),
+            brightest: or_typical(brightest),
+            spots: or_typical(spots),
+            extreme: or_typical(extreme),
+        }
+    }
+
+    /// Returns the range of the radiance that an environment causes at intensity 1. `visible` is
+    /// `true` if the camera and mirrors see it.
+    fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
+        let mean = map.mean().into_iter().fold(0.0, f64::max);
+        let typical = if mean > 0.0 { mean } else { 1.0 };
+        let Response { least, most, peak } = self.response();
+        let range = self.range_of(typical, (least, most, peak));
+        if !visible {
+            return range;
+        }
+        // Bright pixels of the environment's image may be smaller than a pixel of the picture.
+        // Their radiance therefore counts as `spots` but not as `brightest`, which is at least the
+        // mean of the image.
+        let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
+        RadianceRange {
+            dimmest: range.dimmest.min(dimmest * self.faintest),
+            brightest: range.brightest.max(typical),
+            spots: range.spots.max(map.max()),
+            extreme: range.extreme.max(map.max() * self.gain),
+            ..range
+        }
+    }
+
+    /// Returns the range of the radiance that surfaces reflect. `light` is the radiance of a white
+    /// surface. Surfaces multiply it by factors from `least` to `most`, and by `peak` in
+    /// highlights.
+    fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
+        RadianceRange {
+            typical: light,
+            dimmest: light * least * self.faintest,
+            brightest: light * most,
+            spots: light * most,
+            extreme: light * peak * self.gain,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE: RadianceRange =
+        RadianceRange { typical: 1.0, dimmest: 1.0, brightest: 1.0, spots: 1.0, extreme: 1.0 };
+
+    #[test]
+    fn ceil_log2_is_exact() {
+        for (x, exponent) in [(1.0, 0.0), (1.5, 1.0), (2.0, 1.0), (0.75, 0.0), (0.5, -1.0)] {
+            assert_eq!(ceil_log2(x), exponent, "{x}");
+            assert_eq!(ceil_log2(x * 2f64.powi(-300)), exponent - 300.0, "{x}");
+        }
+        assert_eq!(ceil_log2(f64::INFINITY), 1024.0);
+        assert_eq!([0.0, -1.0, 1e-320, f64::NAN].map(ceil_log2), [-1022.0; 4]);
+    }
+
+    #[test]
+    fn scale_exponent_covers_dim_and_bright_end() {
+        let exponent = |change: &dyn Fn(&mut RadianceRange)| {
+            let mut range = ONE;
+            change(&mut range);
+            range.scale_exponent()
+        };
+        assert_eq!(exponent(&|_| ()), 28.0);
+        assert_eq!(ONE.times(0.5, 0.75).scale_exponent(), 28.0);
+        assert_eq!(ONE.times(2f64.powi(40), 2f64.powi(40)).scale_exponent(), -12.0);
+        // Radiance of a dim surface, and two values for the radiance of bright surfaces.
+        let [dim, bright, far] = [-40, 20, 60].map(|e| 2f64.powi(e));
+        assert_eq!(exponent(&|b| b.dimmest = dim), 44.0);
+        assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-20)), 36.0);
+        assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
+        assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
+        assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
+        // Spots narrower than a quarter of a pixel and amplified light do not lower the scale below
+        // the bound for dim surfaces, 2^16 steps.
+        assert_eq!(exponent(&|b| b.spots = far), 16.0);
+        assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
+        assert_eq!(exponent(&|b| b.extreme = bright), 28.0);
+        assert_eq!(exponent(&|b| b.extreme = 2f64.powi(25)), 24.0);
+        assert_eq!(exponent(&|b| b.extreme = f64::INFINITY), 16.0);
+    }
+}

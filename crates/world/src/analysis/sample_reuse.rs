@@ -1,0 +1,141 @@
+//! Reuse of film samples after an edit: decides if the samples traced for one scene are valid for
+//! the edited scene.
+//!
+//! Descriptions of scenes are compared as a whole, by `==`. The few fields that may differ are set
+//! to equal values before the comparison, or are named in a pattern without `..`. A field that is
+//! added to a description later is therefore compared by default, or causes a compile error here.
+
+use crate::lights::groups::{LightGroupSource, LightGroups, contributes};
+use std::borrow::Cow;
+use zerkalo_scene::light::Light;
+use zerkalo_scene::material::Material;
+use zerkalo_scene::shape::Shape;
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{FilmSettings, Object, Scene};
+
+impl LightGroups {
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`, so that only
+    /// the weights of the light groups have to change. `self` are the light groups of `compiled`.
+    /// The scenes may differ in names, in unused materials, in the largest number of samples per
+    /// pixel of glossy tiles, and in the emission of sources that have a group of their own.
+    pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
+        let Scene {
+            film,
+            trace,
+            camera,
+            cameras: _,
+            background,
+            ambient,
+            lights: _,
+            materials: _,
+            objects,
+            resolver: _,
+        } = scene;
+        uncapped(film) == uncapped(&compiled.film)
+            && *trace == compiled.trace
+            && *camera == compiled.camera
+            && (background.color == Color::BLACK || compiled.background.color != Color::BLACK)
+            && (ambient.color == Color::BLACK
+                || !self.ambient
+                || self.members.contains(&LightGroupSource::Ambient))
+            && objects.len() == compiled.objects.len()
+            && compiled
+                .objects
+                .iter()
+                .zip(objects)
+                .all(|(a, b)| self.same_object((compiled, a), (scene, b)))
+            && self.can_relight(compiled, scene)
+    }
+
+    /// Returns `true` if the lights of `scene` allow the samples of `compiled` to be reused: they
+    /// differ at most in names, and in the emission of lights that have a group of their own.
+    /// Lights that do not emit are not compared.
+    fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
+        let is_compiled = |i: usize| {
+            let contains = |source: &LightGroupSource| match source {
+                LightGroupSource::Light(light) => *light == i,
+                _ => false,
+            };
+            self.members.iter().flat_map(LightGroupSource::emitting).any(contains)
+        };
+        let same_but_emission = |i: usize, light: &Light| {
+            with_unit_emission(&compiled.lights[i]) == with_unit_emission(light)
+        };
+        let mut emitting =
+            scene.lights.iter().enumerate().filter(|(_, light)| contributes(light, self.lit));
+        let same_emission_if_shared = |source: &LightGroupSource| match source {
+            LightGroupSource::Shared(list) => {
+                list.iter().all(|source| source.emission(scene) == source.emission(compiled))
+            }
+            _ => true,
+        };
+        emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
+            && self.members.iter().all(same_emission_if_shared)
+    }
+
+    /// Returns `true` if the object `a` of the scene `compiled` and the object `b` of `scene` are
+    /// equal except for their names, the names of their materials, and the emission of materials
+    /// that have a light group of their own.
+    fn same_object(&self, (compiled, a): (&Scene, &Object), (scene, b): (&Scene, &Object)) -> bool {
+        let Object { name: _, material: _, shape, transform } = b;
+        let names = a.materials().into_iter().zip(b.materials());
+        *transform == a.transform
+            && *unnamed(shape) == *unnamed(&a.shape)
+            && a.materials().len() == b.materials().len()
+            && names.into_iter().all(|(a, b)| self.same_material((compiled, a), (scene, b)))
+    }
+
+    /// Returns `true` if the material `name_a` of the scene `compiled` and the material `name_b` of
+    /// `scene` are equal except for their emission. If the first material has a light group, both
+    /// names must be equal, too. If it has none, the second material must not emit.
+    fn same_material(
+        &self,
+        (compiled, name_a): (&Scene, &str),
+        (scene, name_b): (&Scene, &str),
+    ) -> bool {
+        let (a, b) = (material(compiled, name_a), material(scene, name_b));
+        let is_a = |source: &LightGroupSource| match source {
+            LightGroupSource::Material(name) => name == name_a,
+            _ => false,
+        };
+        if self.members.iter().flat_map(LightGroupSource::emitting).any(is_a) {
+            name_a == name_b && without_emission(&a) == without_emission(&b)
+        } else {
+            !b.emits() && without_emission(&a) == without_emission(&b)
+        }
+    }
+}
+
+/// Returns a copy of `material` without its emission.
+fn without_emission(material: &Material) -> Material {
+    Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
+}
+
+/// Returns a copy of the film settings without a limit on the samples per pixel of glossy tiles.
+fn uncapped(film: &FilmSettings) -> FilmSettings {
+    FilmSettings { rays_per_pixel: 0, ..film.clone() }
+}
+
+/// Returns a copy of the light without its name, switched on, white, and of intensity 1. The
+/// samples of a light in a group of its own are computed with this emission.
+fn with_unit_emission(light: &Light) -> Light {
+    Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
+}
+
+/// Returns the shape with the names of its parts' materials removed.
+fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
+    if shape.named_materials().is_empty() {
+        return Cow::Borrowed(shape);
+    }
+    let mut shape = shape.clone();
+    shape.part_names_mut().into_iter().for_each(String::clear);
+    Cow::Owned(shape)
+}
+
+/// Returns the material `name` of a scene; the default material if the scene does not define it.
+fn material<'a>(scene: &'a Scene, name: &str) -> Cow<'a, Material> {
+    match scene.materials.get(name) {
+        Some(material) => Cow::Borrowed(material),
+        None => Cow::Owned(Material::default()),
+    }
+}

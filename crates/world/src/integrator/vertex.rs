@@ -1,0 +1,129 @@
+//! Vertices of a packet of paths: what both integrators do where their rays hit surfaces.
+
+use crate::culling::tile::TileCandidates;
+use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density};
+use crate::integrator::interaction::SurfaceInteraction;
+use crate::integrator::nested_dielectrics::Media;
+use crate::integrator::path::{Path, Radiance};
+use crate::world::World;
+use zerkalo_kernel::bvh::Hit;
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
+use zerkalo_kernel::sampling::PacketSampler;
+use zerkalo_scene::material::BsdfQuery;
+
+/// Vertices of a packet of paths: its hit points, and what is needed to shade them.
+pub(crate) struct Vertex<'a, L: SimdFloat> {
+    pub world: &'a World<L>,
+    /// Paths that arrive at the hit points.
+    pub path: &'a mut Path<L>,
+    pub interaction: &'a SurfaceInteraction<L>,
+    /// Primitives that shadow rays are tested against.
+    pub candidates: &'a TileCandidates,
+    pub sampler: &'a PacketSampler<'a, L>,
+    /// Number of earlier surfaces of the paths, since the camera or the latest diffuse bounce.
+    pub bounce: u32,
+    /// Media in front of the surfaces; `None` in worlds without transmission.
+    pub media: Option<Media<'a, L>>,
+    pub out: &'a mut Radiance<L>,
+}
+
+/// Multiplies the throughput of `path` by the transmittance up to its hits at the distance `t`. Adds
+/// the background in those of the lanes `active` that hit no surface, where `t` is the largest finite
+/// number, and returns the others.
+#[inline(always)]
+pub(crate) fn add_background<L: SimdFloat>(
+    world: &World<L>,
+    path: &mut Path<L>,
+    t: L,
+    active: L::Mask,
+    media: Option<Media<'_, L>>,
+    out: &mut Radiance<L>,
+) -> L::Mask {
+    if let Some(left) = media.and_then(|media| media.transmittance(t)) {
+        path.throughput = path.throughput.component_mul(left);
+    }
+    let is_hit = t.lt(L::from_f64(L::MAX));
+    if let Some(group) = world.background {
+        out.groups[group] += path.throughput.masked(active.and_not(is_hit));
+    }
+    active & is_hit
+}
+
+impl<L: SimdFloat> Vertex<'_, L> {
+    /// Adds the light that the surfaces emit and reflect. `emitters` is `true` if the world may have
+    /// emitters. `bouncing` are the lanes whose diffuse bounces compute their indirect light; `None`
+    /// if there are no bounces. `rays` returns the reflected rays that find emitters, too.
+    #[inline(always)]
+    pub fn shade<const SIMPLE: bool>(
+        &mut self,
+        hit: &Hit<L>,
+        emitters: bool,
+        bouncing: Option<L::Mask>,
+        rays: impl FnOnce(&Self) -> ReflectedRays<L>,
+    ) {
+        let world = self.world;
+        if emitters && world.emitters.has_objects() {
+            self.surface_emission(hit);
+        }
+        self.ambient_light::<SIMPLE>(bouncing);
+        self.delta_lights::<SIMPLE>();
+        if let Some(choice) = &world.light_choice {
+            self.chosen_lights::<SIMPLE>(choice);
+        }
+        if emitters {
+            let rays = rays(self);
+            self.emitter_lighting(&rays);
+        }
+    }
+
+    /// Replaces the rays of the paths by reflected rays, with directions sampled from the reflection
+    /// lobes. Returns the lanes whose paths continue: their new throughput is at least
+    /// [`min_weight`](World::min_weight). The density of the directions is computed only if
+    /// `emitters` is `true`.
+    #[inline(always)]
+    pub fn sample_reflection<const SIMPLE: bool>(&mut self, emitters: bool) -> L::Mask {
+        let (world, interaction, query) = (self.world, self.interaction, self.query());
+        let throughput = self.path.throughput;
+        let mut numbers = None;
+        for (index, lanes) in interaction.bsdfs(interaction.reflecting) {
+            let bsdf = &world.bsdfs[index];
+            let uv = self.lobe_numbers(bsdf.is_delta(), &mut numbers);
+            let path = &mut *self.path;
+            let sample = bsdf.sample(&query, uv);
+            let mut direction = sample.direction;
+            if !SIMPLE && world.smooth {
+                direction = interaction.reflect_into_hemisphere(direction);
+            }
+            if emitters {
+                let density = reflected_density(world, interaction, &query, index, direction);
+                path.lobe_density = L::select(lanes, density, path.lobe_density);
+            }
+            path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);
+            let throughput = Path::bounded(throughput.component_mul(sample.weight));
+            path.throughput = Vec3::select(lanes, throughput, path.throughput);
+        }
+        self.path.ray.origin = interaction.ray_origin();
+        interaction.reflecting & world.reaches_min_weight(self.path.throughput)
+    }
+
+    /// Returns the query of BSDFs at the hit points.
+    #[inline(always)]
+    pub fn query(&self) -> BsdfQuery<L> {
+        BsdfQuery {
+            incident: self.path.ray.direction,
+            normal: self.interaction.normal,
+            fold: self.world.fold,
+        }
+    }
+
+    /// Returns the random numbers of samples of a lobe; zeros if it is a mirror (`is_delta`).
+    /// `numbers` holds them once they are computed, because all lobes of a packet share them.
+    #[inline(always)]
+    pub fn lobe_numbers(&mut self, is_delta: bool, numbers: &mut Option<(L, L)>) -> (L, L) {
+        if is_delta {
+            return (L::zero(), L::zero());
+        }
+        self.out.counts.glossy = true;
+        *numbers.get_or_insert_with(|| self.sampler.lobe_2d(self.bounce))
+    }
+}

@@ -1,0 +1,490 @@
+//! Choice of lights at a surface point, in scenes with many point or spot lights.
+//!
+//! The lights are divided into sets of four to eight lights. Sets of spot lights are larger,
+//! because most surfaces are outside of most cones. At each surface a path chooses one set, all
+//! with the same probability, and traces shadow rays to its lights. A stratum is a group of lights
+//! that are close to each other: consecutive lights in the order of a Morton curve. A set holds at
+//! most one light of each stratum, so that its lights are spread over the scene.
+//!
+//! The number of sets is a power of two, because successive samples of a pixel are stratified over
+//! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
+//! every light once. If n were no power of two, the noise would be several times as large.
+//!
+//! The probabilities depend neither on the intensities of the lights nor on the surface point.
+//! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
+//! from every surface. All lights are in one light group, see
+//! [`LightGroups`](crate::LightGroups).
+
+use crate::world::DeltaSource;
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo_kernel::bvh::morton_code;
+use zerkalo_kernel::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
+use zerkalo_kernel::primitive::BoundingSphere;
+use zerkalo_scene::light::{DeltaLight, Light, LightForm, SpotCone, spot_factor};
+use zerkalo_scene::value::sort_by_number;
+
+/// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
+/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
+/// methods. A spot light counts as a part of a light; see [`ManyLights`].
+pub(crate) const MIN_LIGHTS: usize = 16;
+
+/// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
+/// path traces shadow rays at one surface.
+const MIN_SET: usize = 4;
+
+/// Weight of the part of the variance that all lights have in common, relative to the other parts;
+/// see [`bright_lights`]. With a weight of 1, the mirror room with eight strong lights out of 64
+/// needs 2.3 times as many rays as with this weight.
+const COMMON_VARIANCE: f64 = 0.25;
+
+/// Largest number of bright lights; see [`bright_lights`]. Paths trace shadow rays to all bright
+/// lights at each surface, although they choose among the other lights.
+const MAX_BRIGHT: usize = 16;
+
+/// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
+/// lookup in 16 elements is one instruction.
+const MIN_TABLE: usize = 16;
+
+/// Values of one property of the lights of a stratum (a spatial group). The lights of a scene are
+/// divided into sets, which have at most one light of each stratum. A path chooses one set at a
+/// surface and traces shadow rays to its lights.
+enum Table<S> {
+    /// Value that all lights of the stratum (spatial group of lights) have.
+    Common(S),
+    /// Value for each set of lights (those to which one path traces shadow rays). Elements beyond
+    /// the number of sets are never read.
+    BySet(Vec<S>),
+}
+
+/// Stratum: a spatial group of lights. A path traces shadow rays to at most one of them at each
+/// surface.
+struct Stratum<S> {
+    /// Sphere around the lights of the stratum (spatial group of lights).
+    ball: BoundingSphere,
+    /// Coordinates x, y and z of the stratum's lights, one light for each set (the lights to which
+    /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
+    /// coordinates are NaN; the test whether the surface faces the light then fails.
+    positions: [Table<S>; 3],
+    /// Irradiance, at normal incidence, of the stratum's light in each set. It is 0 for lights
+    /// whose irradiance decreases with the square of the distance. The irradiance of other lights
+    /// is the same at every distance.
+    constant: Table<S>,
+    /// Emission (colour times intensity) of the stratum's light in each set: red, green and blue.
+    /// The tracer multiplies the samples of the light by its emission. A set without a light of the
+    /// stratum has the emission 1.
+    emission: [Table<S>; 3],
+    /// Cones of the stratum's lights. `None` if all of them emit equally in all directions.
+    cones: Option<Cones<S>>,
+}
+
+/// Cones of the lights of a stratum (spatial group of lights). The cone of a point light contains
+/// all directions. The fields are those of [`SpotCone`], for the stratum's light in each set (the
+/// lights to which one path traces shadow rays).
+struct Cones<S> {
+    axis: [Table<S>; 3],
+    outer: Table<S>,
+    scale: Table<S>,
+}
+
+/// Point and spot lights of a scene, of which each path chooses a few at each surface.
+pub(crate) struct LightChoice<S> {
+    /// Index of the light group that all lights of this choice share.
+    pub group: usize,
+    /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
+    sets: usize,
+    strata: Vec<Stratum<S>>,
+}
+
+/// For each lane of a packet, the set of lights to which it traces shadow rays.
+pub(crate) struct ChosenSets<'a, S> {
+    choice: &'a LightChoice<S>,
+    /// Index of the chosen set of lights in each lane.
+    sets: [u32; MAX_WIDTH],
+}
+
+impl<S: Float> LightChoice<S> {
+    /// Removes from `sources` the lights among which paths choose: point and spot lights that are
+    /// not on a surface, except for those that are much brighter than the others. Lights of a kind
+    /// (point or spot) remain if the scene does not have `many` of this kind, or if fewer than
+    /// `MIN_LIGHTS` of them are not on a surface. Returns `None`, and removes nothing, if no lights
+    /// are left to choose from. `extent` is the largest absolute coordinate of the scene's shapes
+    /// and camera.
+    pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
+        let of_kind = |is_spot: bool, is_many: bool| {
+            let is_kind = |source: &DeltaSource<S>| match &source.light.light {
+                DeltaLight::Point { cone, .. } => {
+                    cone.is_some() == is_spot && source.light.on_surface.is_none()
+                }
+                DeltaLight::Directional { .. } => false,
+            };
+            let lights: Vec<usize> = (0..sources.len()).filter(|i| is_kind(&sources[*i])).collect();
+            if is_many && lights.len() >= MIN_LIGHTS { lights } else { Vec::new() }
+        };
+        let mut candidates = [of_kind(false, many.points), of_kind(true, many.spots)].concat();
+        if candidates.is_empty() {
+            return None;
+        }
+        candidates.sort_unstable();
+        let shares = candidates.iter().map(|i| match &sources[*i].light.light {
+            DeltaLight::Point { cone: Some(cone), .. } => share(cone.outer.to_f64()),
+            _ => 1.0,
+        });
+        let sets = 1 << (shares.sum::<f64>() as usize / MIN_SET).max(1).ilog2();
+        let powers = powers(candidates.iter().map(|i| &sources[*i]), extent);
+        let mut is_chosen = vec![false; sources.len()];
+        for i in &candidates {
+            is_chosen[*i] = true;
+        }
+        for bright in bright_lights(&powers, sets) {
+            is_chosen[candidates[bright]] = false;
+        }
+        let mut is_chosen = is_chosen.into_iter();
+        let (mut chosen, others): (Vec<_>, Vec<_>) =
+            sources.drain(..).partition(|_| is_chosen.next() == Some(true));
+        *sources = others;
+        let low = chosen.iter().map(place).reduce(DVec3::min)?;
+        let high = chosen.iter().map(place).reduce(DVec3::max)?;
+        sort_by_number(&mut chosen, |source| morton(place(source), low, high) as i64);
+
+        let group = chosen[0].group;
+        assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");
+        let strata = chosen.chunks(sets).map(|lights| Stratum::new(lights, sets)).collect();
+        Some(Self { group, sets, strata })
+    }
+
+    /// Returns the number of strata (spatial groups of lights).
+    pub fn strata(&self) -> usize {
+        self.strata.len()
+    }
+
+    /// Returns the light period: the number of successive samples of a pixel that together trace a
+    /// shadow ray to each light once. It is the number of sets of lights, because each of these
+    /// samples uses a different set.
+    pub fn period(&self) -> u32 {
+        self.sets as u32
+    }
+
+    /// Returns a sphere around the lights of each stratum (spatial group of lights).
+    pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
+        self.strata.iter().map(|stratum| stratum.ball)
+    }
+
+    /// Chooses a set of lights for each lane. `number` is uniform in [0, 1).
+    #[inline(always)]
+    pub fn choose<L: SimdFloat<Scalar = S>>(&self, number: L) -> ChosenSets<'_, S> {
+        // The product with a power of two is exact, so it is less than the number of sets.
+        let place = number * L::from_f64(self.sets as f64);
+        let set = |lane: usize| if lane < L::WIDTH { place.lane(lane).to_u32() } else { 0 };
+        ChosenSets { choice: self, sets: array_from_fn(set) }
+    }
+}
+
+impl<S: Float> Table<S> {
+    /// Creates a table of one property of lights, with a value for each of `sets` sets. `values`
+    /// are the values of the lights, and `absent` is the value for sets without a light of the
+    /// stratum.
+    fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
+        let absent = S::from_f64(absent);
+        let is_full = values.clone().count() == sets;
+        match common(values.clone()) {
+            Some(value) if is_full => Self::Common(value),
+            _ => {
+                let padded = values.chain(std::iter::repeat(absent));
+                Self::BySet(padded.take(sets.max(MIN_TABLE)).collect())
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gather<L: SimdFloat<Scalar = S>>(&self, sets: &[u32; MAX_WIDTH]) -> L {
+        match self {
+            Self::Common(value) => L::splat(*value),
+            Self::BySet(table) => L::gather(table, sets),
+        }
+    }
+}
+
+impl<S: Float> Stratum<S> {
+    /// Creates a stratum (spatial group of lights) from its `lights`. Each of the `sets` sets holds
+    /// at most one light of the stratum. A path chooses one set at a surface and traces shadow rays
+    /// to its lights.
+    fn new(lights: &[DeltaSource<S>], sets: usize) -> Self {
+        let coordinate = |axis: usize| {
+            let coordinate = move |light: &DeltaSource<S>| match light.light.light {
+                DeltaLight::Point { position, .. } => position[axis],
+                DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
+            };
+            Table::new(lights.iter().map(coordinate), f64::NAN, sets)
+        };
+        let constant = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { inverse_square: false, .. } => S::from_f64(PI),
+            _ => S::default(),
+        };
+        let emission = |channel: usize| {
+            let emission = move |light: &DeltaSource<S>| {
+                light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
+            };
+            Table::new(lights.iter().map(emission), 1.0, sets)
+        };
+        Self {
+            ball: ball(lights.iter().map(place)),
+            positions: [0, 1, 2].map(coordinate),
+            constant: Table::new(lights.iter().map(constant), 0.0, sets),
+            emission: [0, 1, 2].map(emission),
+            cones: Cones::new(lights, sets),
+        }
+    }
+}
+
+impl<S: Float> Cones<S> {
+    /// Creates the cones of the `lights` of a stratum (spatial group of lights), at most one for
+    /// each of `sets` sets. Returns `None` if all lights emit equally in all directions.
+    fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
+        let cone = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { cone, .. } => cone,
+            DeltaLight::Directional { .. } => None,
+        };
+        lights.iter().find_map(cone)?;
+        let all: SpotCone<S> = SpotCone::of_all_directions();
+        let cones: Vec<SpotCone<S>> =
+            lights.iter().map(|light| cone(light).unwrap_or(all)).collect();
+        let table = |value: &dyn Fn(&SpotCone<S>) -> S| {
+            Table::new(cones.iter().map(value), value(&all).to_f64(), sets)
+        };
+        Some(Self {
+            axis: [0, 1, 2].map(|i| table(&move |cone| cone.axis[i])),
+            outer: table(&|cone| cone.outer),
+            scale: table(&|cone| cone.scale),
+        })
+    }
+}
+
+impl<S: Float> ChosenSets<'_, S> {
+    #[inline(always)]
+    fn gather<L: SimdFloat<Scalar = S>>(&self, tables: &[Table<S>; 3]) -> Vec3<L> {
+        let [x, y, z] = tables;
+        Vec3::new(x.gather(&self.sets), y.gather(&self.sets), z.gather(&self.sets))
+    }
+
+    /// Returns the position of each lane's chosen light in the stratum number `stratum` (a spatial
+    /// group of lights).
+    #[inline(always)]
+    pub fn positions<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
+        self.gather(&self.choice.strata[stratum].positions)
+    }
+
+    /// Returns the irradiance of each lane's chosen light in the stratum number `stratum` (a
+    /// spatial group of lights), divided by the probability of the choice. The irradiance is that
+    /// of a light with unit emission at normal incidence. `inverse` is the reciprocal of the
+    /// distance to the light.
+    #[inline(always)]
+    pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
+        let count = L::from_f64(self.choice.sets as f64);
+        // The irradiance is kept finite, because infinity times black would be NaN.
+        let falling = (inverse * inverse).min(L::from_f64(L::MAX) / count);
+        let constant: L = self.choice.strata[stratum].constant.gather(&self.sets);
+        L::select(constant.gt(L::zero()), constant, falling) * count
+    }
+
+    /// Returns the factor, 0..=1, of the intensity of each lane's chosen light in the stratum
+    /// number `stratum` (a spatial group of lights): that of its cone in the direction `wi`, a unit
+    /// vector from the surface point to the light. Returns `None` if no light of the stratum has a
+    /// cone.
+    #[inline(always)]
+    pub fn cone<L: SimdFloat<Scalar = S>>(&self, stratum: usize, wi: Vec3<L>) -> Option<L> {
+        let Cones { axis, outer, scale } = self.choice.strata[stratum].cones.as_ref()?;
+        let (outer, scale) = (outer.gather(&self.sets), scale.gather(&self.sets));
+        Some(spot_factor(wi, self.gather(axis), outer, scale))
+    }
+
+    /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
+    /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
+    /// multiply the lights' samples by an emission.
+    #[inline(always)]
+    pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
+        self.gather(&self.choice.strata[stratum].emission)
+    }
+}
+
+/// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
+/// of such a kind share one light group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ManyLights {
+    /// `true` if the scene has `MIN_LIGHTS` point lights or more.
+    points: bool,
+    /// `true` if the cones of the scene's spot lights have together at least the solid angle of
+    /// `MIN_LIGHTS` hemispheres. A spot light costs rays at surfaces in its cone only. If the cones
+    /// are narrow, few surfaces are in many of them, and all spots together cost few rays.
+    spots: bool,
+}
+
+impl ManyLights {
+    /// Counts `lights`, which are those that change the picture.
+    pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
+        let (mut points, mut spots) = (0, 0.0);
+        for light in lights {
+            match light.form() {
+                LightForm::Point { cone: None, .. } => points += 1,
+                LightForm::Point { cone: Some(spot), .. } => {
+                    spots += share(1.0 - spot.outer_angle.to_radians().cos());
+                }
+                LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => {}
+            }
+        }
+        Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
+    }
+
+    /// Returns `true` if the scene has many lights of the kind of `light`.
+    pub fn includes(&self, light: &Light) -> bool {
+        match light.form() {
+            LightForm::Point { cone: None, .. } => self.points,
+            LightForm::Point { cone: Some(_), .. } => self.spots,
+            LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => false,
+        }
+    }
+}
+
+/// Returns the solid angle of a cone in hemispheres, at most 1. It is approximately the share of
+/// the surfaces that a spot light with this cone illuminates. `outer` is [`SpotCone::outer`].
+fn share(outer: f64) -> f64 {
+    outer.min(1.0)
+}
+
+/// Returns the position of a light; the origin for a directional light.
+fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
+    source.light.light.position().unwrap_or_default()
+}
+
+/// Returns the power of each light in arbitrary units: red, green and blue. Lights whose irradiance
+/// does not depend on the distance are compared with the others at the mean distance of the lights
+/// from the scene's centre, which is the origin. This distance is at least `extent`.
+fn powers<'a, S: Float>(
+    lights: impl Iterator<Item = &'a DeltaSource<S>> + Clone,
+    extent: f64,
+) -> Vec<DVec3> {
+    let distances = lights.clone().map(|light| place(light).length().max(extent));
+    let mean = distances.sum::<f64>() / lights.clone().count().max(1) as f64;
+    let power = |light: &DeltaSource<S>| {
+        let emission = light.emission.map_or(DVec3::ONE, |e| DVec3::from(e.map(S::to_f64)));
+        match light.light.light.is_inverse_square() {
+            true => emission,
+            false => emission * (PI * mean * mean),
+        }
+    };
+    lights.map(power).collect()
+}
+
+/// Returns the indices of the bright lights: those to which every path traces shadow rays at each
+/// surface. The other lights are divided into `sets`, of which a path chooses one per surface.
+/// `powers` are the powers of all lights: red, green and blue.
+///
+/// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
+/// smallest product of variance and cost. The cost is the number of rays per surface: one that
+/// arrives, one to each bright light, and those to the lights of a set. The variance has three
+/// parts. The first is common to all lights, because it depends on the place of the surface only:
+/// the squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
+/// powers of the bright lights. The third is that sum for the other lights, times the number of
+/// sets, because a path reaches only one of the sets.
+///
+/// If all lights have similar powers, none is bright, because the squared sum outweighs the rest.
+/// Among one strong light and many weak ones, the strong light is bright.
+fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
+    let largest = powers.iter().map(|power| power.max_element()).fold(0.0, f64::max);
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Vec::new();
+    }
+    // Scaled powers, whose squares neither overflow nor vanish.
+    let powers: Vec<DVec3> = powers.iter().map(|power| *power / largest).collect();
+    let squares: Vec<f64> = powers.iter().map(|power| power.length_squared()).collect();
+    let mut order: Vec<usize> = (0..powers.len()).collect();
+    order.sort_by(|a, b| squares[*b].total_cmp(&squares[*a]));
+    let common = COMMON_VARIANCE * powers.iter().sum::<DVec3>().length_squared();
+    let effort = |k: usize| {
+        let sum = |lights: &[usize]| lights.iter().map(|i| squares[*i]).sum::<f64>();
+        let (bright, others) = order.split_at(k);
+        let cost = 1.0 + k as f64 + others.len() as f64 / sets as f64;
+        (common + sum(bright) + sets as f64 * sum(others)) * cost
+    };
+    let efforts: Vec<f64> = (0..=MAX_BRIGHT.min(powers.len() - 1)).map(effort).collect();
+    let best = (0..efforts.len()).reduce(|a, b| if efforts[b] < efforts[a] { b } else { a });
+    order.truncate(best.unwrap_or(0));
+    order
+}
+
+/// Returns the value that all `items` have. Returns `None` if they differ or if there are none.
+fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
+    let first = items.next()?;
+    items.all(|item| item == first).then_some(first)
+}
+
+/// Returns a sphere that contains `points`, centred on their bounding box.
+fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
+    let low = points.clone().reduce(DVec3::min).unwrap_or_default();
+    let high = points.clone().reduce(DVec3::max).unwrap_or_default();
+    let center = 0.5 * (low + high);
+    let radius = points.map(|point| point.distance(center)).fold(0.0, f64::max);
+    // The radius has a margin for rounding errors.
+    BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
+}
+
+/// Returns the position of `point` on a Morton curve through the box from `low` to `high`.
+fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
+    let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
+    morton_code(((point - low) / extent).to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the number of sets that `count` lights are divided into.
+    fn sets(count: usize) -> usize {
+        1 << (count / MIN_SET).ilog2()
+    }
+
+    fn bright(powers: &[f64]) -> Vec<usize> {
+        let powers: Vec<DVec3> = powers.iter().map(|power| DVec3::splat(*power)).collect();
+        bright_lights(&powers, sets(powers.len()))
+    }
+
+    #[test]
+    fn no_light_of_similar_ones_is_bright() {
+        for count in MIN_LIGHTS..=300 {
+            for power in [1e-300, 0.3, 1e300] {
+                assert!(bright(&vec![power; count]).is_empty(), "{count} of {power}");
+            }
+            let powers: Vec<f64> = (0..count).map(|i| 1.0 + 0.5 * (i as f64).sin()).collect();
+            assert!(bright(&powers).is_empty(), "{count}");
+        }
+        assert!(bright(&[0.0; 20]).is_empty());
+    }
+
+    #[test]
+    fn a_few_strong_lights_among_weak_ones_are_bright() {
+        for count in [MIN_LIGHTS, 64, 1000] {
+            for weak in [1e-30, 1e-6, 1e-3] {
+                let mut powers = vec![weak; count];
+                powers[5] = 0.7;
+                assert_eq!(bright(&powers), [5], "{count} of {weak}");
+                powers[count - 1] = 0.9;
+                assert_eq!(bright(&powers), [count - 1, 5], "{count} of {weak}");
+            }
+        }
+        // Powers in different channels are compared by their sizes.
+        let mut powers = vec![DVec3::X * 1e-3; 64];
+        powers[7] = DVec3::Z;
+        assert_eq!(bright_lights(&powers, sets(64)), [7]);
+    }
+
+    #[test]
+    fn few_of_very_different_lights_are_bright() {
+        for count in [MIN_LIGHTS, 64, 1000] {
+            for ratio in [0.5_f64, 0.9, 0.99] {
+                let powers: Vec<f64> = (0..count).map(|i| ratio.powi(i as i32)).collect();
+                let bright = bright(&powers).len();
+                assert!(bright <= MAX_BRIGHT, "{bright} of {count}, ratio {ratio}");
+            }
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! Flat emissive objects (emissive sheets) that lie on opaque surfaces, such as a panel on the
+//! ceiling of a room.
+//!
+//! Rounding would decide which of two coincident surfaces a ray hits, and points sampled on the
+//! emissive sheet could be behind the opaque surface. Compilation therefore moves the sheet off the
+//! surface by a few rounding errors. The picture is the limit of a vanishing gap, both for rays
+//! that hit the sheet and for points sampled on it.
+//!
+//! The sheet moves to the side on which it is visible. A one-sided sheet moves to its front. A
+//! two-sided sheet on a solid moves outside, or inside if the eye is inside of the solid. A
+//! two-sided sheet on an open surface, which has no inside, moves to the side of the eye.
+
+use crate::compile::RecenteredGeometry;
+use crate::integrator::coincident_surfaces::touching_pairs;
+use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
+use crate::lights::emitters::CONTACT_LIFTS;
+use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
+use std::slice;
+use zerkalo_kernel::bvh::Ray;
+use zerkalo_kernel::lanes::{SimdFloat, Vec3};
+use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, HalfSpace, ParallelogramForm};
+
+/// Distance between an emissive sheet and the surface off which it is moved. The unit is the height
+/// of sampled points above the sheet. At this distance the surface does not count as covering the
+/// points that are sampled on either side of the sheet (see [`CONTACT_LIFTS`]).
+const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
+
+/// Number of test points for contact along each side of a triangle.
+const POINTS_PER_SIDE: u32 = 12;
+
+/// Largest number of triangles of a form for which contact is tested at several points of each
+/// triangle. In forms with more triangles, it is tested at one point of each.
+const MAX_DETAILED: usize = 12;
+
+/// Largest number of triangles of a mesh that are tested for contact.
+const MAX_POINTS: usize = 1024;
+
+/// Smallest cosine of the angle between the normals of a sheet and of a surface on which it can
+/// lie.
+const MIN_COSINE: f64 = 0.999_999;
+
+/// Sides on which an object emits light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Emits {
+    Nothing,
+    Front,
+    BothSides,
+}
+
+/// Moves emissive sheets off the opaque surfaces on which they lie. For each object, `emits` holds
+/// the sides that emit light, and `transmits` is `true` if it transmits light. `eye` is the
+/// position of the camera. `lift` is the height of sampled points above emissive surfaces. Returns
+/// `None` if no sheet is moved.
+pub(crate) fn move_off_surfaces(
+    geometry: &RecenteredGeometry,
+    (emits, transmits): (&[Emits], &[bool]),
+    eye: DVec3,
+    lift: f64,
+) -> Option<RecenteredGeometry> {
+    let forms = &geometry.forms[..];
+    let sheet = |object: usize| {
+        let shines = emits[object] != Emits::Nothing && !transmits[object];
+        shines.then(|| Sheet::new(&forms[object], lift))?
+    };
+    let sheets: Vec<Option<Sheet>> = (0..forms.len()).map(sheet).collect();
+    if sheets.iter().all(Option::is_none) {
+        return None;
+    }
+    let reach = CONTACT_LIFTS * lift;
+    let may_lie_on = |object: usize, carrier: usize| {
+        let sheet = sheets[object].as_ref().filter(|_| emits[carrier] == Emits::Nothing);
+        sheet.is_some_and(|sheet| may_carry(&forms[carrier], sheet, reach))
+    };
+    let wanted = |a: usize, b: usize| may_lie_on(a, b) || may_lie_on(b, a);
+    let mut compiled = CompiledObjects { forms, aggregates: HashMap::new() };
+    let mut contacts: HashMap<usize, Vec<Contact>> = HashMap::new();
+    let mut fixed = vec![false; forms.len()];
+    for (a, b) in touching_pairs(forms, wanted, reach) {
+        let (object, carrier) = if sheets[a].is_some() { (a, b) } else { (b, a) };
+        let Some(sheet) = &sheets[object] else { continue };
+        let Some(contact) = compiled.contact((object, sheet), carrier, eye, reach) else {
+            continue;
+        };
+        // Transparent surfaces in the plane of the sheet are crossed in a fixed order, from which a
+        // shift would remove the sheet.
+        fixed[object] |= transmits[carrier];
+        contacts.entry(object).or_default().push(contact);
+    }
+    let mut moved = geometry.forms.clone();
+    let mut has_moved = false;
+    for (object, contacts) in contacts {
+        let Some(sheet) = sheets[object].as_ref().filter(|_| !fixed[object]) else { continue };
+        let HalfSpace { normal, offset } = sheet.plane;
+        let side = if emits[object] == Emits::Front && sheet.has_front {
+            1.0
+        } else if contacts.iter().all(|contact| contact.side == contacts[0].side) {
+            contacts[0].side
+        } else if normal.dot(eye) >= offset {
+            // The sheet is between two surfaces, one on each side. It moves to the side of the eye.
+            1.0
+        } else {
+            -1.0
+        };
+        let shift = |contact: &Contact| GAP_LIFTS * lift - side * contact.height;
+        let shift = contacts.iter().map(shift).fold(0.0, f64::max);
+        let by = DAffine3::from_translation(normal * (side * shift));
+        moved[object] = forms[object].clone().transformed(&by);
+        has_moved = true;
+    }
+    let RecenteredGeometry { origin, extent, .. } = *geometry;
+    has_moved.then_some(RecenteredGeometry { origin, forms: moved, extent })
+}
+
+/// Flat emissive object.
+struct Sheet {
+    /// Plane that contains the sheet, with its normal on the front.
+    plane: HalfSpace,
+    /// `true` if all parts of the sheet have their fronts on the same side.
+    has_front: bool,
+    /// Sphere around the sheet.
+    ball: BoundingSphere,
+}
+
+impl Sheet {
+    /// Returns the sheet with the geometry `form`; `None` if the geometry is not flat. Corners of a
+    /// mesh may be up to `lift` away from a common plane.
+    fn new(form: &Form, lift: f64) -> Option<Self> {
+        let ball = form.bounding_sphere();
+        if let Some(plane) = form.plane() {
+            return Some(Self { plane, has_front: true, ball });
+        }
+        let Form::Mesh(mesh) = form else { return None };
+        let triangles = || triangles_of_mesh(mesh, 1);
+        let normal_of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+        // A coarse test with one triangle excludes most meshes quickly.
+        let some = triangles().find(|triangle| normal_of(*triangle) != DVec3::ZERO)?;
+        let normal = normal_of(some).normalize();
+        let is_near = |corner: DVec3| {
+            let from_corner = corner - some[0];
+            normal.dot(from_corner).abs() <= 1e-3 * from_corner.length() + lift
+        };
+        if !triangles().flatten().all(is_near) {
+            return None;
+        }
+        let larger = |a: DVec3, b: DVec3| if a.length() >= b.length() { a } else { b };
+        let normal = triangles().map(normal_of).reduce(larger)?.normalize();
+        let offset = normal.dot(some[0]);
+        let is_on = |corner: DVec3| (normal.dot(corner) - offset).abs() <= lift;
+        let has_front = triangles().all(|triangle| normal_of(triangle).dot(normal) >= 0.0);
+        let is_flat = triangles().flatten().all(is_on);
+        is_flat.then_some(Self { plane: HalfSpace { normal, offset }, has_front, ball })
+    }
+}
+
+/// Contact of an emissive sheet with a surface on which it lies.
+struct Contact {
+    /// Side on which the sheet is visible: 1 for the front, -1 for the back.
+    side: f64,
+    /// Height of the sheet above the surface, along the normal of the sheet; negative if the sheet
+    /// is below the surface.
+    height: f64,
+}
+
+/// Objects of a scene. Each is compiled by itself, at its first use.
+struct CompiledObjects<'a> {
+    forms: &'a [Form],
+    aggregates: HashMap<usize, Aggregate<f64>>,
+}
+
+impl CompiledObjects<'_> {
+    /// Returns the closest hit of a ray with an object: its distance, and the outward normal of the
+    /// object there.
+    fn hit(&mut self, object: usize, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
+        let form = slice::from_ref(&self.forms[object]);
+        let compile = || Aggregate::with_tree(form, false);
+        let alone = self.aggregates.entry(object).or_insert_with(compile);
+        let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
+        let ray = Ray { origin: vector(origin), direction: vector(direction) };
+        let hit = alone.closest(&ray, alone.all());
+        if hit.t >= f64::MAX {
+            return None;
+        }
+        let normal = alone.surface(hit.primitive.id_lane(0), hit.triangle, ray.at(hit.t)).normal;
+        Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
+    }
+
+    /// Tests if the flat emissive object number `object` lies on the object `carrier`. Returns the
+    /// height of the surface of `carrier` above the plane of the object, and the side on which the
+    /// object is visible. `sheet` describes the plane of the object. Returns `None` if no tested
+    /// point of the object is on `carrier`.
+    fn contact(
+        &mut self,
+        (object, sheet): (usize, &Sheet),
+        carrier: usize,
+        eye: DVec3,
+        reach: f64,
+    ) -> Option<Contact> {
+        let HalfSpace { normal, offset } = sheet.plane;
+        let points =
+            points_on(&self.forms[object]).into_iter().chain(points_on(&self.forms[carrier]));
+        for point in points {
+            let from_plane = normal.dot(point) - offset;
+            if from_plane.abs() > reach {
+                continue;
+            }
+            // The probe runs through the point along the normal of the sheet.
+            let point = point - normal * from_plane;
+            let start = point + normal * (2.0 * reach);
+            let mut probe = |object: usize| {
+                let (t, outward) = self.hit(object, start, -normal)?;
+                let height = t - 2.0 * reach;
+                let is_on = height.abs() <= reach && outward.dot(normal).abs() >= MIN_COSINE;
+                is_on.then_some((height, outward))
+            };
+            let Some((height, outward)) = probe(object).and_then(|_| probe(carrier)) else {
+                continue;
+            };
+            // The first surface of the object on the way from the eye to the point shows whether
+            // the eye is inside of the object.
+            let sight = (point - eye).normalize_or(-normal);
+            let first = self.hit(carrier, eye, sight);
+            let is_inside = first.is_some_and(|(_, outward)| outward.dot(sight) > 0.0);
+            let shows = if is_inside { -outward } else { outward };
+            return Some(Contact { side: normal.dot(shows).signum(), height });
+        }
+        None
+    }
+}
+
+/// Returns `true` if `sheet` may lie on the form `carrier`: if the form may have a flat face in the
+/// plane of the sheet. The two planes may be up to `reach` apart.
+fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
+    let is_parallel = |normal: DVec3| normal.dot(sheet.plane.normal).abs() >= MIN_COSINE;
+    // Angles below that of `MIN_COSINE` displace the edge of the sheet by 0.2 % of its radius.
+    let room = reach + 2e-3 * sheet.ball.radius;
+    let is_face = |face: &HalfSpace| {
+        let height = face.normal.dot(sheet.ball.center) - face.offset;
+        is_parallel(face.normal) && height.abs() <= room
+    };
+    match carrier {
+        Form::Sphere(_) | Form::Ellipsoid(_) | Form::Torus(_) => false,
+        Form::ConvexPolyhedron(form) => form.faces.iter().any(is_face),
+        Form::Parallelogram(_) | Form::Plane(_) => carrier.plane().as_ref().is_some_and(is_face),
+        Form::ConicalFrustum(_) | Form::Csg(_) | Form::Mesh(_) => true,
+    }
+}
+
+/// Returns points inside of the faces of a form; none for forms that are not made of triangles.
+fn points_on(form: &Form) -> Vec<DVec3> {
+    let triangles = match form {
+        Form::Parallelogram(ParallelogramForm { corner, u, v }) => {
+            let (corner, far) = (*corner, *corner + *u + *v);
+            vec![[corner, corner + *u, far], [corner, far, corner + *v]]
+        }
+        Form::ConvexPolyhedron(form) => triangles_of_polyhedron(form),
+        Form::Mesh(mesh) => {
+            triangles_of_mesh(mesh, form.triangles().div_ceil(MAX_POINTS).max(1)).collect()
+        }
+        Form::Sphere(_)
+        | Form::Ellipsoid(_)
+        | Form::ConicalFrustum(_)
+        | Form::Csg(_)
+        | Form::Plane(_)
+        | Form::Torus(_) => Vec::new(),
+    };
+    let per_side = if triangles.len() <= MAX_DETAILED { POINTS_PER_SIDE } else { 1 };
+    let points_on_triangle = |&[a, b, c]: &[DVec3; 3]| {
+        let weight = move |i: u32| (f64::from(i) + 1.0 / 3.0) / f64::from(per_side);
+        let pairs = (0..per_side).flat_map(move |i| (0..per_side - i).map(move |j| (i, j)));
+        pairs.map(move |(i, j)| a + (b - a) * weight(i) + (c - a) * weight(j))
+    };
+    triangles.iter().flat_map(points_on_triangle).collect()
+}

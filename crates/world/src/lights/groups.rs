@@ -1,0 +1,497 @@
+//! Light groups. A light group is the part of the picture that comes from one source: a light, an
+//! emissive material, ambient light or the background. It is proportional to the colour and
+//! intensity of the source. The film stores each group separately, so that colour and intensity can
+//! change without new samples.
+
+use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
+use crate::lights::choice::ManyLights;
+use std::collections::HashMap;
+use zerkalo_kernel::lanes::Float;
+use zerkalo_scene::light::Light;
+use zerkalo_scene::material::Material;
+use zerkalo_scene::value::Color;
+use zerkalo_scene::{Object, Scene};
+
+/// Largest number of light groups for lights and emissive materials. If a scene has more lights and
+/// emissive materials than that, several of them share the last of these groups.
+const MAX_LIGHT_GROUPS: usize = 8;
+
+/// Largest number of light groups: those of lights and emissive materials, one for ambient light,
+/// and one for the background.
+pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
+
+/// Largest size \[bytes\] of the film's integer sums. Lights get groups of their own until the sums
+/// reach this size; further lights share the last group.
+const FILM_BYTES: u64 = 1 << 30;
+
+/// Bytes that the film stores per pixel for one light group. Each of the two replicates, which are
+/// halves of the samples, has one sum of eight bytes for each of three channels.
+const GROUP_BYTES: u64 = 2 * 3 * 8;
+
+/// Source of the light in one light group.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightGroupSource {
+    /// Ambient light of the scene.
+    Ambient,
+    /// Background: the radiance of rays that miss all primitives.
+    Background,
+    /// One light; the value is its index in the scene.
+    Light(usize),
+    /// Emission of all objects with one material; the value is the name of the material.
+    Material(String),
+    /// Several lights and materials. The tracer multiplies the samples of each by its colour and
+    /// intensity.
+    Shared(Vec<LightGroupSource>),
+}
+
+impl LightGroupSource {
+    /// Returns the lights and materials in the light group; empty for ambient light and background.
+    pub fn emitting(&self) -> &[Self] {
+        match self {
+            Self::Ambient | Self::Background => &[],
+            Self::Light(_) | Self::Material(_) => std::slice::from_ref(self),
+            Self::Shared(list) => list,
+        }
+    }
+
+    /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
+    /// black.
+    pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
+        match self {
+            Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
+            Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
+            Self::Ambient | Self::Background | Self::Shared(_) => [0.0; 3],
+        }
+    }
+}
+
+/// Light groups of a scene, except for groups that would be black in every sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightGroups {
+    /// Sources of the light groups, in the order of the film's sums: one source for each group.
+    pub members: Vec<LightGroupSource>,
+    /// `true` if some surface reflects light that arrives directly from lights.
+    pub(crate) lit: bool,
+    /// `true` if some surface reflects ambient light.
+    pub(crate) ambient: bool,
+    /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
+    pub(crate) many: ManyLights,
+}
+
+impl LightGroups {
+    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
+    /// materials share one group. Otherwise each has a group of its own, with two exceptions that
+    /// share the last group: the lights of a kind (point or spot) of which the scene has many (see
+    /// `ManyLights`), and the lights and materials beyond the largest number of groups.
+    ///
+    /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
+    /// reflects ambient light. A light that no surface reflects has a group only if the camera can
+    /// see it.
+    pub fn new(scene: &Scene, (lit, ambient): (bool, bool), merge_lights: bool) -> Self {
+        let mut members = Vec::new();
+        if ambient && scene.ambient.color != Color::BLACK {
+            members.push(LightGroupSource::Ambient);
+        }
+        if scene.background.color != Color::BLACK {
+            members.push(LightGroupSource::Background);
+        }
+        let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
+        emitting.retain(|i| contributes(&scene.lights[*i], lit));
+        // Many point lights share one group, because separate sums for seven of them would take a
+        // quarter of the rendering time. So do many spot lights.
+        let many = ManyLights::new(emitting.iter().map(|i| &scene.lights[*i]));
+        let (shared, separate): (Vec<_>, Vec<_>) =
+            emitting.into_iter().partition(|i| many.includes(&scene.lights[*i]));
+        let [mut shared, mut separate] = [shared, separate]
+            .map(|lights| lights.into_iter().map(LightGroupSource::Light).collect::<Vec<_>>());
+        separate.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
+        let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
+        let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
+        let max_light_groups = match merge_lights {
+            true => 1,
+            false => max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS),
+        };
+        if separate.len() + usize::from(!shared.is_empty()) > max_light_groups {
+            shared.splice(0..0, separate.drain(max_light_groups - 1..));
+        }
+        members.extend(separate);
+        if !shared.is_empty() {
+            members.push(LightGroupSource::Shared(shared));
+        }
+        if members.is_empty() {
+            // The film needs at least one group, even for a black picture.
+            members.push(LightGroupSource::Background);
+        }
+        Self { members, lit, ambient, many }
+    }
+
+    /// Returns the number of light groups that would remain if all lights and emissive materials
+    /// shared one.
+    pub fn merged_count(&self) -> usize {
+        let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
+        self.members.len() - lights.saturating_sub(1)
+    }
+
+    /// Returns the index of the light group whose source is `wanted`. Returns `None` if there is no
+    /// such group.
+    pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
+        self.members.iter().position(|m| m == wanted)
+    }
+
+    /// Returns three values for each light in a light group: its index in the scene, the index of
+    /// the group, and its emission. The tracer multiplies the light's samples by the emission,
+    /// which is 1 for a light with a group of its own.
+    pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
+        let light = |source: &LightGroupSource| match source {
+            LightGroupSource::Light(i) => Some(*i),
+            _ => None,
+        };
+        self.emitting(scene, light)
+    }
+
+    /// Returns three values for each emissive material: its name, the index of its light group, and
+    /// its emission. The tracer multiplies the material's samples by the emission, which is 1 for a
+    /// material with a group of its own.
+    pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
+        let material = |source: &LightGroupSource| match source {
+            LightGroupSource::Material(name) => Some(name.clone()),
+            _ => None,
+        };
+        self.emitting(scene, material)
+    }
+
+    /// Returns three values for each source (light or emissive material) that `select` accepts: the
+    /// result of `select`, the index of the light group, and the emission. The tracer multiplies
+    /// the source's samples by the emission, which is 1 for a source with a group of its own.
+    fn emitting<T>(
+        &self,
+        scene: &Scene,
+        select: impl Fn(&LightGroupSource) -> Option<T>,
+    ) -> Vec<(T, usize, [f64; 3])> {
+        let mut out = Vec::new();
+        for (group, member) in self.members.iter().enumerate() {
+            let is_shared = matches!(member, LightGroupSource::Shared(_));
+            for source in member.emitting() {
+                let emission = if is_shared { source.emission(scene) } else { [1.0; 3] };
+                out.extend(select(source).map(|name| (name, group, emission)));
+            }
+        }
+        out
+    }
+
+    /// Returns the red, green and blue factor by which the film's sums of each light group are
+    /// multiplied in the picture of `scene`. `scene` may differ from the compiled scene in colours,
+    /// intensities and on/off switches of lights, emission of materials, ambient light and
+    /// background.
+    pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
+        let weight = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => scene.ambient.color.0,
+            LightGroupSource::Background => scene.background.color.0,
+            LightGroupSource::Light(_) | LightGroupSource::Material(_) => member.emission(scene),
+            LightGroupSource::Shared(_) => [1.0; 3],
+        };
+        self.members.iter().map(weight).collect()
+    }
+
+    /// Returns the name of each light group, for layers of image files.
+    pub fn names(&self, scene: &Scene) -> Vec<String> {
+        let name = |member: &LightGroupSource| match member {
+            LightGroupSource::Ambient => "ambient".to_string(),
+            LightGroupSource::Background => "background".to_string(),
+            LightGroupSource::Light(i) => match scene.lights.get(*i) {
+                Some(light) if !light.name.is_empty() => light.name.clone(),
+                _ => format!("light {}", i + 1),
+            },
+            LightGroupSource::Material(name) => name.clone(),
+            LightGroupSource::Shared(list) => format!("{} lights", list.len()),
+        };
+        self.members.iter().map(name).collect()
+    }
+
+    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
+    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`].
+    /// `ranges` has that of each light, by its index in the scene, for intensity 1.
+    pub(crate) fn scales<S: Float>(
+        &self,
+        scene: &Scene,
+        ranges: &HashMap<usize, RadianceRange>,
+        distances: &SceneDistances,
+    ) -> Vec<f64> {
+        let range_of_material = |name: &str| {
+            let has_material = |object: &usize| scene.objects[*object].materials().contains(&name);
+            let objects = (0..scene.objects.len()).filter(has_material);
+            objects.map(|object| distances.object(object)).reduce(RadianceRange::or)
+        };
+        let range_of_one = |source: &LightGroupSource| match source {
+            LightGroupSource::Ambient => Some(distances.ambient()),
+            LightGroupSource::Background => Some(distances.background()),
+            LightGroupSource::Light(i) => ranges.get(i).copied(),
+            LightGroupSource::Material(name) => range_of_material(name),
+            LightGroupSource::Shared(_) => None,
+        };
+        let range_of_emission = |source: &LightGroupSource| {
+            let channels = source.emission(scene).into_iter().filter(|s| *s > 0.0);
+            let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
+            Some(range_of_one(source)?.times(low, high))
+        };
+        let range_of = |member: &LightGroupSource| match member {
+            LightGroupSource::Shared(list) => {
+                list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
+            }
+            member => range_of_one(member),
+        };
+        // The largest sample and its square have to be finite in the precision of the samples.
+        let (min_exponent, max_exponent) =
+            if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
+        let scale = |member| {
+            let exponent = range_of(member).map_or(0.0, |range| range.scale_exponent());
+            exponent.clamp(min_exponent, max_exponent).exp2()
+        };
+        self.members.iter().map(scale).collect()
+    }
+}
+
+/// Returns the names of the materials that emit light and are used, in order of first use.
+pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in scene.objects.iter().flat_map(Object::materials) {
+        let emits = scene.materials.get(name).is_some_and(Material::emits);
+        if emits && !names.iter().any(|known| known == name) {
+            names.push(name.to_string());
+        }
+    }
+    names
+}
+
+/// Returns the emission of a light: colour times intensity, black if it is off.
+pub(crate) fn emission(light: &Light) -> [f64; 3] {
+    if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
+}
+
+/// Returns `true` if the light is on and its emission is not black.
+pub(crate) fn emits(light: &Light) -> bool {
+    emission(light) != [0.0; 3]
+}
+
+/// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
+/// or the camera sees it. `lit` is `true` if some surface reflects direct light.
+pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
+    emits(light) && (lit || light.visible && light.has_radiance())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::choice::MIN_LIGHTS;
+
+    const LIGHTS: &str = "
+        [ambient]
+        color = [0.1, 0.1, 0.1]
+        [[light]]
+        name = \"lamp\"
+        point = { position = [0.0, 3.0, 0.0] }
+        [[light]]
+        point = { position = [1.0, 3.0, 0.0] }
+        on = false
+        [materials.red]
+        color = [1.0, 0.0, 0.0]
+        [materials.spare]
+        [[object]]
+        material = \"red\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+    ";
+
+    fn scene(text: &str) -> Scene {
+        Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn move_right(light: &mut Light) {
+        light.position_mut().unwrap()[0] = 5.0;
+    }
+
+    fn can_reuse(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        groups.can_reuse(scene, &changed)
+    }
+
+    #[test]
+    fn samples_are_reused_for_scenes_that_differ_in_group_weights_only() {
+        let scene = scene(LIGHTS);
+        let groups = LightGroups::new(&scene, (true, true), false);
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        assert!(reusable(|_| ()));
+        assert!(reusable(|s| s.lights[0].intensity = 7.0));
+        assert!(reusable(|s| s.lights[0].color = Color([0.0, 0.5, 1.0])));
+        assert!(reusable(|s| s.lights[0].on = false));
+        assert!(reusable(|s| s.ambient.color = Color::BLACK));
+        assert!(reusable(|s| s.ambient.color = Color::WHITE));
+        assert!(reusable(|s| s.film.rays_per_pixel = 9));
+        assert!(reusable(|s| s.lights[0].name = "sun".to_string()));
+        assert!(reusable(|s| s.objects[0].name = "ball".to_string()));
+        assert!(reusable(|s| s.materials.retain(|name, _| name != "spare")));
+        // A material under another name is the same material.
+        assert!(reusable(|s| {
+            let red = s.materials.remove("red").unwrap();
+            s.materials.insert("crimson".to_string(), red);
+            s.objects[0].material = "crimson".to_string();
+        }));
+        // Lights that do not emit may move or be absent.
+        assert!(reusable(|s| s.lights[1].intensity = 9.0));
+        assert!(reusable(|s| move_right(&mut s.lights[1])));
+        assert!(reusable(|s| s.lights.truncate(s.lights.len() - 1)));
+        assert!(reusable(|s| s.lights.clear()));
+        assert!(reusable(|s| {
+            s.lights[0].on = false;
+            move_right(&mut s.lights[0]);
+        }));
+    }
+
+    #[test]
+    fn samples_are_not_reused_for_other_scenes() {
+        let scene = scene(LIGHTS);
+        let groups = LightGroups::new(&scene, (true, true), false);
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        assert!(!reusable(|s| s.lights[1].on = true));
+        assert!(!reusable(|s| s.background.color = Color::WHITE));
+        assert!(!reusable(|s| move_right(&mut s.lights[0])));
+        assert!(!reusable(|s| s.lights[0].falloff = zerkalo_scene::light::Falloff::InverseSquare));
+        assert!(!reusable(|s| s.lights.push(s.lights[0].clone())));
+        assert!(!reusable(|s| s.camera.eye[0] += 0.5));
+        assert!(!reusable(|s| s.film.size = [641, 480]));
+        assert!(!reusable(|s| s.trace.max_depth = 3));
+        assert!(!reusable(|s| s.materials.get_mut("red").unwrap().ambient = 0.5));
+        assert!(!reusable(|s| s.objects[0].material = "spare".to_string()));
+        assert!(!reusable(|s| s.objects.push(s.objects[0].clone())));
+    }
+
+    const GLOWING: &str = "
+        [materials.lamp]
+        emission = 4.0
+        [materials.matt]
+        [[object]]
+        material = \"lamp\"
+        shape.sphere = { center = [0.0, 3.0, 0.0], radius = 1.0 }
+        [[object]]
+        material = \"matt\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+    ";
+
+    #[test]
+    fn emission_of_a_material_is_a_group_weight() {
+        let scene = scene(GLOWING);
+        let groups = LightGroups::new(&scene, (true, false), false);
+        assert_eq!(groups.members, [LightGroupSource::Material("lamp".to_string())]);
+        assert_eq!(groups.names(&scene), ["lamp"]);
+        assert_eq!(groups.mix(&scene), [[4.0; 3]]);
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        fn lamp(scene: &mut Scene) -> &mut Material {
+            scene.materials.get_mut("lamp").unwrap()
+        }
+        assert!(reusable(|_| ()));
+        assert!(reusable(|s| lamp(s).emission = 7.0));
+        assert!(reusable(|s| lamp(s).emission = 0.0));
+        assert!(reusable(|s| lamp(s).emission_color = Color([1.0, 0.5, 0.0])));
+        assert!(!reusable(|s| lamp(s).diffuse = 0.5));
+        assert!(!reusable(|s| s.materials.get_mut("matt").unwrap().emission = 1.0));
+        assert!(!reusable(|s| s.objects[1].material = "lamp".to_string()));
+        // A light group is identified by the name of its material, so the samples cannot be reused
+        // if the material has another name.
+        assert!(!reusable(|s| {
+            let lamp = s.materials.remove("lamp").unwrap();
+            s.materials.insert("bulb".to_string(), lamp);
+            s.objects[0].material = "bulb".to_string();
+        }));
+        let mut dark = scene.clone();
+        lamp(&mut dark).emission = 0.0;
+        assert_eq!(groups.mix(&dark), [[0.0; 3]]);
+        assert!(!LightGroups::new(&dark, (true, false), false).can_reuse(&dark, &scene));
+    }
+
+    #[test]
+    fn lights_and_materials_share_the_last_group() {
+        let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let scene = scene(&(light.repeat(MAX_LIGHT_GROUPS) + GLOWING));
+        let groups = LightGroups::new(&scene, (true, false), false);
+        let shared = [
+            LightGroupSource::Light(MAX_LIGHT_GROUPS - 1),
+            LightGroupSource::Material("lamp".to_string()),
+        ];
+        assert_eq!(groups.members.last(), Some(&LightGroupSource::Shared(shared.to_vec())));
+        let emission = groups.materials(&scene);
+        assert_eq!(emission, [("lamp".to_string(), MAX_LIGHT_GROUPS - 1, [4.0; 3])]);
+        let change = |s: &mut Scene| s.materials.get_mut("lamp").unwrap().emission = 3.0;
+        assert!(!can_reuse(&groups, &scene, change));
+    }
+
+    #[test]
+    fn many_point_lights_share_a_group() {
+        let point = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let sphere = "[[light]]\nsphere = { center = [0.0, 3.0, 0.0], radius = 0.1 }\n";
+        let members = |points: usize| {
+            let scene = scene(&(point.repeat(points) + sphere + GLOWING));
+            LightGroups::new(&scene, (true, false), false).members
+        };
+        let lights =
+            |range| -> Vec<_> { std::ops::Range::map(range, LightGroupSource::Light).collect() };
+        let lamp = LightGroupSource::Material("lamp".to_string());
+
+        let single = MAX_LIGHT_GROUPS - 1;
+        let few = members(MIN_LIGHTS - 1);
+        assert_eq!(few[..single], lights(0..single));
+        let rest = [lights(single..MIN_LIGHTS), vec![lamp.clone()]].concat();
+        assert_eq!(few[single..], [LightGroupSource::Shared(rest)]);
+
+        let shared = LightGroupSource::Shared(lights(0..MIN_LIGHTS));
+        assert_eq!(members(MIN_LIGHTS), [LightGroupSource::Light(MIN_LIGHTS), lamp, shared]);
+    }
+
+    #[test]
+    fn many_spot_lights_share_a_group() {
+        let point = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let spot = "[[light]]\nspot = { position = [0.0, 3.0, 0.0], direction = [0.0, -1.0, 0.0], \
+                    inner_angle = 20.0, outer_angle = 100.0 }\n";
+        let members = |points: usize, spots: usize| {
+            let scene = scene(&(point.repeat(points) + &spot.repeat(spots) + GLOWING));
+            LightGroups::new(&scene, (true, false), false).members
+        };
+        let lights = |range: std::ops::Range<usize>| {
+            LightGroupSource::Shared(range.map(LightGroupSource::Light).collect())
+        };
+        let lamp = LightGroupSource::Material("lamp".to_string());
+        let single = LightGroupSource::Light;
+        let many = MIN_LIGHTS;
+        assert_eq!(members(1, many), [single(0), lamp.clone(), lights(1..many + 1)]);
+        assert_eq!(members(many, 1), [single(many), lamp.clone(), lights(0..many)]);
+        assert_eq!(members(many, many), [lamp, lights(0..2 * many)]);
+    }
+
+    #[test]
+    fn lights_do_not_matter_without_surfaces_that_return_light() {
+        let scene = scene(LIGHTS);
+        let groups = LightGroups::new(&scene, (false, false), false);
+        assert!(can_reuse(&groups, &scene, |s| s.lights[1].on = true));
+        assert!(can_reuse(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
+        assert!(can_reuse(&groups, &scene, |s| s.ambient.color = Color::WHITE));
+        // A black picture has a group for the background, because the film needs one. Its samples
+        // cannot be reused for a background that is not black.
+        assert_eq!(groups.members, [LightGroupSource::Background]);
+        assert!(!can_reuse(&groups, &scene, |s| s.background.color = Color::WHITE));
+    }
+
+    #[test]
+    fn samples_are_not_reused_when_a_light_of_a_shared_group_changes() {
+        let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let scene = scene(&light.repeat(MAX_LIGHT_GROUPS + 2));
+        let groups = LightGroups::new(&scene, (true, false), false);
+        let single = MAX_LIGHT_GROUPS - 1;
+        assert_eq!(
+            groups.members[single],
+            LightGroupSource::Shared((single..single + 3).map(LightGroupSource::Light).collect())
+        );
+        assert!(can_reuse(&groups, &scene, |s| s.lights[single - 1].intensity = 3.0));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights[single].intensity = 3.0));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights[single + 1].on = false));
+        assert!(!can_reuse(&groups, &scene, |s| s.lights.truncate(s.lights.len() - 1)));
+    }
+}

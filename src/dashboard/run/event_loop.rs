@@ -1,0 +1,311 @@
+//! Event loop of the dashboard. One thread updates the model and draws it. Work that may block runs
+//! in other threads, whose results come back through channels.
+
+use crate::dashboard::run::effects::{EffectRunner, Outcome};
+use crate::dashboard::run::exports::image_upload::ImageUpload;
+use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
+use crate::dashboard::run::input::{self, Input};
+use crate::dashboard::run::job_control::{ResizeDebounce, TerminalIo, stop_group};
+use crate::dashboard::run::latency::LatencyRecorder;
+use crate::dashboard::update::update;
+use crate::dashboard::{Effect, Message, Model, Overlay};
+use crossbeam_channel::{Receiver, after, never, select};
+use std::io;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use zerkalo_render::session::{Snapshot, State};
+use zerkalo_terminal::flow::LinkStatus;
+use zerkalo_terminal::{Event, HUNG_UP, Reply, TimedEvent};
+
+/// Shortest interval between updates of the displayed connection status or upload progress.
+pub const STATUS_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Dashboard on a terminal.
+pub struct Dashboard {
+    pub model: Model,
+    pub effects: EffectRunner,
+    pub done: Receiver<Message>,
+    pub terminal_io: TerminalIo,
+    pub frames: FramePipeline,
+    pub latency: LatencyRecorder,
+    pub began: Instant,
+    /// Generation of the visible picture.
+    pub shown: u64,
+    /// Counter that increases when another picture replaces the present one, but not when more
+    /// samples refine it.
+    pub image_epoch: u64,
+    /// Changes of the terminal's size that have not taken effect yet.
+    pub resizing: ResizeDebounce,
+    /// Time at which the model last received the connection's status or upload progress.
+    pub status_sent_at: Duration,
+    /// `true` if rendering is paused because the terminal does not reply.
+    pub resting: bool,
+    /// `true` if the model has changed since the last frame.
+    pub changed: bool,
+    /// `true` if the program is to be suspended after the present messages.
+    pub suspend: bool,
+    /// `true` if the program is to quit after the present messages.
+    pub quit: bool,
+}
+
+impl Dashboard {
+    /// Runs the event loop. Returns the exit status if a signal or the loss of the terminal ends
+    /// the program, and `None` if the user quits.
+    pub fn event_loop(&mut self) -> io::Result<Option<u8>> {
+        let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
+        let wakeup = self.effects.session.wakeup().clone();
+        let done = self.done.clone();
+        let written = self.frames.writer.written.clone();
+        let silence = never();
+        let mut waiting = Vec::new();
+        // Signals that arrived during the capability query are handled before the first frame.
+        while let Ok(event) = signals.try_recv() {
+            if let Some(status) = self.handle_signal(event) {
+                return Ok(Some(status));
+            }
+        }
+        while !self.quit {
+            let wait = self.draw();
+            // A snapshot is taken only when the terminal can receive another frame.
+            let (wakeup, wants_snapshot) = match self.wants_snapshot() {
+                None => (&silence, None),
+                Some(Duration::ZERO) => (&wakeup, None),
+                wait => (&silence, wait),
+            };
+            let timer = match wait.into_iter().chain(wants_snapshot).min() {
+                Some(wait) => after(wait),
+                None => never(),
+            };
+            select! {
+                recv(input) -> event => match event {
+                    Ok(Ok(event)) => self.enqueue(event, &mut waiting),
+                    // The terminal is gone.
+                    Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
+                },
+                recv(wakeup) -> notified => match notified {
+                    Ok(()) => self.take_snapshot(),
+                    // The renderer's panic has been reported already.
+                    Err(_) => return Err(io::Error::other("the renderer has ended")),
+                },
+                recv(done) -> message => if let Ok(message) = message {
+                    self.dispatch(message);
+                },
+                recv(written) -> frame => {
+                    if let Ok(written) = frame {
+                        self.frames.record_written();
+                        match written {
+                            Ok(at) => self.latency.written(at),
+                            Err(_) => return Ok(Some(HUNG_UP)),
+                        }
+                    }
+                }
+                recv(signals) -> event => {
+                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
+                        return Ok(Some(status));
+                    }
+                }
+                recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(timer) -> _ => self.wake(),
+            }
+            while let Ok(Ok(event)) = input.try_recv() {
+                self.enqueue(event, &mut waiting);
+            }
+            if let Some(status) = self.handle(&mut waiting) {
+                return Ok(Some(status));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Handles user input and the results of effects. Returns the exit status if the program is to
+    /// end.
+    fn handle(&mut self, waiting: &mut Vec<Input>) -> Option<u8> {
+        for Input { at, message } in waiting.drain(..) {
+            self.frames.flow.record_input(self.began.elapsed());
+            let scene = self.dispatch(message);
+            self.latency.event(at, scene);
+        }
+        while let Ok(message) = self.done.try_recv() {
+            self.dispatch(message);
+        }
+        if std::mem::take(&mut self.suspend) { self.suspend(stop_group) } else { None }
+    }
+
+    /// Handles a terminal reply at once, and appends user input to `waiting`.
+    fn enqueue(&mut self, TimedEvent { at, event }: TimedEvent, waiting: &mut Vec<Input>) {
+        let message = match event {
+            Event::Key(key) => Message::Key(key),
+            Event::Mouse(mouse) => Message::Mouse(mouse),
+            Event::Paste(text) => Message::Paste(text),
+            Event::Reply(Reply::Cursor { .. }) => {
+                self.frames.flow.on_ack(at.saturating_duration_since(self.began));
+                return;
+            }
+            Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
+                // A terminal behind a multiplexer may reply only after the capability query has
+                // ended.
+                self.frames.terminal.learn(&reply);
+                return;
+            }
+            Event::Reply(_) => return,
+        };
+        input::join(waiting, Input { at, message });
+    }
+
+    /// Waits for outstanding replies of the terminal, which the shell would read as input
+    /// otherwise.
+    pub fn await_answers(&mut self) {
+        let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
+        while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
+            match self.terminal_io.input.recv_timeout(left) {
+                Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
+                _ => break,
+            }
+            if !self.frames.flow.is_waiting() {
+                break;
+            }
+        }
+    }
+
+    /// Updates the model and executes the effects. Returns the generation of the picture that the
+    /// response to the message needs, if it needs a new one.
+    pub fn dispatch(&mut self, message: Message) -> Option<u64> {
+        let mut awaited = None;
+        let is_snapshot = matches!(message, Message::Snapshot(_));
+        let version = self.model.picture_version;
+        for effect in update(&mut self.model, message, self.began.elapsed()) {
+            let scene = match &effect {
+                Effect::Show(scene) => Some(Arc::clone(scene)),
+                _ => None,
+            };
+            match self.effects.run(effect, &mut self.frames) {
+                Outcome::Done => {}
+                Outcome::Rendering(generation) => {
+                    // A change of lights alone needs none: the snapshot has one picture per light
+                    // group.
+                    let snapshot = self.model.snapshot.as_deref();
+                    let relit =
+                        scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
+                    if !relit {
+                        awaited = Some(generation);
+                    }
+                }
+                Outcome::Suspend => self.suspend = true,
+                Outcome::Quit => self.quit = true,
+            }
+        }
+        if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
+            self.image_epoch += 1;
+        }
+        self.changed = true;
+        awaited
+    }
+
+    fn take_snapshot(&mut self) {
+        if let Some(snapshot) = self.effects.session.take() {
+            let failed = matches!(snapshot.report.state, State::Failed(_));
+            let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
+            if snapshot.picture.is_some() || failed {
+                let old = self.model.snapshot.as_deref().and_then(raster);
+                let is_new_scene = self.shown != snapshot.report.generation;
+                self.image_epoch += u64::from(is_new_scene || old != raster(&snapshot));
+                self.shown = snapshot.report.generation;
+            }
+            self.dispatch(Message::Snapshot(Box::new(snapshot)));
+        }
+    }
+
+    /// Returns the time until a frame with a new picture may be sent. Returns `None` while the last
+    /// frame is being written.
+    fn wants_snapshot(&self) -> Option<Duration> {
+        let now = self.began.elapsed();
+        let flow = &self.frames.flow;
+        let may_send = flow.allowance(now, self.latency.replies(u64::MAX)).is_some();
+        let due = if may_send { now } else { flow.wakes_at(now, true) };
+        self.frames.writing_since.is_none().then(|| due.saturating_sub(now))
+    }
+
+    fn wake(&mut self) {
+        if self.model.next_timeout().is_some_and(|at| at <= self.began.elapsed()) {
+            self.dispatch(Message::Tick);
+        }
+    }
+
+    /// Draws a frame if one is due and the connection has room for it. Returns the time until this
+    /// method must be called again; `None` means not before the next event.
+    fn draw(&mut self) -> Option<Duration> {
+        let now = self.began.elapsed();
+        if let Some(due) = self.resizing.due() {
+            if due > now {
+                return Some(due - now);
+            }
+            self.resize();
+        }
+        self.frames.look(now);
+        let reading = self.frames.flow.reading();
+        let mode = |link: &Option<LinkStatus>| link.as_ref().map(|link| link.mode);
+        let mode_changed = mode(&reading) != mode(&self.model.link);
+        if mode_changed || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
+            self.status_sent_at = now;
+            self.dispatch(Message::LinkStatus(reading));
+        }
+        self.report_upload(now);
+        self.frames.follow(&self.model);
+        let mut due = None;
+        if self.frames.writing_since.is_none() && !self.quit {
+            let answers = self.latency.replies(self.shown);
+            due = self.frames.due(now, self.changed, answers);
+            if due.is_some_and(|at| at <= now) {
+                let drawn =
+                    self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
+                self.latency.line(now, self.frames.diff.pending().visible, self.frames.sent);
+                self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
+                match drawn {
+                    DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
+                    DrawOutcome::Same => {
+                        // The screen already shows the response, so the latency ends now.
+                        self.latency.sent(self.shown);
+                        self.latency.written(Instant::now());
+                    }
+                    // Generations begin at 1; 0 means a frame without picture.
+                    DrawOutcome::Text => self.latency.sent(0),
+                    DrawOutcome::Picture => self.latency.sent(self.shown),
+                }
+                let answers = self.latency.replies(self.shown);
+                due = match self.frames.writing_since {
+                    None => self.frames.due(now, self.changed, answers),
+                    Some(_) => None,
+                };
+            }
+        }
+        let measures_at = self.frames.flow.measures_at(now);
+        let silent_at = self.rest(now);
+        let times = [self.model.next_timeout(), due, measures_at, silent_at];
+        times.into_iter().flatten().min().map(|at| at.saturating_sub(now))
+    }
+
+    /// Reports the progress of an image transfer to the model, at most once per
+    /// [`STATUS_INTERVAL`], and its end at once.
+    fn report_upload(&mut self, now: Duration) {
+        let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
+        let known = match &self.model.overlay {
+            Some(Overlay::ViewerImage(viewed)) => viewed.sent,
+            _ => return,
+        };
+        if sent != known && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
+            self.status_sent_at = now;
+            self.dispatch(Message::ImageSent(sent));
+        }
+    }
+
+    /// Pauses rendering while the terminal does not reply. Returns the time at which rendering will
+    /// be paused unless a reply arrives before.
+    fn rest(&mut self, now: Duration) -> Option<Duration> {
+        let silent_at = self.frames.flow.silent_at(self.frames.writing_since);
+        let is_silent = silent_at.is_some_and(|at| at <= now);
+        if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
+            self.effects.rest(is_silent);
+        }
+        silent_at.filter(|_| !is_silent)
+    }
+}

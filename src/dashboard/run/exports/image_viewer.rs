@@ -1,0 +1,68 @@
+//! Reading and encoding of exported images for the image viewer.
+
+use crate::dashboard::Message;
+use crate::dashboard::run::exports::shrink::shrunk;
+use crate::dashboard::run::frames::FramePipeline;
+use crossbeam_channel::Sender;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+use zerkalo_render::film::Display;
+use zerkalo_render::image_file::{ReadPicture, png_of_rgb, read_exr, read_png};
+use zerkalo_terminal::cells::Raster;
+use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
+use zerkalo_terminal::{Capabilities, cell_px};
+
+/// Longest time in which an image may be sent. For slow connections the image is downscaled.
+const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
+
+/// Returns the viewport of the image viewer on a screen of these columns and rows.
+pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
+    let terminal = &frames.terminal;
+    // The user may have changed the size of cells since the start.
+    let cell_px = cell_px().or(terminal.cell_px);
+    let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
+    // A local terminal has no limit.
+    let rate = frames.flow.reading().map(|link| link.rate);
+    let max_bytes = rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
+    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
+}
+
+/// Reads and encodes the image at `path` in a separate thread, which sends a
+/// [`Message::ViewerImage`] to `results`.
+pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
+    let (requested, failed) = (path.clone(), results.clone());
+    let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
+        let image = viewer_image(&path, &display, &viewport).map(Arc::new);
+        // Sending fails only at the end of the program, when the receiver is gone.
+        let _ = results.send(Message::ViewerImage(path, image));
+    });
+    if let Err(error) = started {
+        let _ = failed.send(Message::ViewerImage(requested, Err(error.to_string())));
+    }
+}
+
+/// Reads, scales and encodes the image at `path`. `display` converts the linear light of an EXR
+/// file.
+fn viewer_image(
+    path: &Path,
+    display: &Display,
+    viewport: &ImageViewport,
+) -> Result<ViewerImage, String> {
+    let image = if path.extension().is_some_and(|e| e == "exr") {
+        let ReadPicture { size: [width, height], pixels, .. } = read_exr(path)?;
+        Raster { width, height, pixels: pixels.into_iter().map(display.to_8()).collect() }
+    } else {
+        let image = read_png(path)?;
+        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        Raster { width, height, pixels: image.as_raw().as_chunks::<3>().0.to_vec() }
+    };
+    let layout = viewport.layout([image.width, image.height])?;
+    let shown = shrunk(&image, layout.shown);
+    let halves = shrunk(&shown, layout.halves);
+    ViewerImage::encode(viewport, layout, &shown, halves, |image| {
+        let size = layout.shown.map(|n| n as u32);
+        png_of_rgb(size, image.pixels.as_flattened()).map_err(|error| error.to_string())
+    })
+}

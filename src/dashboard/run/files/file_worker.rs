@@ -1,0 +1,134 @@
+//! Thread that reads and writes the scene file and checks it for changes by other programs.
+
+use crate::dashboard::Message;
+use crate::dashboard::run::files::{AutosaveJob, SharedFile};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use zerkalo_scene::disk::FileStamp;
+use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
+
+/// Interval between checks for changes by other programs.
+pub const CHECK_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest time that a save waits for the update of the recovery file.
+const PREPARED_WITHIN: Duration = Duration::from_secs(2);
+
+pub enum Job {
+    Save {
+        scene: Arc<Scene>,
+        path: Option<PathBuf>,
+        overwrite: bool,
+        /// Receiver that is disconnected as soon as the recovery file is up to date.
+        prepared: Receiver<()>,
+    },
+    /// Read the scene file.
+    Load,
+    /// Continue with this text, recovered for an unreadable scene file.
+    Adopt(Box<SceneFile>),
+    End,
+}
+
+pub struct FileWorker {
+    pub path: Option<PathBuf>,
+    /// Scene file as last read or written; `None` if it has never been readable.
+    pub file: Option<SceneFile>,
+    /// Stamp of the scene file when it was last read, written or checked.
+    pub seen: Option<FileStamp>,
+    /// State folder of the user (XDG).
+    pub state: Option<PathBuf>,
+    pub autosaves: Sender<AutosaveJob>,
+    pub shared: SharedFile,
+    pub results: Sender<Message>,
+}
+
+impl FileWorker {
+    pub fn run(mut self, inbox: &Receiver<Job>) {
+        let mut checked = Instant::now();
+        loop {
+            let next_check = checked + CHECK_INTERVAL;
+            match inbox.recv_deadline(next_check) {
+                Ok(Job::Save { scene, path, overwrite, prepared }) => {
+                    let _ = prepared.recv_timeout(PREPARED_WITHIN);
+                    let saved = self.save(&scene, path, overwrite);
+                    self.send(Message::Saved(scene, saved));
+                }
+                Ok(Job::Load) => {
+                    let loaded = self.load();
+                    self.send(Message::Loaded(Box::new(loaded)));
+                }
+                Ok(Job::Adopt(file)) => self.file = Some(*file),
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(Job::End) | Err(RecvTimeoutError::Disconnected) => break,
+            }
+            let now = Instant::now();
+            if next_check <= now {
+                checked = now;
+                if self.changed() {
+                    self.send(Message::ChangedOnDisk);
+                }
+            }
+        }
+    }
+
+    fn send(&self, message: Message) {
+        // Sending fails only at the end of the program, when the receiver is gone.
+        let _ = self.results.send(message);
+    }
+
+    /// Returns `true` if another program has changed the scene file since the last read, write or
+    /// check.
+    fn changed(&mut self) -> bool {
+        let Some(path) = &self.path else { return false };
+        let now = FileStamp::of(path);
+        if self.seen == now {
+            return false;
+        }
+        self.seen = now;
+        match &self.file {
+            Some(file) => file.on_disk() == DiskState::Changed,
+            None => now.is_some(),
+        }
+    }
+
+    fn save(
+        &mut self,
+        scene: &Arc<Scene>,
+        path: Option<PathBuf>,
+        overwrite: bool,
+    ) -> Result<PathBuf, SaveError> {
+        let Some(file) = &mut self.file else {
+            let what = "its contents are not a scene".to_string();
+            return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
+        };
+        match path {
+            Some(path) => file.save_as(&path, scene, overwrite)?,
+            None => file.save(scene, overwrite)?,
+        }
+        let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
+        self.seen = FileStamp::of(&path);
+        let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
+        self.shared.set_elsewhere(recovery.elsewhere());
+        self.shared.put(file);
+        let _ = self.autosaves.send(AutosaveJob::Saved(Arc::clone(scene), path.clone()));
+        self.path = Some(path.clone());
+        Ok(path)
+    }
+
+    fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
+        // The stamp is older than the text, so that a write during the read counts as a change.
+        self.seen = self.path.as_deref().and_then(FileStamp::of);
+        let file = match (self.file.take(), &self.path) {
+            (Some(file), _) => {
+                let file = self.file.insert(file);
+                file.reload()?;
+                file
+            }
+            (None, Some(path)) => self.file.insert(SceneFile::open(path)?),
+            (None, None) => return Ok(Arc::default()),
+        };
+        let scene = Arc::new(file.document().scene().clone());
+        self.shared.put(file);
+        Ok(scene)
+    }
+}
