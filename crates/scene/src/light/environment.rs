@@ -134,11 +134,11 @@ impl EnvironmentLight {
         let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
         let mut density = [1.0; MAX_WIDTH];
         for_each(lanes, |lane| {
-            let (direction, p) = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
-            let [x, y, z] = direction;
+            let sample = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
+            let [x, y, z] = sample.direction;
             wi[lane] = [x * cos + z * sin, y, z * cos - x * sin];
-            irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
-            density[lane] = p;
+            irradiance[lane] = self.map.radiance(sample.direction).map(|l| l / sample.density);
+            density[lane] = sample.density;
         });
         LightSample {
             wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
