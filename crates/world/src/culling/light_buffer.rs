@@ -3,6 +3,7 @@
 //! Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
 
 use crate::culling::light_projection::{LightProjection, ProjectedBounds};
+use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, next_distinct};
 use zerkalo_kernel::primitive::{
@@ -78,17 +79,15 @@ impl<S: Float> LightBuffer<S> {
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
-            LightTarget::Point(light) => light.abs().max_element(),
-            LightTarget::Direction(_) => 0.0,
+            LightTarget::Point(light) => *light,
+            LightTarget::Direction(_) => DVec3::ZERO,
         };
-        let max_coordinate = occluders.iter().map(|s| farthest(&s.ball)).fold(light, f64::max);
+        let coordinates = occluders.iter().map(|s| farthest(&s.ball));
+        let max_coordinate = coordinates.fold(light.abs().max_element(), f64::max);
         // Bounding spheres relative to the light, with a margin for rounding errors of rays.
-        let relative_to_light = |s: &Occluder| {
-            let center = match target {
-                LightTarget::Point(light) => s.ball.center - light,
-                LightTarget::Direction(_) => s.ball.center,
-            };
-            BoundingSphere { center, radius: s.ball.radius + F32_RAY_ERROR * max_coordinate }
+        let relative_to_light = |s: &Occluder| BoundingSphere {
+            center: s.ball.center - light,
+            radius: s.ball.radius + F32_RAY_ERROR * max_coordinate,
         };
         let balls: Vec<BoundingSphere> = occluders.iter().map(relative_to_light).collect();
         let near_depth = |ball: &BoundingSphere| match target {
@@ -219,7 +218,6 @@ impl<S: Float> LightBuffer<S> {
 mod tests {
     use super::*;
     use crate::culling::light_projection::tests::Random;
-    use glam::DVec3;
     use zerkalo_kernel::lanes::{Double, Single, Vec3};
     use zerkalo_kernel::primitive::{Form, SphereForm};
 
