@@ -11,12 +11,10 @@ pub enum LightForm<'a> {
         /// `None` for light in all directions.
         cone: Option<&'a Spot>,
     },
-    /// Light from infinitely far away.
+    /// Light from one direction, infinitely far away.
     Distant {
         /// Unit vector towards the light.
         wi: DVec3,
-        /// Angular radius of the light \[radians\]; 0 for parallel rays.
-        radius: f64,
     },
     /// Light from a surface without a body: rays pass through it, and it casts no shadow.
     Surface(EmissiveSurface),
@@ -28,8 +26,7 @@ impl LightForm<'_> {
     pub fn is_visible(&self) -> bool {
         match self {
             Self::Surface(_) | Self::Environment(_) => true,
-            Self::Distant { radius, .. } => *radius > 0.0,
-            Self::Point { .. } => false,
+            Self::Point { .. } | Self::Distant { .. } => false,
         }
     }
 }
