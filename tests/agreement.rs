@@ -35,7 +35,7 @@ fn samples_of(name: &str) -> u32 {
 const GALLERY: &str = "mirror-room.toml gallery-triptych.toml gallery-metals.toml gallery-glass.toml \
      rough-glass.toml absorbing-glass.toml texture-checker.toml texture-image.toml \
      texture-mapping.toml texture-uv.toml bump.toml depth-of-field.toml sphere-light.toml \
-     rectangle-light.toml disk-light.toml environment.toml emissive-objects.toml \
+     rectangle-light.toml disk-light.toml sun.toml environment.toml emissive-objects.toml \
      many-lights.toml";
 
 #[test]

@@ -93,6 +93,26 @@ fn d8_disk_light() {
 }
 
 #[test]
+fn d12_sun() {
+    fn sun(scene: &mut Scene) -> &mut Directional {
+        match &mut lamp(scene).kind {
+            LightKind::Directional(sun) => sun,
+            kind => panic!("a {} light is no sun", kind.key()),
+        }
+    }
+    alike(
+        "sun.toml",
+        &[
+            ("parallel rays", &|s| sun(s).angle = 0.0),
+            ("half the angle", &|s| sun(s).angle *= 0.5),
+            ("another direction", &|s| sun(s).direction[0] = 0.7),
+            ("invisible", &|s| lamp(s).visible = false),
+            ("half the intensity", &|s| lamp(s).intensity *= 0.5),
+        ],
+    );
+}
+
+#[test]
 fn d9_environment() {
     fn sky(scene: &mut Scene) -> &mut Environment {
         lamp(scene).environment_mut().unwrap()

@@ -8,9 +8,26 @@ use zerkalo_scene::light::LightUnit;
 
 /// Lamp: a light with a size.
 pub enum Lamp {
-    Sphere { center: DVec3, radius: f64 },
-    Rectangle { center: DVec3, across: DVec3, up: DVec3, normal: DVec3 },
-    Disk { center: DVec3, radius: f64, normal: DVec3 },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+    },
+    Rectangle {
+        center: DVec3,
+        across: DVec3,
+        up: DVec3,
+        normal: DVec3,
+    },
+    Disk {
+        center: DVec3,
+        radius: f64,
+        normal: DVec3,
+    },
+    /// Directional light with the angular radius `radius`.
+    Sun {
+        towards: DVec3,
+        radius: f64,
+    },
 }
 
 /// Light that arrives from a point of a lamp: direction to the point, distance, and irradiance on a
@@ -42,6 +59,10 @@ impl Lamp {
                 let normal = DVec3::from(disk.normal).normalize();
                 Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
             }
+            LightKind::Directional(sun) if sun.angle > 0.0 => Some(Self::Sun {
+                towards: -DVec3::from(sun.direction).normalize(),
+                radius: 0.5 * sun.angle.to_radians(),
+            }),
             LightKind::Point(_)
             | LightKind::Directional(_)
             | LightKind::Spot(_)
@@ -54,11 +75,16 @@ impl Lamp {
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
             Self::Rectangle { across, up, .. } => across.length() * up.length(),
             Self::Disk { radius, .. } => PI * radius * radius,
+            Self::Sun { .. } => f64::INFINITY,
         }
     }
 
     /// Returns the radiance of a white lamp of intensity 1, if intensities are in the unit `unit`.
     pub fn radiance(&self, unit: LightUnit) -> f64 {
+        if let Self::Sun { radius, .. } = self {
+            // The irradiance of a surface that faces the sun is pi.
+            return 1.0 / radius.sin().powi(2);
+        }
         match unit {
             LightUnit::Radiance => 1.0,
             LightUnit::Power => 1.0 / (PI * self.area()),
@@ -88,6 +114,9 @@ impl Lamp {
                 let (t, place) = plane(*center, *normal)?;
                 (place.length() <= *radius).then_some(t)
             }
+            Self::Sun { towards, radius } => {
+                (direction.dot(*towards) >= radius.cos()).then_some(f64::MAX)
+            }
         }
     }
 
@@ -101,6 +130,15 @@ impl Lamp {
         numbers: &mut Numbers,
     ) -> Option<Arrival> {
         let (point, normal) = match self {
+            Self::Sun { towards, radius } => {
+                // The height of a uniform point of a spherical cap is uniform.
+                let z = numbers.between(radius.cos(), 1.0);
+                let (sin, cos) = numbers.between(0.0, 2.0 * PI).sin_cos();
+                let (across, up) = towards.any_orthonormal_pair();
+                let aside = (across * cos + up * sin) * (1.0 - z * z).sqrt();
+                let solid_angle = 2.0 * PI * (1.0 - radius.cos());
+                return Some((*towards * z + aside, f64::INFINITY, solid_angle));
+            }
             Self::Sphere { center, radius } => {
                 let normal = numbers.direction();
                 // A sphere lamp also emits inwards: from inside, every point of it is visible.

@@ -33,7 +33,10 @@ impl Light {
                 inverse_square: self.falloff == Falloff::InverseSquare,
                 cone: cone.map(SpotCone::new),
             }),
-            LightForm::Distant { wi } => {
+            LightForm::Distant { wi, radius } if radius > 0.0 => {
+                CompiledLight::Emitter(Emitter::distant_disk(wi, radius))
+            }
+            LightForm::Distant { wi, .. } => {
                 CompiledLight::Delta(DeltaLight::Directional { wi: vector(wi) })
             }
             LightForm::Surface(surface) => {

@@ -9,9 +9,16 @@ use crate::light::solid_angle::{Cone, SphericalRectangle, density_of_area};
 use crate::light::triangles::{FacesSeen, MAX_FACES, Triangle};
 use crate::light::{EmissiveSurface, LightSample, LightUnit};
 use glam::DVec3;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use zerkalo_kernel::lanes::{Float, Frame, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
+
+/// Radius of a sphere around all points of every scene.
+const EVERYWHERE: f64 = 1e30;
+
+/// Distance of a distant disk, as a fraction of the largest finite number, which is the distance of
+/// rays that hit nothing.
+const DISTANT: f64 = 0.5;
 
 /// Surface that emits light of intensity 1, white and the same at every point and in every
 /// direction.
@@ -48,6 +55,12 @@ enum Surface<S> {
         triangles: Vec<Triangle<S>>,
         /// `true` if the triangles enclose a convex solid; no triangle then occludes another.
         convex: bool,
+    },
+    /// Disk at an infinite distance: a cone of directions.
+    DistantDisk {
+        axis: [S; 3],
+        /// 1 - cos(angular radius).
+        one_minus_cos: S,
     },
     /// More than [`MAX_FACES`] triangles, chosen in proportion to their areas.
     Mesh(Vec<Triangle<S>>),
@@ -164,6 +177,25 @@ impl<S: Float> Emitter<S> {
         })
     }
 
+    /// Creates a disk at an infinite distance around the direction `wi`, with the angular radius
+    /// `angle`. The irradiance on a surface that faces it is pi.
+    pub fn distant_disk(wi: DVec3, angle: f64) -> Self {
+        let one_minus_cos = S::from_f64(2.0 * (0.5 * angle).sin().powi(2));
+        let axis = wi.to_array().map(S::from_f64);
+        Self {
+            surface: Surface::DistantDisk { axis, one_minus_cos },
+            sides: Sides { lift: S::default(), both: false },
+            radiance: S::from_f64(angle.sin().powi(-2)),
+            center: DVec3::ZERO,
+            radius: EVERYWHERE,
+            area: f64::INFINITY,
+        }
+    }
+
+    pub fn is_distant(&self) -> bool {
+        self.area == f64::INFINITY
+    }
+
     /// Returns the distance at which each ray hits the front of a surface without a body; the
     /// largest finite number for rays that miss it. `direction` must be of unit length. Triangles
     /// have bodies, which are parts of the geometry: rays miss them here.
@@ -200,6 +232,11 @@ impl<S: Float> Emitter<S> {
                 let inside = (x * x + y * y).le(radius * radius) & t.ge(L::zero());
                 L::select(inside, t, missed)
             }
+            Surface::DistantDisk { axis, one_minus_cos } => {
+                let inside =
+                    warp::cone_pdf(Vec3::splat(*axis), direction, L::splat(*one_minus_cos));
+                L::select(inside.gt(L::zero()), L::from_f64(DISTANT * L::MAX), missed)
+            }
             Surface::Faces { .. } | Surface::Mesh(_) => missed,
         }
     }
@@ -207,7 +244,7 @@ impl<S: Float> Emitter<S> {
     /// Samples a point of the surface for each of the receivers at `origin`. `u` and `v` are uniform
     /// in [0, 1).
     ///
-    /// A sphere is sampled by the cone that it subtends, a rectangle by solid
+    /// A sphere or distant disk is sampled by the cone that it subtends, a rectangle by solid
     /// angle, a disk by area. Of at most 32 triangles, one is chosen in proportion to its solid
     /// angle, of more in proportion to its area. The chosen triangle is sampled by solid angle.
     /// Rectangles and triangles whose solid angle is too small for this are sampled by area.
@@ -239,6 +276,13 @@ impl<S: Float> Emitter<S> {
                 let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
                 let (wi, distance) = towards(axes, [x, y, local[2]]);
                 let density = density_of_area(L::from_f64(self.area), distance, local[2]);
+                PointSample { wi, distance, density, pdf: density }
+            }
+            Surface::DistantDisk { axis, one_minus_cos } => {
+                let local = warp::cone(u, v, L::splat(*one_minus_cos));
+                let wi = Frame::around(Vec3::splat(*axis)).to_world(local).renormalize();
+                let distance = L::from_f64(DISTANT * L::MAX);
+                let density = density_of_cone(L::splat(*one_minus_cos));
                 PointSample { wi, distance, density, pdf: density }
             }
             Surface::Faces { triangles, convex } => {
@@ -306,6 +350,7 @@ impl<S: Float> Emitter<S> {
                 let [_, _, height] = local_of(axes, Vec3::splat(*center) - origin);
                 density_of_area(L::from_f64(self.area), distance, height)
             }
+            Surface::DistantDisk { one_minus_cos, .. } => density_of_cone(L::splat(*one_minus_cos)),
             Surface::Faces { triangles, convex } => {
                 FacesSeen::new(triangles, *convex, &self.sides, origin).density()
             }
@@ -343,6 +388,13 @@ impl<S: Float> Surface<S> {
             }
         }
     }
+}
+
+/// Returns the density \[1/sr\] of uniform directions in a cone with the half-angle theta, where
+/// `one_minus_cos` is 1 - cos(theta).
+#[inline(always)]
+fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
+    L::one() / (one_minus_cos * L::from_f64(TAU))
 }
 
 #[inline(always)]

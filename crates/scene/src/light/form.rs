@@ -11,10 +11,12 @@ pub enum LightForm<'a> {
         /// `None` for light in all directions.
         cone: Option<&'a Spot>,
     },
-    /// Light from one direction, infinitely far away.
+    /// Light from infinitely far away.
     Distant {
         /// Unit vector towards the light.
         wi: DVec3,
+        /// Angular radius of the light \[radians\]; 0 for parallel rays.
+        radius: f64,
     },
     /// Light from a surface without a body: rays pass through it, and it casts no shadow.
     Surface(EmissiveSurface),
@@ -26,7 +28,8 @@ impl LightForm<'_> {
     pub fn is_visible(&self) -> bool {
         match self {
             Self::Surface(_) | Self::Environment(_) => true,
-            Self::Point { .. } | Self::Distant { .. } => false,
+            Self::Distant { radius, .. } => *radius > 0.0,
+            Self::Point { .. } => false,
         }
     }
 }

@@ -302,8 +302,30 @@ impl<'a> SceneDistances<'a> {
     }
 
     fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
+        if emitter.is_distant() {
+            return self.distant_disk(emitter.radiance.to_f64(), visible);
+        }
         let ball = (emitter.center, emitter.radius);
         self.emitting_surface(ball, emitter.area, emitter.radiance.to_f64(), visible)
+    }
+
+    /// Returns the range of the radiance that a disk at an infinite distance causes, of which surfaces
+    /// have the irradiance pi. `emitted` is its own radiance, seen if it is `visible`.
+    fn distant_disk(&self, emitted: f64, visible: bool) -> RadianceRange {
+        let Response { least, most, peak } = self.response();
+        let range = self.range_of(1.0, (least, most, peak));
+        if !visible {
+            return range;
+        }
+        // The angular radius, of whose sine `emitted` is the inverse square, is compared with a
+        // quarter of a pixel.
+        let is_wide = emitted.sqrt().recip() > 0.25 * self.eye.1;
+        RadianceRange {
+            brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },
+            spots: range.spots.max(emitted),
+            extreme: range.extreme.max(emitted * self.gain),
+            ..range
+        }
     }
 
     /// Returns the range for object `index` of radiance 1. The area of the object's bounding sphere
