@@ -159,7 +159,7 @@ pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
 
-/// Returns `scene` with its camera turned to `point` and with a vertical view angle of `degrees`.
+/// Returns `scene` with its camera directed at `point` and with a vertical view angle of `degrees`.
 /// If the camera has a focus point, the plane in focus still contains the focus point.
 pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     let mut scene = scene.clone();
