@@ -163,7 +163,7 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
 
     /// Returns the limits of indirect diffuse light: the largest number of bounces, and whether
     /// caustics are included. Returns `None` if the scene switches indirect diffuse light off, or
-    /// if no material is matt.
+    /// if no material is diffuse.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];

@@ -2,7 +2,7 @@
 //! number of integer steps per unit of radiance in the film.
 //!
 //! A pixel's sum has 63 bits, a sample at most 49 bits (`SimdFloat::fixed_sum`). Each sample is
-//! rounded to whole steps. If all samples of a pixel are equal, as on a matt surface, their mean
+//! rounded to whole steps. If all samples of a pixel are equal, as on a diffuse surface, their mean
 //! has an error of up to half a step, which more samples do not reduce. The size of a step
 //! therefore has two bounds:
 //!

@@ -95,7 +95,7 @@ struct Reach {
 
 impl Reach {
     /// Computes the throughput factors of mirrors and glass. If `diffuse` is `true`, they include
-    /// the diffuse albedo of matt surfaces.
+    /// the diffuse albedo of diffuse surfaces.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
