@@ -358,7 +358,7 @@ fn variances_agree_under_independent_random_numbers() {
 
 #[test]
 fn one_sided_transparent_objects_reflect_on_their_front_only() {
-    for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {
+    for law in ["constant", "schlick\"\nf0 = \"#806040", "dielectric"] {
         for side in [1.0, -1.0] {
             let text = format!(
                 "camera = {{ eye = [0.5, 0.75, {}], target = [0.0, 0.0, 0.0] }}

@@ -11,7 +11,8 @@ use crate::harness::*;
 const FIRST_WORDS: &str = "What Who Whose Whom Of How Whether Where When Which";
 
 /// Words and phrases that no text may contain.
-const AVOIDED: &str = "told|tell|tells|thing|things|somebody|nobody|anybody|matt|is no mesh|in the mean";
+const AVOIDED: &str =
+    "told|tell|tells|thing|things|somebody|nobody|anybody|matt|is no mesh|in the mean";
 
 /// Returns every file under `folder` that contains prose.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -65,7 +66,8 @@ fn faults(text: &str, is_rust: bool) -> Vec<(usize, String)> {
         // An empty line of a doc comment ends a paragraph, not the comment.
         in_doc = is_doc;
         let words = words(text);
-        for avoided in AVOIDED.split('|').filter(|avoided| words.contains(&format!(" {avoided} "))) {
+        for avoided in AVOIDED.split('|').filter(|avoided| words.contains(&format!(" {avoided} ")))
+        {
             found.push((number + 1, format!("has `{avoided}`")));
         }
     }
