@@ -352,6 +352,25 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
+/// Returns a sphere around the lens if all camera rays start there. With a near plane, they start on
+/// the plane and thus possibly inside a primitive.
+fn lens_of(scene: &Scene, camera: &PerspectiveCamera) -> Option<BoundingSphere> {
+    let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
+    (scene.camera.near == 0.0).then_some(lens)
+}
+
+/// Returns the structure that finds the hits of rays with `forms`.
+fn structure_of(scene: &Scene, forms: &[Form]) -> AccelerationStructure {
+    match scene.trace.acceleration {
+        Acceleration::Auto => AccelerationStructure::fastest(forms),
+        Acceleration::None => AccelerationStructure::List("bare list"),
+        Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
+        Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
+        Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
+        Acceleration::Bvh => AccelerationStructure::Bvh,
+    }
+}
+
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
 fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
@@ -384,14 +403,7 @@ impl<L: SimdFloat> World<L> {
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye());
         let recentered = moved.as_ref().unwrap_or(recentered);
-        let structure = match scene.trace.acceleration {
-            Acceleration::Auto => AccelerationStructure::fastest(&recentered.forms),
-            Acceleration::None => AccelerationStructure::List("bare list"),
-            Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
-            Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
-            Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
-            Acceleration::Bvh => AccelerationStructure::Bvh,
-        };
+        let structure = structure_of(scene, &recentered.forms);
         let geometry = Aggregate::with_structure(&recentered.forms, structure);
         let primitives = geometry.sources();
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
@@ -399,22 +411,13 @@ impl<L: SimdFloat> World<L> {
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
         let lights =
             CompiledLights::new(scene, recentered, &materials, primitives, &camera, merge_lights);
-        let nested_dielectrics = NestedDielectrics::new(
-            recentered,
-            primitives,
-            &bsdf_of,
-            &materials.bsdfs,
-            start_region(scene, &camera),
-        );
-        let entered = nested_dielectrics
-            .as_ref()
-            .map_or(vec![false; bsdf_of.len()], NestedDielectrics::entered);
-        // Without a near plane, camera rays start on the lens. With one, they start on the plane
-        // and thus possibly inside of a primitive; `start` is `None` then.
-        let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
-        let start = (scene.camera.near == 0.0).then_some(lens);
+        let start = start_region(scene, &camera);
+        let nested_dielectrics =
+            NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, start);
+        let entered = nested_dielectrics.as_ref().map(NestedDielectrics::entered);
+        let entered = entered.unwrap_or_else(|| vec![false; bsdf_of.len()]);
         let forms = primitives.iter().map(|id| &recentered.forms[id.form]);
-        let outside_only = outside_only(forms, start, &entered);
+        let outside_only = outside_only(forms, lens_of(scene, &camera), &entered);
         let culling =
             CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
         let smooth =
@@ -422,7 +425,6 @@ impl<L: SimdFloat> World<L> {
         let colored =
             geometry.is_colored() || textures.as_ref().is_some_and(SurfaceTextures::is_colored);
         let has_background = scene.background.color.0 != [0.0; 3];
-        let background = lights.groups.find(&LightGroupSource::Background);
         let mut world = Self {
             smooth,
             colored,
@@ -439,7 +441,10 @@ impl<L: SimdFloat> World<L> {
             bsdf_of,
             bsdfs: materials.bsdfs,
             ambient: lights.groups.find(&LightGroupSource::Ambient),
-            background: background.filter(|_| has_background),
+            background: lights
+                .groups
+                .find(&LightGroupSource::Background)
+                .filter(|_| has_background),
             group_names: lights.groups.names(scene),
             groups: lights.groups,
             scales: lights.scales,

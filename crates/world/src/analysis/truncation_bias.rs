@@ -214,26 +214,15 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
     }
     if bounces == 0 {
-        let default = Material::default();
-        let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
-        let is_found_by_rays_alone = |object: &Object| {
-            object.materials().into_iter().any(|name| material(name).emits())
-                && !is_sampled(&object.form())
-        };
-        let albedo = |object: &Object| {
-            let albedo = |name| max_diffuse_albedo(material(name), object);
-            object.materials().into_iter().map(albedo).fold(0.0, f64::max)
-        };
-        let matt = scene.objects.iter().map(albedo).fold(0.0, f64::max);
-        if matt > 0.0 && scene.objects.iter().any(is_found_by_rays_alone) {
-            out.push(format!(
+        let albedo = albedo_under_unsampled_emission(scene);
+        out.extend(albedo.map(|albedo| {
+            format!(
                 "max_diffuse_depth 0 leaves out the light of emissive objects without sampled \
                  points on matt surfaces ({})",
-                bound(matt * specular.from(0))
-            ));
-        }
-    }
-    if bounces > 0 {
+                bound(albedo * specular.from(0))
+            )
+        }));
+    } else {
         let cut = reach.from(bounces + 1);
         if cut > 0.0 && reach.first > specular.first {
             out.push(format!(
@@ -249,6 +238,23 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         }
     }
     out
+}
+
+/// Returns the largest diffuse albedo of a scene in which the emission of some object is found only
+/// by rays that hit it; `None` in other scenes, and if the albedo is 0.
+fn albedo_under_unsampled_emission(scene: &Scene) -> Option<f64> {
+    let default = Material::default();
+    let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
+    let is_found_by_rays_alone = |object: &Object| {
+        object.materials().into_iter().any(|name| material(name).emits())
+            && !is_sampled(&object.form())
+    };
+    let albedo = |object: &Object| {
+        let albedo = |name| max_diffuse_albedo(material(name), object);
+        object.materials().into_iter().map(albedo).fold(0.0, f64::max)
+    };
+    let largest = scene.objects.iter().map(albedo).fold(0.0, f64::max);
+    (largest > 0.0 && scene.objects.iter().any(is_found_by_rays_alone)).then_some(largest)
 }
 
 /// Formats `x` with three significant digits, rounded up.
