@@ -136,6 +136,33 @@ impl fmt::Display for MeasureReport<'_> {
             writeln!(f, "{warning}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
+        self.times(f, default)?;
+        let mut last = Experiment::Default;
+        for measured in &m.measured[1..] {
+            if measured.experiment != last {
+                last = measured.experiment;
+                self.heading(f, last)?;
+                self.row(f, &last.default_name(self.single, self.threads), default)?;
+            }
+            self.row(f, &measured.name, measured)?;
+        }
+        for experiment in &m.idle {
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
+        }
+        if m.measured.iter().any(|m| m.bias.is_some()) {
+            writeln!(
+                f,
+                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
+                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl MeasureReport<'_> {
+    fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
+        let m = self.measurement;
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
         for target in &m.targets {
@@ -166,30 +193,9 @@ impl fmt::Display for MeasureReport<'_> {
         if !m.expected.is_empty() {
             writeln!(f, "  ~ extrapolated from the convergence so far")?;
         }
-        let mut last = Experiment::Default;
-        for measured in &m.measured[1..] {
-            if measured.experiment != last {
-                last = measured.experiment;
-                self.heading(f, last)?;
-                self.row(f, &last.default_name(self.single, self.threads), default)?;
-            }
-            self.row(f, &measured.name, measured)?;
-        }
-        for experiment in &m.idle {
-            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
-        }
-        if m.measured.iter().any(|m| m.bias.is_some()) {
-            writeln!(
-                f,
-                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
-                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
-            )?;
-        }
         Ok(())
     }
-}
 
-impl MeasureReport<'_> {
     fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
         writeln!(
             f,
