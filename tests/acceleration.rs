@@ -1,18 +1,7 @@
-//! Acceleration structures: every choice renders the same image, bit for bit.
+//! Acceleration structures: every choice renders the same image, bit for bit. `random_scenes` has
+//! further scenes.
 
-use crate::common;
-use crate::support;
-use zerkalo_render::film::testing::TestFilm;
-
-use common::Numbers;
-use glam::{DAffine3, DQuat, DVec3};
-use std::fmt::Write;
-use std::fs;
-use std::path::Path;
-use support::{accelerated, all_shipped, parsed, sized};
-use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
-use zerkalo_scene::{Acceleration, Scene};
-use zerkalo_world::{AnyWorld, Options, Precision};
+use crate::harness::*;
 
 /// Picture size in pixels. Neither side is a multiple of a tile's side.
 const SIZE: [u32; 2] = [37, 35];
@@ -28,73 +17,8 @@ fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
 #[test]
 fn shipped_scenes_are_equal_under_every_acceleration() {
     for (name, scene) in all_shipped() {
-        same(&name, &sized(scene, SIZE), Precision::Single, 5);
-    }
-}
-
-#[test]
-fn shipped_scenes_are_equal_under_every_acceleration_in_double_precision() {
-    for (name, scene) in all_shipped() {
+        same(&name, &sized(scene.clone(), SIZE), Precision::Single, 5);
         same(&name, &sized(scene, [24, 18]), Precision::Double, 5);
-    }
-}
-
-/// Returns a scene with objects of every shape that allows transforms. The objects have all sizes
-/// and are rotated and stretched. They are around and behind the camera, which may be inside of one
-/// of them.
-fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
-    let shapes = [
-        "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
-        "cube = { corner = [-0.5, -0.5, 0.5], edge = 1.0 }",
-        "cylinder = { base = [0.0, -0.5, 0.0], top = [0.0, 0.5, 0.0], radius = 0.3 }",
-        "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
-        "rectangle = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0], normal = [0.0, 0.0, 1.0] }",
-        "torus = { center = [0.0, 0.0, 0.0], axis = [0.0, 1.0, 0.2], ring = 0.4, tube = 0.1 }",
-        "mesh = { file = \"\" }",
-    ];
-    let far = if numbers.below(3) == 0 { 1e4 } else { 0.0 };
-    let [x, y, z] = (numbers.in_cube(3.0) + far).to_array();
-    let [a, b, c] = numbers.direction().to_array();
-    let near = if numbers.below(2) == 0 { 0.0 } else { 0.3 };
-    let angle = numbers.between(5.0, 140.0);
-    let mut text = format!(
-        "camera = {{ eye = [{x}, {y}, {z}], direction = [{a}, {b}, {c}], near = {near}, \
-         view_angle.vertical = {angle} }}\n\
-         light = [{{ name = \"a\", point = {{ position = [{}, {}, {}] }}, intensity = 30.0 }}, \
-         {{ name = \"b\", directional = {{ direction = [0.3, -1.0, 0.2] }}, intensity = 1.0 }}]\n\
-         [materials.matte]\ncolor = [0.7, 0.5, 0.3]\n\
-         [materials.mirror]\ndiffuse = 0.2\nreflection = 0.7\nroughness = 0.1\n\
-         [materials.glass]\ndiffuse = 0.1\ntransmission = 0.6\n",
-        far + 1.0,
-        far + 4.0,
-        far
-    );
-    for i in 0..count {
-        let material = ["matte", "mirror", "glass"][numbers.below(3)];
-        let shape = shapes[numbers.below(shapes.len())];
-        let mut size = || 10f64.powf(numbers.between(-1.5, 0.5));
-        let [sx, sy, sz] = if i % 2 == 0 { [size(), size(), size()] } else { [size(); 3] };
-        let [x, y, z] = (numbers.in_cube(5.0) + far).to_array();
-        let (rotation, tilt) = (numbers.between(0.0, 360.0), numbers.between(0.0, 360.0));
-        write!(
-            text,
-            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\ntransform = [\
-             {{ scale = [{sx}, {sy}, {sz}] }}, {{ rotate_x = {tilt} }}, {{ rotate_y = {rotation} }}, \
-             {{ translate = [{x}, {y}, {z}] }}]\n"
-        )
-        .unwrap();
-    }
-    parsed(&text)
-}
-
-#[test]
-fn random_scenes_are_equal_under_every_acceleration() {
-    for seed in 0..24 {
-        let mut numbers = Numbers::new(seed);
-        let count = [1, 3, 40, 130, 300][numbers.below(5)];
-        let scene = sized(crowd(&mut numbers, count), [41, 29]);
-        let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
-        same(&format!("seed {seed}, {count} objects"), &scene, precision, 3);
     }
 }
 
@@ -113,88 +37,6 @@ fn silhouette_edges_are_equal_under_every_acceleration() {
          [[object]]\nshape.sphere = { center = [1.0, 0.5, 0.5], radius = 1.0 }\n";
     same("pyramid", &parsed(text), Precision::Single, 64);
 }
-
-/// Compares the acceleration structures on small and elongated pictures with view angles from 5 to
-/// 179 degrees. The rays of a single tile may cover more than a hemisphere of directions. Each
-/// scene has two planes, a rectangle, and random objects.
-#[test]
-fn view_angles_are_equal_under_every_acceleration() {
-    let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\
-                [[object]]\nshape.plane = { point = [0.0, 9.0, 0.0], normal = [0.3, -1.0, 0.2] }\n\
-                [[object]]\nshape.rectangle = { center = [4.0, 0.0, 1.0], size = [3.0, 5.0], \
-                normal = [-1.0, 0.5, 0.2] }\n";
-    let sizes =
-        [[1, 1], [3, 2], [20, 20], [40, 30], [200, 1], [1, 200], [1000, 1], [1, 1000], [57, 3]];
-    let mut seed = 100;
-    for angle in [5.0, 60.0, 100.0, 140.0, 160.0, 175.0, 179.0] {
-        for size in sizes {
-            seed += 1;
-            let mut numbers = Numbers::new(seed);
-            let count = [6, 24, 130][numbers.below(3)];
-            let mut scene = crowd(&mut numbers, count);
-            let planes = parsed(flat);
-            scene.objects.extend(planes.objects);
-            scene.camera.view_angle = match numbers.below(2) {
-                0 => ViewAngle::Vertical(angle),
-                _ => ViewAngle::Horizontal(angle),
-            };
-            let precision = if seed % 2 == 0 { Precision::Single } else { Precision::Double };
-            let name = format!("{angle} degrees, {size:?}, {count} objects, {precision:?}");
-            same(&name, &sized(scene, size), precision, 3);
-        }
-    }
-}
-
-/// Compares the acceleration structures for cameras with a lens. The lenses are from tiny to larger
-/// than the scene. The lenses are focused at any distance. The cameras have any view angle, and
-/// some are inside of objects.
-#[test]
-fn lenses_are_equal_under_every_acceleration() {
-    check_lenses(0..96);
-}
-
-#[test]
-#[ignore = "long: thousands of scenes"]
-fn lenses_are_equal_under_every_acceleration_in_many_scenes() {
-    check_lenses(1000..4000);
-}
-
-fn check_lenses(seeds: std::ops::Range<u64>) {
-    for seed in seeds {
-        let mut numbers = Numbers::new(seed);
-        let count = [1, 3, 6, 24, 130][numbers.below(5)];
-        let mut scene = crowd(&mut numbers, count);
-        if numbers.below(2) == 0 {
-            // A floor and walls, some of them in front of the lens, some behind it.
-            let mut wall = || {
-                let [a, b, c] = numbers.direction().to_array();
-                let [x, y, z] = (DVec3::from(scene.camera.eye) + numbers.in_cube(4.0)).to_array();
-                format!(
-                    "[[object]]\nshape.plane = {{ point = [{x}, {y}, {z}], normal = [{a}, {b}, {c}] }}\n\
-                     [[object]]\nshape.rectangle = {{ center = [{x}, {y}, {z}], size = [3.0, 5.0], \
-                     normal = [{c}, {b}, {a}] }}\n"
-                )
-            };
-            let walls = parsed(&(wall() + &wall()));
-            scene.objects.extend(walls.objects);
-        }
-        scene.camera.aperture = Some(Aperture::Radius(numbers.log_uniform(1e-3, 30.0)));
-        let focus = match numbers.below(3) {
-            0 => numbers.log_uniform(1e-3, 1e4),
-            _ => numbers.log_uniform(0.5, 10.0),
-        };
-        scene.camera.focus = Some(Focus::Distance(focus));
-        let size = [[41, 29], [20, 20], [57, 3], [100, 1]][numbers.below(4)];
-        let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
-        let name = format!("seed {seed}, {count} objects, {precision:?}, focus {focus}");
-        same(&name, &sized(scene, size), precision, 5);
-    }
-}
-
-/// OBJ text of a cube from -0.5 to 0.5, a mesh of twelve triangles.
-const CUBE: &str = "v -0.5 -0.5 -0.5\nv 0.5 -0.5 -0.5\nv 0.5 0.5 -0.5\nv -0.5 0.5 -0.5\n\
-    v -0.5 -0.5 0.5\nv 0.5 -0.5 0.5\nv 0.5 0.5 0.5\nv -0.5 0.5 0.5\n\
-    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
 /// Returns a scene with objects of every kind on a coarse grid, so that some faces are coplanar
 /// with faces of other objects. Eye and light are on the grid as well, mostly exactly on surfaces.
@@ -223,7 +65,6 @@ fn coplanar(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
     let eye = place.transform_point3(grid(6, 0.5));
     let forward = rotation * (grid(2, 1.0) + DVec3::new(0.1, 0.0, 0.3));
     let light = place.transform_point3(grid(4, 0.5));
-    let vector = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
     let mut text = format!(
         "background.color = [0.2, 0.3, 0.4]\n\
          [camera]\neye = {}\ndirection = {}\nview_angle.vertical = 70.0\n\
@@ -232,10 +73,10 @@ fn coplanar(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
          [materials.matte]\ncolor = [0.7, 0.5, 0.3]\n\
          [materials.mirror]\ndiffuse = 0.2\nreflection = 0.7\n\
          [materials.glass]\ndiffuse = 0.1\ntransmission = 0.6\n",
-        vector(eye),
-        vector(forward),
-        vector(light),
-        vector(rotation * DVec3::new(0.3, -1.0, 0.2)),
+        array(eye),
+        array(forward),
+        array(light),
+        array(rotation * DVec3::new(0.3, -1.0, 0.2)),
     );
     let transparent = numbers.below(2);
     for _ in 0..count {
@@ -246,18 +87,16 @@ fn coplanar(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
         let middle = DVec3::new(grid(-3, 7), grid(-3, 7), grid(-3, 7)) * 0.5;
         write!(
             text,
-            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\ntransform = [{{ scale = {} }}, \
-             {{ translate = {} }}, {{ scale = {scale:?} }}, \
-             {{ rotate = {{ axis = {}, degrees = {degrees:?} }} }}, {{ translate = {} }}]\n",
-            vector(size),
-            vector(middle),
-            vector(axis),
-            vector(offset)
+            "[[object]]\nmaterial = \"{material}\"\nshape.{shape}\n\
+             transform = [{{ scale = {} }}, {{ translate = {} }}, {}]\n",
+            array(size),
+            array(middle),
+            steps(&place)
         )
         .unwrap();
     }
     let path = folder.join("scene.toml");
-    fs::write(folder.join("cube.obj"), CUBE).unwrap();
+    fs::write(folder.join("cube.obj"), obj_box(DVec3::splat(-0.5), DVec3::splat(0.5))).unwrap();
     fs::write(&path, &text).unwrap();
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }

@@ -1,21 +1,15 @@
-//! Check of a big picture against single pixels, which are traced without tiles and without regions
-//! (bands that are rendered one after the other).
+//! Check of a big picture against single pixels, which are traced without tiles and without
+//! regions.
 
-use crate::support::{shipped, sized};
-use std::collections::BTreeMap;
+use crate::harness::*;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::PathBuf;
-use zerkalo_kernel::lanes::{Double, SimdFloat};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
-use zerkalo_world::{AnyWorld, Options, Radiance, TracedPacket, World};
+use zerkalo_render::film::TILE_PIXELS;
+use zerkalo_world::TracedPacket;
 
 /// Side of the square picture in pixels.
 const SIDE: u32 = 16384;
-/// Number of samples of a pixel in each of the two replicates (halves of the samples). It is half
-/// of `--spp`.
+/// Number of samples of a pixel in each replicate. It is half of `--spp`.
 const SAMPLES: u32 = 4;
 /// Columns of the picture that are checked in every row.
 const COLUMNS: [u32; 16] =
@@ -23,7 +17,7 @@ const COLUMNS: [u32; 16] =
 
 /// Returns the displayed pixels of row `y` in the columns of `COLUMNS`, traced without tiles.
 fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
-    let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
+    let sampling = sobol(0);
     let tracer = world.camera_tracer(&sampling);
     let scales = world.scales().to_vec();
     let precision = "double".to_string();

@@ -1,21 +1,8 @@
-//! Determinism: a sample is a pure function of the seed, the pixel, the replicate (one of two
-//! halves of the samples) and the sample index. The bytes of the film do not depend on the number
-//! of threads, the order of tracing, the packet layout or the division into parts.
+//! Determinism: a sample is a pure function of the seed, the pixel, the replicate and the sample
+//! index. The bytes of the film do not depend on the number of threads, the order of tracing, the
+//! packet layout or the division into parts.
 
-use crate::common;
-use crate::common::report;
-use crate::support;
-use zerkalo_render::film::testing::TestFilm;
-
-use common::Numbers;
-use report::report;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-use support::{all_shipped, begin, pool, shipped, sized, trace, uniform, wave};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::Film;
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
 const SEED: u64 = 29;
@@ -26,20 +13,12 @@ const SIZE: [u32; 2] = [37, 35];
 /// Returns scenes that together contain every lobe, highlight and kind of light, several light
 /// groups, a lens, and paths that branch.
 fn scenes() -> Vec<(String, Scene)> {
-    [
-        "mirror-room.toml",
-        "mirror-room-physical.toml",
-        "light-groups.toml",
-        "lobe-ggx.toml",
-        "glass.toml",
-        "depth-of-field.toml",
-        "many-lights.toml",
-    ]
-    .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
-    .into()
+    "mirror-room mirror-room-physical light-groups lobe-ggx glass depth-of-field many-lights"
+        .split(' ')
+        .map(|name| (name.to_string(), sized(shipped(&format!("{name}.toml")), SIZE)))
+        .collect()
 }
 
-/// Returns the film of the samples `0..count` of both replicates (halves of the samples).
 fn film_of_samples(scene: &Scene, precision: Precision, count: u32) -> Film {
     film_of_ranges(scene, precision, &[(0, count), (0, count)])
 }
@@ -102,9 +81,9 @@ fn extreme_29_sum_of_parts_does_not_depend_on_order() {
     report(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// Checks that a render that is stopped within a wave (a set of concurrent tracing jobs) can be
-/// resumed. A second render traces the remaining jobs, as the successor of a killed process would.
-/// The sum of both films must equal the film of an uninterrupted render.
+/// Checks that a render that is stopped within a wave can be resumed. A second render traces the
+/// remaining jobs, as the successor of a killed process would. The sum of both films must equal the
+/// film of an uninterrupted render.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
@@ -137,27 +116,6 @@ fn extreme_29_stopped_and_resumed() {
         }
     }
     report(29, "both", "stopped and resumed: the same bytes");
-}
-
-#[test]
-fn sum_of_films_with_disjoint_tiles_is_the_whole_film() {
-    let scene = &scenes()[2].1;
-    let expected = film_of_samples(scene, Precision::Single, 16).bytes();
-    let pool = pool(2);
-    let films: Vec<Film> = (0..3)
-        .map(|share| {
-            let mut rendering = begin(scene, SEED, Precision::Single);
-            for replicate in [0, 1] {
-                let mut wave = wave(&rendering.film, replicate, 0, 16);
-                wave.jobs.retain(|job| job.tile % 3 == share);
-                trace(&mut rendering, &wave, &pool);
-            }
-            rendering.film
-        })
-        .collect();
-    let mut sum = Film::new(films[0].header().clone());
-    [2, 0, 1].into_iter().for_each(|i| sum.add(&films[i]).unwrap());
-    assert!(sum.bytes() == expected);
 }
 
 /// Checks that packets of one pixel and of several pixels trace the same samples. A wave is a set
@@ -220,14 +178,7 @@ fn reused_film_equals_a_new_film() {
     let (_, scene) = &scenes()[0];
     let mut other = scene.clone();
     other.camera.eye[0] += 0.5;
-    let options = zerkalo_render::Options {
-        world: zerkalo_world::Options::default(),
-        sampling: zerkalo_kernel::sampling::SampleSettings {
-            seed: SEED,
-            kind: zerkalo_kernel::sampling::SamplerKind::Sobol,
-        },
-        display: zerkalo_render::film::Display::default(),
-    };
+    let options = render_options(sobol(SEED));
     let mut rendering = RenderState::new(&other, &options, None);
     uniform(&mut rendering, 0, 8, &pool(2));
     let mut rendering = RenderState::new(scene, &options, Some(rendering));

@@ -1,19 +1,9 @@
 //! Environment lights: white furnaces, very bright pixels, scaled and turned images, hostile files.
 
-use crate::common::normal;
-use crate::support;
-
-use normal::two_sided_z;
-use std::fs;
-use std::path::Path;
-use support::{parsed, picture, rendered};
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_scene::camera::ViewAngle;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Returns the mean of each channel over the picture, and the standard error of the mean. The error
-/// comes from the difference of the two replicates (halves of the samples); pixels are independent.
+/// comes from the difference of the two replicates; pixels are independent.
 fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f64); 3] {
     let rendering = rendered(scene, seed, precision, count);
     assert_eq!(rendering.film.bad_samples().count, 0, "{:?}", rendering.film.bad_samples().first);
@@ -26,8 +16,6 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
     })
 }
 
-/// Returns the scene of a ball that fills most of the picture. The texts `material` and `trace` are
-/// keys of the ball's material and of the trace settings; `light` is a light or a background.
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
         "[film]
@@ -50,71 +38,6 @@ fn ball(material: &str, trace: &str, light: &str) -> Scene {
 }
 
 const WHITE_SKY: &str = "[[light]]\nenvironment = {}";
-
-/// Materials that absorb no light, as texts of a scene file.
-const WHITE: &[&str] = &[
-    "diffuse = 1.0",
-    "diffuse = 0.0\nreflection = 1.0",
-    "diffuse = 0.0\nreflection = 1.0\nroughness = 0.4",
-    "diffuse = 0.0\nreflection = 1.0\nroughness = 0.4\nlobe = \"square\"",
-    "diffuse = 0.5\nreflection = 0.5\nroughness = 0.2",
-    "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"\nior = 1.5",
-];
-
-/// Checks that white objects in a white environment are white at small and at large path depths.
-/// Glass is checked only at the largest depth, because its paths lose light at the depth limit.
-#[test]
-fn white_objects_in_a_white_environment_are_white() {
-    let threshold = two_sided_z(1e-4 / (WHITE.len() * 3 * 2) as f64);
-    for material in WHITE {
-        for depth in [1, 2, 16] {
-            if material.contains("dielectric") && depth < 16 {
-                continue;
-            }
-            for precision in [Precision::Single, Precision::Double] {
-                let scene = ball(material, &format!("max_depth = {depth}"), WHITE_SKY);
-                let [(mean, error), ..] = mean(&scene, 1, precision, 64);
-                // Allowed bias: paths in glass that end at the depth limit lose light, and film and
-                // image round.
-                let bias = if material.contains("dielectric") { 1e-4 } else { 1e-6 };
-                assert!(
-                    (mean - 1.0).abs() <= threshold * error + bias,
-                    "{material}, depth {depth}, {precision:?}: {mean} +- {error}"
-                );
-            }
-        }
-    }
-}
-
-/// Checks that a white convex body in a white environment is white at every diffuse depth. A
-/// diffuse bounce that escapes must not add the environment's light a second time.
-#[test]
-fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
-    let threshold = two_sided_z(1e-4 / (2 * 2 * 3 * 2) as f64);
-    for material in ["diffuse = 1.0", "diffuse = 0.5\nreflection = 0.5\nroughness = 0.2"] {
-        for light in [WHITE_SKY, "[[light]]\nenvironment = {}\nvisible = false"] {
-            if light != WHITE_SKY && material.contains("reflection") {
-                continue;
-            }
-            for bounces in [0, 1, 3] {
-                for precision in [Precision::Single, Precision::Double] {
-                    let trace = format!("max_diffuse_depth = {bounces}");
-                    let mut scene = ball(material, &trace, light);
-                    scene.camera.view_angle = ViewAngle::Vertical(10.0);
-                    let [(mean, error), ..] = mean(&scene, 6, precision, 64);
-                    let z = (mean - 1.0) / error;
-                    println!(
-                        "{material:?}, {light:?}, {bounces} bounces, {precision:?}: {mean}, z {z:.2}"
-                    );
-                    assert!(
-                        (mean - 1.0).abs() <= threshold * error + 1e-6 && error < 5e-3,
-                        "{material}, {light}, {bounces}, {precision:?}: {mean} +- {error}"
-                    );
-                }
-            }
-        }
-    }
-}
 
 /// Checks the light of one diffuse bounce between a floor and a wall that is 1 high, both very
 /// long, in a white environment. As seen from a point of the floor, the upper edge of the wall is
@@ -167,8 +90,6 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
     }
 }
 
-/// Checks lobes that lose light. A white environment, whose light is sampled, gives the same
-/// reflected radiance as a white background, which only rays find.
 #[test]
 fn lobes_reflect_a_white_environment_like_a_white_background() {
     let background = "[background]\ncolor = [1.0, 1.0, 1.0]";
@@ -274,24 +195,6 @@ fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     }
 }
 
-/// Checks that twice the intensity of an environment gives twice the picture, sample by sample.
-#[test]
-fn intensity_scales_the_picture_of_an_environment() {
-    let sky = "[[light]]\nenvironment = { zenith = [0.2, 0.5, 1.0] }\nintensity = ";
-    let material = "diffuse = 0.5\nreflection = 0.5\nroughness = 0.3";
-    let [one, two] = ["1.0", "2.0"].map(|intensity| {
-        let scene = ball(material, "", &format!("{sky}{intensity}"));
-        picture(&rendered(&scene, 4, Precision::Auto, 16), Replicates::Both)
-    });
-    for (one, two) in one.iter().zip(&two) {
-        for c in 0..3 {
-            assert_eq!(2.0 * one[c], two[c]);
-        }
-    }
-}
-
-/// Checks that an invisible environment lights surfaces, but that neither the camera nor mirrors
-/// see it.
 #[test]
 fn invisible_environment_lights_but_is_not_seen() {
     let hidden = format!("{WHITE_SKY}\nvisible = false");

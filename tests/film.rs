@@ -1,19 +1,10 @@
 //! The film's public interface: order of addition, precision of sums, contents of files.
 
-use crate::common;
-use crate::common::report;
-use zerkalo_render::film::testing::TestFilm;
-
-use common::Numbers;
+use crate::harness::*;
 use proptest::prelude::*;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufReader;
-use std::ops::Range;
-use std::path::Path;
-use zerkalo_render::film::{
-    Display, Film, Header, InvalidSample, LightWeights, Replicates, TILE, Tile, TileHandle, Tone,
-    lattice_pixels, quantised_8, quantised_16,
-};
+use zerkalo_render::film::{InvalidSample, TileHandle, lattice_pixels, quantised_8, quantised_16};
 use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
 
 const WIDTH: usize = 37;
@@ -59,8 +50,8 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds the samples `range` of one of the two replicates (halves of the samples) to the tiles in
-/// `tiles`, in the order of this list.
+/// Adds the samples `range` of one of the two replicates to the tiles in `tiles`, in the order of
+/// this list.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -79,32 +70,8 @@ fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
     tile.advance(replicate, range.len() as u32);
 }
 
-#[test]
-fn threads_do_not_change_the_bytes() {
-    let expected = whole().bytes();
-    for threads in [1, 2, 7] {
-        let mut film = new_film();
-        let all = all_tiles(&film);
-        for replicate in 0..2 {
-            let mut shares: Vec<Vec<_>> = (0..threads).map(|_| vec![]).collect();
-            for (i, slot) in film.slots(&all).into_iter().enumerate() {
-                shares[i % threads].push(slot);
-            }
-            std::thread::scope(|scope| {
-                for share in shares {
-                    scope.spawn(move || {
-                        share.into_iter().for_each(|s| trace_slot(s, replicate, 0..12))
-                    });
-                }
-            });
-        }
-        assert!(film.bytes() == expected, "{threads} threads");
-    }
-}
-
-/// Adds the first sample of replicate A (half of the samples) to each pixel. The pixels are visited
-/// in lattices, from coarse to fine. `steps` contains for each lattice the distance between its
-/// pixels.
+/// Adds the first sample of replicate A to each pixel. The pixels are visited in lattices, from
+/// coarse to fine. `steps` contains for each lattice the distance between its pixels.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;
@@ -130,30 +97,6 @@ fn whole() -> Film {
     trace(&mut film, &all, 0, 0..12);
     trace(&mut film, &all, 1, 0..12);
     film
-}
-
-#[test]
-fn disjoint_ranges_in_any_order_equal_the_whole() {
-    let whole = whole();
-    let ranges = [0..1, 1..5, 5..12];
-    let part = |range: &Range<u32>| {
-        let mut film = new_film();
-        let backwards: Vec<_> = all_tiles(&film).into_iter().rev().collect();
-        trace(&mut film, &backwards, 1, range.clone());
-        trace(&mut film, &backwards, 0, range.clone());
-        film
-    };
-    for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
-        let mut sum = new_film();
-        order.iter().for_each(|i| sum.add(&part(&ranges[*i])).unwrap());
-        assert!(sum.bytes() == whole.bytes(), "{order:?}");
-        assert_eq!(sum.bad_samples(), whole.bad_samples());
-    }
-    let bad = whole.bad_samples();
-    assert!(bad.count > 4 && !bad.first.is_empty(), "{bad:?}");
-    assert_eq!(whole.samples(), (WIDTH * HEIGHT * 24) as u64);
-    // Different films have different bytes.
-    assert!(part(&ranges[0]).bytes() != part(&ranges[1]).bytes());
 }
 
 #[test]
@@ -210,7 +153,7 @@ fn extreme_28_milliard_samples() {
     assert!((green / 0.6993 - 1.0).abs() < 1e-8, "{green}");
     assert!((blue - 1e-8).abs() <= 0.5 / scale, "{blue}");
     let error = (red / 0.7 - 1.0).abs().max((green / 0.6993 - 1.0).abs());
-    report::report(28, "both", &format!("{error:.0e} off (relative)"));
+    report(28, "both", &format!("{error:.0e} off (relative)"));
 }
 
 #[test]
@@ -239,7 +182,7 @@ fn extreme_28_saturation_is_flagged() {
     sums[1].add(&film).unwrap();
     assert_eq!(sums.each_ref().map(Film::saturated_pixels), [1, 1]);
     assert!(sums[0].bytes() == sums[1].bytes());
-    report::report(28, "both", "saturation flagged");
+    report(28, "both", "saturation flagged");
 }
 
 #[test]

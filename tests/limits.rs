@@ -1,16 +1,7 @@
 //! Truncation bias that the program reports for `max_depth` and `min_throughput`. It is compared
 //! with the true bias, the difference between pictures with and without these limits.
 
-use crate::common;
-use crate::support;
-use zerkalo_scene::shape::EXAMPLES;
-
-use common::Numbers;
-use std::fmt::Write;
-use support::{parsed, picture, rendered};
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_world::{self as world, AnyWorld, Precision};
+use crate::harness::*;
 
 const SAMPLES: u32 = 4;
 
@@ -169,12 +160,6 @@ fn checked(seeds: std::ops::Range<u64>) {
 #[test]
 fn reported_truncation_bias_holds() {
     checked(0..400);
-}
-
-#[test]
-#[ignore = "takes minutes"]
-fn reported_truncation_bias_holds_in_many_scenes() {
-    checked(400..6000);
 }
 
 /// Checks that the depth bias of a single glass ball is reported without a bound. Bumps, and

@@ -5,18 +5,7 @@
 //! - The limits are ray types, depth, smallest throughput, horizon, and the cap on samples of
 //!   glossy tiles.
 
-use crate::support;
-use zerkalo_render::film::testing::TestFilm;
-
-use support::{
-    all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
-};
-use zerkalo_render::film::{Display, LightWeights, Replicates};
-use zerkalo_render::schedule::{Stop, StoppedBy};
-use zerkalo_scene::camera::Focus;
-use zerkalo_scene::value::Color;
-use zerkalo_scene::{BelowHorizon, RayTypes, Scene, TransformOp};
-use zerkalo_world::{self as world, AnyWorld, Precision};
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [48, 36];
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
@@ -137,7 +126,6 @@ fn unit_of_light_does_not_change_the_picture() {
     }
 }
 
-/// Returns `scene`, translated by `by`.
 fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
     let mut scene = scene.clone();
     let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
@@ -233,130 +221,5 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
                 "{name} in {precision:?}: {flipped:?}, one sample has {one_sample}"
             );
         }
-    }
-}
-
-#[test]
-fn ray_types_add_shadows_and_reflections() {
-    for precision in PRECISIONS {
-        let [primary, shadows, full] =
-            ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
-        let mut unreflected = full.clone();
-        unreflected.trace.max_depth = 0;
-        assert_eq!(primary.trace.ray_types, RayTypes::Primary);
-        let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
-        // Shadows can only make a pixel darker, and reflections can only make it brighter.
-        assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
-        assert!(shadowed.iter().zip(&reflected).all(|(s, r)| s <= r));
-        assert!(difference(&shadowed, &lit) > 0.1 && difference(&shadowed, &reflected) > 0.1);
-        assert!(values(&unreflected, precision) == shadowed, "max_depth 0 is ray_types `shadows`");
-    }
-    let [primary, shadows, full] =
-        ["primary", "shadows", "full"].map(|l| small(&format!("level-{l}.toml")));
-    assert!(has(&primary, "no shadows") && !has(&primary, "cone lobe"));
-    assert!(has(&shadows, "shadows only") && !has(&shadows, "cone lobe"));
-    assert!(!has(&full, "no shadows") && !has(&full, "shadows only") && has(&full, "cone lobe"));
-    assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
-}
-
-/// Checks that the bias of a depth limit is bounded. With the depth limit K and the reflectance
-/// rho, longer paths add at most rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
-#[test]
-fn depth_limits_paths_and_its_bias_is_bounded() {
-    const RHO: f64 = 0.9;
-    let with_depth = |depth: u32| {
-        let mut scene = small("facing-mirrors.toml");
-        (scene.trace.max_depth, scene.trace.min_throughput) = (depth, 0.0);
-        scene
-    };
-    let all = values(&with_depth(400), Precision::Double);
-    // A surface reflects at most 0.8 from the lamp and 0.2 from the ambient light. Its highlight
-    // adds at most 0.2 x 0.8. The sum is less than 1.2.
-    let brightest = 1.2;
-    let mut before = 0.0;
-    for depth in [0, 1, 2, 5, 17, 60] {
-        let scene = with_depth(depth);
-        let cut = values(&scene, Precision::Double);
-        assert!(cut.iter().zip(&all).all(|(cut, all)| *cut <= all + 1e-7), "depth {depth}");
-        let missing = cut.iter().zip(&all).map(|(cut, all)| all - cut).fold(0.0, f64::max);
-        let bound = brightest * RHO.powi(depth as i32 + 1) / (1.0 - RHO);
-        assert!(missing <= bound + 1e-7, "depth {depth}: {missing} of {bound}");
-        let sum: f64 = cut.iter().sum();
-        assert!(sum > before || depth == 60, "depth {depth} adds nothing");
-        before = sum;
-        let world = AnyWorld::compile(&scene, &world::Options::default());
-        let biases = world.biases().concat();
-        assert!(biases.contains(&format!("max_depth {depth} cuts longer paths")), "{biases}");
-    }
-}
-
-#[test]
-fn min_throughput_limits_paths_and_its_bias_is_bounded() {
-    const RHO: f64 = 0.9;
-    let with_least = |least: f64| {
-        let mut scene = small("facing-mirrors.toml");
-        (scene.trace.max_depth, scene.trace.min_throughput) = (400, least);
-        scene
-    };
-    let all = values(&with_least(0.0), Precision::Double);
-    for least in [0.95, 0.89, 0.5, 0.01] {
-        // Paths up to this depth have at least the throughput `least`, which is the limit. Deeper
-        // paths have less.
-        let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
-        let mut by_depth = with_least(0.0);
-        by_depth.trace.max_depth = depth;
-        let scene = with_least(least);
-        let cut = values(&scene, Precision::Double);
-        assert!(cut == values(&by_depth, Precision::Double), "{least} is depth {depth}");
-        let missing = cut.iter().zip(&all).map(|(cut, all)| all - cut).fold(0.0, f64::max);
-        assert!(missing > 0.0 && missing <= 1.2 * least / (1.0 - RHO), "{least}: {missing}");
-        let world = AnyWorld::compile(&scene, &world::Options::default());
-        assert!(world.biases().concat().contains(&format!("min_throughput {least} cuts")));
-    }
-}
-
-#[test]
-fn horizon_folds_or_absorbs_rays() {
-    for precision in PRECISIONS {
-        let (fold, absorb) = (small("horizon-fold.toml"), small("horizon-absorb.toml"));
-        assert!(has(&absorb, "absorbing horizon") && !has(&fold, "absorbing horizon"));
-        assert_eq!(
-            fold.trace,
-            zerkalo_scene::IntegratorSettings { below_horizon: BelowHorizon::Fold, ..absorb.trace }
-        );
-        // Reflected rays above the surface are equal in both scenes. Those below it are mirrored up
-        // in the scene `fold`, and lost in the scene `absorb`.
-        let [folded, absorbed] = [&fold, &absorb].map(|s| values(s, precision));
-        assert!(absorbed.iter().zip(&folded).all(|(absorbed, folded)| absorbed <= folded));
-        assert!(difference(&folded, &absorbed) > 0.2);
-        // Folding conserves energy: with only the ice under a constant white background, every
-        // pixel has radiance 1.
-        let mut sky = fold.clone();
-        sky.objects.truncate(1);
-        sky.background.color = Color([1.0; 3]);
-        assert!(values(&sky, precision).iter().all(|x| (x - 1.0).abs() < 1e-6));
-    }
-}
-
-#[test]
-fn rays_per_pixel_caps_glossy_tiles() {
-    let scene = sized(shipped("rays-per-pixel.toml"), [96, 64]);
-    assert_eq!(scene.film.rays_per_pixel, 16);
-    let stop = Stop { noise_levels: Some(0.3), ..Stop::default() };
-    for adaptive in [false, true] {
-        let mut rendering = begin(&scene, 1, Precision::Auto);
-        let reason =
-            follow(&mut rendering, settings(adaptive, scene.film.rays_per_pixel, stop), &pool(2));
-        assert_eq!(reason, StoppedBy::RaysPerPixel, "adaptive {adaptive}");
-        let counts: Vec<u32> =
-            rendering.film.touched().map(|(_, tile)| tile.counts().iter().sum()).collect();
-        let capped = counts.iter().filter(|n| **n == 16).count();
-        assert!(capped > counts.len() / 2, "adaptive {adaptive}: {counts:?}");
-        // Tiles without a glossy lobe have no cap and get more than 16 samples. No tile gets fewer
-        // than 16.
-        assert!(counts.iter().all(|n| *n >= 16), "adaptive {adaptive}: {counts:?}");
-        let uncapped =
-            follow(&mut begin(&scene, 1, Precision::Auto), settings(adaptive, 0, stop), &pool(2));
-        assert_eq!(uncapped, StoppedBy::Noise);
     }
 }

@@ -1,20 +1,9 @@
 //! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals,
 //! colours, and files that are invalid or change.
 
-use crate::support;
-
-use glam::DVec3;
-use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
-use std::fs;
-use std::path::{Path, PathBuf};
-use support::{picture, rendered};
-use zerkalo_kernel::primitive::{Form, MeshForm};
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::asset::Assets;
-use zerkalo_scene::edit::{Target, add_object, set};
-use zerkalo_scene::{Scene, SceneFile};
-use zerkalo_world::{AnyWorld, FirstHit, Options, Precision};
+use crate::harness::*;
+use zerkalo_scene::SceneFile;
+use zerkalo_scene::edit::{add_object, set};
 
 /// Returns a tube around a trefoil knot, made of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {
@@ -103,8 +92,6 @@ fn mesh_files_match_generators() {
     }
 }
 
-/// Checks that the signed volume of each shipped closed mesh is positive, that is, its fronts face
-/// outwards.
 #[test]
 fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
@@ -179,85 +166,7 @@ const VIEW: &str = "
     material = \"matt\"
 ";
 
-fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
-    let [width, height] = scene.film.size.map(|n| n as usize);
-    let world = AnyWorld::compile(scene, &Options { precision, ..Options::default() });
-    let points: Vec<[f64; 2]> = (0..width * height)
-        .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
-        .collect();
-    let mut seen = vec![FirstHit::MISS; points.len()];
-    world.first_hit(&points, &mut seen);
-    seen
-}
-
-#[test]
-fn sphere_mesh_hits_converge_to_sphere() {
-    let desk = Desk::new();
-    desk.put("ball.obj", &ball(200, 400));
-    let sphere =
-        desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
-    let mesh = desk.scene(&(VIEW.to_string() + "shape.mesh = { file = \"ball.obj\" }"));
-    for precision in [Precision::Single, Precision::Double] {
-        let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
-        let mut both = 0;
-        for (a, b) in a.iter().zip(&b) {
-            // The faces are at most 1 - cos(pi / 400) inside of the sphere. The difference of the
-            // depths is largest at the silhouette.
-            let (n, m) =
-                (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
-            if a.object.is_some() && b.object.is_some() {
-                both += 1;
-                assert!((a.depth - b.depth).abs() < 0.01, "{a:?} {b:?}");
-                assert!(n.dot(m) > 0.995, "{a:?} {b:?}");
-            } else {
-                assert!(b.object.is_none(), "the mesh lies inside the sphere");
-            }
-        }
-        let sphere_pixels = a.iter().filter(|s| s.object.is_some()).count();
-        assert!(both * 100 > sphere_pixels * 99, "{both} of {sphere_pixels}");
-    }
-    let [sphere, smooth] = [&sphere, &mesh].map(|scene| rendered(scene, 7, Precision::Auto, 16));
-    let [sphere, smooth] = [&sphere, &smooth].map(|r| picture(r, Replicates::Both));
-    let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| {
-        a.iter().zip(b).map(|(a, b)| (a[0] - b[0]).abs()).sum::<f64>() / a.len() as f64
-    };
-    let apart = difference(&sphere, &smooth);
-    assert!(apart < 1e-3, "{apart}");
-}
-
-/// Checks that the blue background is nowhere visible through a closed red mesh, up to 33 pixels
-/// from the centre of the picture.
-#[test]
-fn closed_mesh_has_no_holes() {
-    let desk = Desk::new();
-    for (rings, sides) in [(7, 12), (90, 181)] {
-        desk.put("ball.obj", &ball(rings, sides));
-        for normals in ["smooth", "flat"] {
-            let text =
-                format!("{VIEW}shape.mesh = {{ file = \"ball.obj\", normals = \"{normals}\" }}");
-            let scene = desk.scene(&text);
-            for precision in [Precision::Single, Precision::Double] {
-                let rendering = rendered(&scene, 3, precision, 16);
-                let pixels = picture(&rendering, Replicates::Both);
-                let blue = |x: usize, y: usize| pixels[y * 96 + x][2];
-                let mut inner = 0;
-                for y in 0..96usize {
-                    for x in 0..96usize {
-                        let (dx, dy) = (x as f64 - 47.5, y as f64 - 47.5);
-                        // The ball's image has a radius of about 37 pixels.
-                        if dx.hypot(dy) < 33.0 {
-                            inner += 1;
-                            assert_eq!(blue(x, y), 0.0, "{x} {y} {rings} {normals}");
-                        }
-                    }
-                }
-                assert!(inner > 3000);
-            }
-        }
-    }
-}
-
-/// Checks that a light inside of a closed mesh lights no surface outside of it, neither with smooth
+/// Checks that a light inside a closed mesh lights no surface outside of it, neither with smooth
 /// nor with flat normals.
 #[test]
 fn closed_mesh_leaks_no_light() {
@@ -322,37 +231,6 @@ fn flat_normals_show_the_triangles() {
 }
 
 #[test]
-fn colours_of_the_file_multiply_the_materials() {
-    let desk = Desk::new();
-    desk.put("two.mtl", "newmtl a\nKd 0.5 0.25 0.0\nnewmtl b\nKd 0 0 0.5\n");
-    let square = "mtllib two.mtl\nv -1 -1 0\nv 0 -1 0\nv 1 -1 0\nv -1 1 0\nv 0 1 0\nv 1 1 0\n";
-    desk.put("two.obj", &format!("{square}usemtl a\nf 1 2 5 4\nusemtl b\nf 2 3 6 5\n"));
-    let text = "
-        film.size = [8, 8]
-        camera = { eye = [0.0, 0.0, 1.0], direction = [0.0, 0.0, -1.0], view_angle.vertical = 40.0 }
-        ambient.color = [1.0, 1.0, 1.0]
-        [materials.m]
-        color = [0.5, 0.5, 1.0]
-        ambient = 1.0
-        diffuse = 0.5
-        [[light]]
-        directional = { direction = [0.0, 0.0, -1.0] }
-        [[object]]
-        material = \"m\"
-        shape.mesh = { file = \"two.obj\" }
-    ";
-    let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Replicates::Both);
-    for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
-        for c in 0..3 {
-            // The ambient light contributes the colour once. The directional light contributes it
-            // with the diffuse coefficient 0.5.
-            let value = expected[c] * 1.5;
-            assert!((pixels[pixel][c] - value).abs() < 1e-4, "{pixel} {:?}", pixels[pixel]);
-        }
-    }
-}
-
-#[test]
 fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     let desk = Desk::new();
     let ball_file = desk.put("ball.obj", &ball(6, 9));
@@ -410,7 +288,7 @@ fn scene_is_not_saved_where_mesh_would_be_missing() {
 
 #[test]
 fn the_inventory_counts_triangles() {
-    let scene = support::shipped("shape-mesh.toml");
+    let scene = shipped("shape-mesh.toml");
     let inventory = AnyWorld::compile(&scene, &Options::default()).inventory().to_string();
     assert!(inventory.contains("4 meshes of 23,106 triangles (list)"), "{inventory}");
 }

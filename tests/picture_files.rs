@@ -1,12 +1,10 @@
 //! Picture files that the program writes, which must have the same bytes for any number of threads
 //! and of SIMD lanes.
 
-use crate::support::png_file::PngImage;
+use crate::harness::*;
 use png::{BitDepth, ColorType};
-use std::fs;
 use std::process::Command;
 
-/// Compares picture files that `zerkalo render` writes with different numbers of threads.
 #[test]
 fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();

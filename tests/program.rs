@@ -2,8 +2,8 @@
 //! line, the dashboard, and the rules for the source.
 
 mod command_line;
-mod common;
 mod fuzz;
+mod harness;
 mod kills;
 mod link;
 mod live_session;
@@ -12,6 +12,4 @@ mod prose;
 mod pty;
 mod scene_editing;
 mod scene_files;
-mod session;
 mod stories;
-mod support;

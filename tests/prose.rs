@@ -4,8 +4,7 @@
 //! words, comments use the plain word of the field: programs report or print, terminals reply, rays
 //! intersect primitives.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 
 /// Words that begin a clause without a noun; a doc comment must not begin with one of them.
 const FIRST_WORDS: &[&str] =

@@ -2,9 +2,7 @@
 
 mod format_manual;
 
-use std::path::{Path, PathBuf};
-use zerkalo_kernel::primitive::{ConvexPolyhedronForm, Form, SphereForm};
-use zerkalo_scene::{Document, Scene};
+use crate::harness::*;
 
 fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
@@ -85,7 +83,6 @@ fn scene_format_reference_is_up_to_date() {
     golden(Path::new("docs/scene-format.md"), &format_manual::format_manual());
 }
 
-/// Returns the corners of the object `name` of the mirror room.
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {

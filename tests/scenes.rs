@@ -4,28 +4,13 @@
 //! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values.
 //! `ZERKALO_BLESS=NAME.toml` writes those of one scene, and keeps the stored ones of all others.
 
-use crate::common::normal;
-use crate::support;
-
-use normal::{tail, two_sided_z};
-use std::collections::BTreeMap;
-use std::fmt::Write;
-use std::fs;
-use std::path::PathBuf;
-use support::{
-    all_shipped, begin, parsed, picture, pool, rendered, shipped, sized, uniform, without_chance,
-};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_world::{self as world, AnyWorld, Precision};
+use crate::harness::*;
 
 /// Width and height in pixels of the compared pictures.
 const SIZE: [u32; 2] = [48, 32];
 const COUNT: u32 = 32;
 /// Side in pixels of the blocks whose mean colours are compared.
 const BLOCK: usize = 8;
-/// Seeds of the renders whose mean is the reference.
 const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
 /// Number of decimals of the stored means.
 const DECIMALS: usize = 6;
@@ -62,7 +47,7 @@ fn every_scene_compiles_to_its_inventory() {
 
 /// Returns two values for each block, row by row: its mean colour, and the squared standard error
 /// of that mean. The standard error of a pixel is estimated as half the difference of its two
-/// replicates (halves of the samples). The squares are added, because pixels are independent.
+/// replicates. The squares are added, because pixels are independent.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -186,22 +171,8 @@ fn every_scene_renders_its_golden_picture() {
     assert!(wrong.is_empty(), "{} of {values}:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-#[test]
-fn furnace_radiance_is_exactly_1() {
-    let scene = shipped("furnace.toml");
-    for precision in [Precision::Single, Precision::Double] {
-        let rendering = rendered(&scene, 3, precision, 16);
-        assert_eq!(rendering.film.bad_samples().count, 0);
-        let picture = picture(&rendering, Replicates::Both);
-        let wrong = picture.iter().filter(|rgb| **rgb != [1.0; 3]).count();
-        assert_eq!(wrong, 0, "{precision:?}: of {} pixels, such as {:?}", picture.len(), {
-            picture.iter().find(|rgb| **rgb != [1.0; 3])
-        });
-    }
-}
-
-/// Checks that both replicates (halves of the samples) are equal in scenes without anti-aliasing
-/// and lobes, where no sample is random.
+/// Checks that both replicates are equal in scenes without anti-aliasing and lobes, where no sample
+/// is random.
 #[test]
 fn deterministic_scenes_have_equal_replicates() {
     for (name, mut scene) in all_shipped() {
@@ -214,30 +185,4 @@ fn deterministic_scenes_have_equal_replicates() {
             assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
         }
     }
-}
-
-#[test]
-fn auto_precision_is_double_for_extreme_proportions() {
-    let chosen = |scene: &Scene| match compiled(scene) {
-        AnyWorld::Single(_) => Precision::Single,
-        AnyWorld::Double(_) => Precision::Double,
-    };
-    for (name, scene) in all_shipped() {
-        assert_eq!(chosen(&scene), Precision::Single, "{name}");
-    }
-    // A floor of 10 x 10 around the origin and a ball on it. The largest coordinate is 5.
-    let with_ball = |radius: f64| {
-        parsed(&format!(
-            "[[object]]\n\
-             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [10.0, 10.0] }}\n\
-             [[object]]\n\
-             shape.sphere = {{ center = [0.0, {radius}, 0.0], radius = {radius} }}\n\
-             [camera]\neye = [0.0, 0.1, 1.0]\ntarget = [0.0, 0.0, 0.0]\n"
-        ))
-    };
-    // Single precision requires a diameter of the ball of at least 1/8192 of the largest
-    // coordinate.
-    let limit = 5.0 / 8192.0 / 2.0;
-    assert_eq!(chosen(&with_ball(1.01 * limit)), Precision::Single);
-    assert_eq!(chosen(&with_ball(0.99 * limit)), Precision::Double);
 }

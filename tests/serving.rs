@@ -2,23 +2,7 @@
 //! with the weights of the edited scene, must give the picture of a fresh render. The test edits
 //! every key of the scene format, from the tables of keys.
 
-use crate::common;
-use crate::common::tables;
-use crate::support;
-use zerkalo_scene::shape::EXAMPLES;
-
-use common::Numbers;
-use std::collections::BTreeSet;
-use std::fmt::Write;
-use std::sync::Arc;
-use support::{Pool, begin, picture, pool, uniform};
-use tables::{Key, keys, put, scene, table, value_at};
-use toml::{Table, Value};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_scene::value::ValueType;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 const SEED: u64 = 11;
 const SAMPLES: u32 = 2;
@@ -106,7 +90,7 @@ fn base() -> Scene {
         let finish = finishes[i % finishes.len()];
         write!(text, "\n[[object]]\nmaterial = \"{finish}\"\n{example}\n{transform}\n").unwrap();
     }
-    Scene::parse(&text, common::NAME).unwrap_or_else(|e| panic!("{e}"))
+    Scene::parse(&text, NAME).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
@@ -253,7 +237,7 @@ impl Bench {
     /// Checks the picture if the film is reused for the edited scene `changed`. Returns `true` if
     /// it is reused, `false` if it is not, and `None` if the edited scene is invalid.
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
-        let edited = scene(changed, &self.base.resolver)?;
+        let edited = scene_of_table(changed, &self.base.resolver)?;
         self.tried += 1;
         if !self.film.try_reuse(&Arc::new(edited.clone())) {
             return Some(false);
@@ -276,7 +260,7 @@ impl Bench {
 fn relit_film_equals_render_of_the_edited_scene() {
     let mut bench = Bench::new();
     let mut numbers = Numbers::new(5);
-    let plain = table(&bench.base);
+    let plain = bench.base.to_table();
     let all = keys(&plain);
     assert!(all.len() > 450, "only {} keys", all.len());
     for key in &all {
@@ -318,8 +302,6 @@ fn relit_film_equals_render_of_the_edited_scene() {
     }
 }
 
-/// Checks that a film is not reused for a scene in which a material has changed, even if only a
-/// part of a compound has this material.
 #[test]
 fn material_of_a_compound_part_prevents_relighting() {
     let mut bench = Bench::new();
@@ -334,6 +316,6 @@ fn material_of_a_compound_part_prevents_relighting() {
             object.rename_material(name, "other");
         }
         assert!(renamed.faults().is_empty());
-        assert_eq!(bench.holds(&table(&renamed), name), Some(true));
+        assert_eq!(bench.holds(&renamed.to_table(), name), Some(true));
     }
 }

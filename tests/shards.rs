@@ -1,15 +1,11 @@
-//! Renders that are divided into shards (parts, each for one process): equality with a render by
-//! one process, interruption, and the noise that a plan promises.
+//! Renders that are divided into shards: equality with a render by one process, interruption, and
+//! the noise that a plan promises.
 
-use std::path::Path;
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::film::{Display, Film, Noise};
-use zerkalo_render::plan::{Plan, PlanSettings, ShardRender};
-use zerkalo_render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
-use zerkalo_render::{Options, RenderState, SyncRender};
-use zerkalo_scene::Scene;
-use zerkalo_world as world;
+use crate::harness::*;
+use zerkalo_render::film::Noise;
+use zerkalo_render::plan::ShardRender;
+use zerkalo_render::schedule::USUAL_SLOPE;
+use zerkalo_render::{Options, SyncRender};
 
 const THREADS: usize = 2;
 
@@ -21,15 +17,11 @@ fn scene(name: &str, size: Option<[u32; 2]>) -> Scene {
 }
 
 fn options(seed: u64) -> Options {
-    Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    }
+    render_options(sobol(seed))
 }
 
 fn until(noise: f64) -> Settings {
-    let stop = Stop { noise_levels: Some(noise), ..Stop::default() };
+    let stop = noise_stop(noise);
     Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
 }
 
@@ -40,8 +32,6 @@ fn adaptive(scene: &Scene, seed: u64, noise: f64) -> SyncRender {
     render
 }
 
-/// Plans a render by `shards` shards (parts, each for one process). The pilot (trial render) ended
-/// at twice the noise target `noise`.
 fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -> Plan {
     let settings = PlanSettings {
         source: "test".into(),
@@ -61,7 +51,6 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
     Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings).unwrap()
 }
 
-/// Traces shard `number` of `plan`. Returns its film and its number of rays.
 fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
     let state = RenderState::new(scene, &options(plan.settings.seed), None);
     let mut render = ShardRender::new(state, &plan.ranges(number), 0, THREADS).unwrap();
@@ -71,8 +60,8 @@ fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
     (render.state, rays)
 }
 
-/// Returns the sum of the films of the pilot (trial render) and of all shards (parts, each for one
-/// process). Also returns the number of rays of each shard.
+/// Returns the sum of the films of the pilot and of all shards. Also returns the number of rays of
+/// each shard.
 fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u64>) {
     let mut state = RenderState::new(scene, &options(plan.settings.seed), None);
     state.film.add(&pilot.state.film).unwrap();
@@ -89,26 +78,6 @@ fn noise(state: &RenderState) -> Noise {
     state.film.noise(&state.mix, &Display::default()).expect("an estimate of every tile")
 }
 
-#[test]
-fn merged_film_equals_one_process_and_is_the_expected_one() {
-    let scene = scene("mirror-room", Some([100, 70]));
-    let pilot = adaptive(&scene, 3, 1.0);
-    let plan = plan(&scene, &pilot, 3, 0.5, 5);
-    let ends: Vec<_> = plan.tiles.iter().map(|tile| 0..tile.end).collect();
-    let state = RenderState::new(&scene, &options(3), None);
-    let mut one = ShardRender::new(state, &ends, 0, THREADS).unwrap();
-    while one.step() {}
-    let pilot_rays = pilot.schedule.rays();
-    let (sum, rays) = merged(&scene, &plan, pilot);
-    assert!(sum.film.bytes() == one.state.film.bytes());
-    assert_eq!(pilot_rays + rays.iter().sum::<u64>(), one.rays());
-    let all: Vec<u32> = (0..=5).collect();
-    assert_eq!(plan.differing_tile(&sum.film, &all), None);
-    assert!(plan.differing_tile(&sum.film, &all[1..]).is_some());
-}
-
-/// Checks that a shard that is interrupted after every step, and continued from a copy of its film,
-/// equals an uninterrupted one.
 #[test]
 fn interrupted_shard_equals_uninterrupted() {
     let scene = scene("reflecting-tracks", Some([96, 64]));
@@ -137,10 +106,10 @@ fn interrupted_shard_equals_uninterrupted() {
     assert!(ShardRender::new(state, &plan.ranges(0), rays, THREADS).is_err());
 }
 
-/// Results of a render that is planned for eight shards (parts, each for one process). The noise is
-/// divided by the noise target, and the number of rays by that of an adaptive render with this
-/// target. `pilot` is the fraction of the rays in the pilot (trial render). `imbalance` is the
-/// excess of the largest shard's rays over the mean, as a fraction.
+/// Results of a render that is planned for eight shards. The noise is divided by the noise target,
+/// and the number of rays by that of an adaptive render with this target. `pilot` is the fraction
+/// of the rays in the pilot. `imbalance` is the excess of the largest shard's rays over the mean,
+/// as a fraction.
 struct Planned {
     noise: f64,
     rays: f64,
@@ -182,23 +151,8 @@ fn planned_noise_is_near_the_target() {
         // noise estimate of so few pixels is twice as uncertain as usual.
         assert!((0.8..=1.1).contains(&result.noise), "{name}: {}", result.noise);
         assert!(result.rays < 1.15, "{name}: {}", result.rays);
-        // A shard gets 40 to 110 blocks (ranges of samples of one tile). Their numbers of rays
-        // differ by a factor of three. The largest shard may therefore have 25 % more rays than the
-        // mean.
+        // A shard gets 40 to 110 blocks. Their numbers of rays differ by a factor of three. The
+        // largest shard may therefore have 25 % more rays than the mean.
         assert!(result.imbalance < 0.25, "{name}: {}", result.imbalance);
-    }
-}
-
-/// Checks planned renders of eight shards, in some minutes: `cargo test --test engine shards:: --
-/// --ignored --nocapture planned`
-#[test]
-#[ignore = "takes minutes"]
-fn planned_runs_of_eight_shards_meet_their_target() {
-    for name in ["mirror-room", "reflecting-tracks", "gallery-glass"] {
-        for seed in 0..if name == "gallery-glass" { 1 } else { 3 } {
-            let result = planned(name, None, seed, 0.25);
-            assert!(result.noise <= 1.1, "{name}, seed {seed}: {}", result.noise);
-            assert!(result.rays <= 1.1, "{name}, seed {seed}: {}", result.rays);
-        }
     }
 }

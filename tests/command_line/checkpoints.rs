@@ -1,9 +1,7 @@
 //! Checkpoints of `zerkalo render`: interrupted and resumed renders, refusals, `zerkalo info`.
 
 use super::*;
-use std::time::Duration;
-use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::film::testing::TestFilm;
+use crate::harness::*;
 
 /// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;
@@ -23,8 +21,6 @@ fn args<'a>(name: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&["render", "scene.toml", "-o", name][..], &LONG, more].concat()
 }
 
-/// Checks that a render that is killed at random moments and resumed gives the same film and the
-/// same picture as an uninterrupted one.
 #[test]
 fn killed_and_resumed_render_equals_an_uninterrupted_one() {
     let desk = Desk::new();

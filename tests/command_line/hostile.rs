@@ -2,14 +2,13 @@
 //! their folder.
 
 use super::*;
-use std::fmt::Write;
+use crate::harness::*;
 
 /// Text with control sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse
 /// the text direction.
 const EVIL: &str =
     "\u{1b}]52;c;cm0gLXJm\u{7}\u{1b}[31m\u{9b}32m\u{9d}52;c;AA\u{9c}\u{202e}\r\u{8}\u{200b}";
 
-/// Returns `true` if `text` contains control or formatting characters other than line ends.
 fn has_control_characters(text: &str) -> bool {
     text.chars().any(|c| {
         (c.is_control() && c != '\n')
@@ -24,10 +23,13 @@ fn check(what: &str, run: &Run) {
     assert!(!run.err.contains("panicked"), "{what}: {:?}", run.err);
 }
 
-/// Returns `text` as a string of TOML, with escapes.
 fn toml(text: &str) -> String {
     let escaped: String = text.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     format!("\"{escaped}\"")
+}
+
+fn with_mesh(file: &str) -> String {
+    format!("{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh.file = \"{file}\"\n")
 }
 
 #[test]
@@ -84,12 +86,7 @@ fn scene_texts_are_printed_without_control_characters() {
         ("materials", SCENE.replace("[materials.red]", &format!("[materials.{evil}]"))),
         ("a key", format!("{SCENE}\n[trace]\n{evil} = 1\n")),
         ("a word", format!("{SCENE}\n[trace]\nray_types = {evil}\n")),
-        (
-            "a mesh",
-            format!(
-                "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = {evil} }}\n"
-            ),
-        ),
+        ("a mesh", with_mesh("").replace("\"\"", &evil)),
         (
             "a view",
             format!("{SCENE}\n[cameras.{evil}]\neye = [0.0, 1.0, 0.0]\ntarget = [0.0, 0.0, 0.0]\n"),
@@ -127,10 +124,7 @@ fn mesh_texts_are_printed_without_control_characters() {
         ),
     ] {
         fs::write(desk.path(name), text).unwrap();
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{name}");
         check(name, &run);
@@ -163,17 +157,13 @@ fn scenes_read_regular_files_only() {
     let made = Command::new("mkfifo").arg(desk.path("pipe.obj")).status();
     assert!(made.unwrap().success());
     for name in ["zero.obj", "folder.obj", "pipe.obj", "/dev/stdin", "/dev/zero"] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{name}: {}", run.out);
         assert!(run.err.contains("mesh.toml:"), "{name}: {}", run.err);
     }
 }
 
-/// Checks that a scene may name files in any folder, as docs/scene-format.md says.
 #[test]
 #[cfg(unix)]
 fn scenes_name_files_anywhere() {
@@ -183,16 +173,12 @@ fn scenes_name_files_anywhere() {
     fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     std::os::unix::fs::symlink(&mesh, desk.path("scenes/link.obj")).unwrap();
     for name in ["../m.obj", "link.obj", mesh.to_str().unwrap()] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("scenes/mesh.toml"), scene).unwrap();
+        fs::write(desk.path("scenes/mesh.toml"), with_mesh(name)).unwrap();
         let run = desk.run(&["check", "scenes/mesh.toml"]);
         assert_eq!(run.status, 0, "{name}: {}", run.err);
     }
 }
 
-/// Checks that files to which a mesh file refers must be in the mesh file's folder or below it.
 #[test]
 fn files_named_by_meshes_stay_in_their_folder() {
     let desk = Desk::new();
@@ -213,17 +199,13 @@ fn files_named_by_meshes_stay_in_their_folder() {
             "scene": 0
         });
         fs::write(desk.path("meshes/m.gltf"), gltf.to_string()).unwrap();
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"meshes/m.gltf\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh("meshes/m.gltf")).unwrap();
         let run = desk.run(&["check", "mesh.toml"]);
         assert_eq!(run.status, 1, "{uri}: {}", run.out);
         assert!(run.err.contains("folder"), "{uri}: {}", run.err);
     }
 }
 
-/// Checks that excessive sizes in mesh files are refused before memory is allocated.
 #[test]
 fn sizes_are_checked_before_allocation() {
     let desk = Desk::new();
@@ -235,10 +217,7 @@ fn sizes_are_checked_before_allocation() {
     stl.extend(u32::MAX.to_le_bytes());
     fs::write(desk.path("m.stl"), stl).unwrap();
     for name in ["m.ply", "m.stl"] {
-        let scene = format!(
-            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
-        );
-        fs::write(desk.path("mesh.toml"), scene).unwrap();
+        fs::write(desk.path("mesh.toml"), with_mesh(name)).unwrap();
         // The limit of 2 GB leaves memory for the message only if the mesh is refused early.
         let program = env!("CARGO_BIN_EXE_zerkalo");
         let mut command = Command::new("sh");
@@ -285,10 +264,8 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
     let mut scenes = vec!["spheres.toml".to_string()];
     for (name, bytes) in files {
         fs::write(desk.path(name), bytes).unwrap();
-        let object = "\n[[object]]\nmaterial = \"red\"\n";
-        let scene = format!("{SCENE}{object}shape.mesh = {{ file = \"{name}\" }}\n");
         scenes.push(format!("{name}.toml"));
-        fs::write(desk.path(&scenes[scenes.len() - 1]), scene).unwrap();
+        fs::write(desk.path(&scenes[scenes.len() - 1]), with_mesh(name)).unwrap();
     }
     for scene in &scenes {
         let mut fits = false;

@@ -6,8 +6,6 @@ use super::*;
 /// Arguments of a uniform render, whose film has 7 MB for each light group.
 const UNIFORM: [&str; 5] = ["--size", "400x375", "--spp", "4", "--uniform"];
 
-/// Renders `scene` to the file `name` with at most the memory `memory` and the further arguments
-/// `more`.
 fn within(desk: &Desk, scene: &str, name: &str, memory: &str, more: &[&str]) -> Run {
     desk.run(&[&["render", scene, "-o", name, "--memory", memory], &UNIFORM[..], more].concat())
 }
@@ -100,7 +98,6 @@ fn lights_are_merged_first() {
     assert!(fs::read(desk.path("999.png")).unwrap() == fs::read(desk.path("whole.png")).unwrap());
 }
 
-/// Checks that each region of an adaptive render reaches the noise target.
 #[test]
 fn adaptive_regions_reach_the_noise_target() {
     let desk = Desk::new();

@@ -9,11 +9,10 @@ mod refusals;
 mod scale;
 mod shards;
 #[cfg(unix)]
-mod signals;
+pub mod signals;
 mod watch;
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
@@ -206,28 +205,11 @@ fn saturated_samples_are_reported_everywhere() {
 fn stats_file_has_every_key() {
     let desk = Desk::new();
     let stats = desk.stats(&["--spp", "31", "--threads", "2", "--seed", "5", "--uniform"]);
-    for key in [
-        "scene",
-        "size",
-        "seed",
-        "precision",
-        "lanes",
-        "threads",
-        "samples",
-        "spp_min",
-        "spp_mean",
-        "spp_max",
-        "seconds",
-        "samples_per_second",
-        "first_picture_seconds",
-        "noise_levels",
-        "rmse_linear",
-        "bad_samples",
-        "saturated_samples",
-        "saturated_pixels",
-        "peak_rss_bytes",
-        "stopped_by",
-    ] {
+    for key in "scene size seed precision lanes threads samples spp_min spp_mean spp_max seconds \
+         samples_per_second first_picture_seconds noise_levels rmse_linear bad_samples \
+         saturated_samples saturated_pixels peak_rss_bytes stopped_by"
+        .split(' ')
+    {
         assert!(stats.get(key).is_some(), "no {key} in {stats:#}");
     }
     assert_eq!(stats["scene"], "scene.toml");
@@ -340,23 +322,11 @@ fn help_names_every_option_and_exit_status() {
         assert!(run.out.contains(part), "no {part}");
     }
     let run = desk.run(&["render", "--help"]);
-    for option in [
-        "--output",
-        "--size",
-        "--spp",
-        "--noise",
-        "--rmse",
-        "--time",
-        "--threads",
-        "--seed",
-        "--precision",
-        "--sampler",
-        "--uniform",
-        "--bits",
-        "--exposure",
-        "--tone",
-        "--stats",
-    ] {
+    for option in
+        "--output --size --spp --noise --rmse --time --threads --seed --precision --sampler \
+         --uniform --bits --exposure --tone --stats"
+            .split(' ')
+    {
         assert!(run.out.contains(option), "no {option}");
     }
 }

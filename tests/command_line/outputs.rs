@@ -29,8 +29,6 @@ fn results_are_replaced_in_one_step() {
     assert!(desk.files().iter().all(|name| !name.ends_with(".tmp")));
 }
 
-/// Checks that an interrupted `zerkalo new` leaves no incomplete scene. A file size limit of zero
-/// ends the program at its first write.
 #[test]
 fn interrupted_new_leaves_no_incomplete_scene() {
     let desk = Desk::new();

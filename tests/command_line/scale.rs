@@ -2,7 +2,7 @@
 //! process. Growth in time is the ratio of the times of two scene sizes within one run.
 
 use super::*;
-use std::fmt::Write;
+use crate::harness::*;
 
 /// Returns the text of a scene of `count` spheres on a grid, 55 bytes for each.
 fn spheres(count: usize) -> String {
@@ -61,7 +61,6 @@ fn gltf(count: usize) -> (&'static str, Vec<u8>) {
     ("copies.gltf", text.into_bytes())
 }
 
-/// Writes a mesh file. Returns the text of a scene that shows the mesh.
 fn mesh_scene(desk: &Desk, (name, mesh): (&str, Vec<u8>)) -> String {
     fs::write(desk.path(name), mesh).unwrap();
     format!("ambient.color = [1, 1, 1]\n[[object]]\nshape.mesh.file = \"{name}\"\n")

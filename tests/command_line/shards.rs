@@ -2,9 +2,7 @@
 //! shard into a film file (a part), and `zerkalo merge` adds the parts.
 
 use crate::command_line::Desk;
-use std::fs;
-use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::film::testing::TestFilm;
+use crate::harness::*;
 
 /// Runs the program with `args`, which must succeed. Returns the program's output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {
@@ -74,7 +72,7 @@ fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
             assert!(png == one[0], "{shards} shards in order {order}: another PNG");
         }
         assert!(merge(&desk, &parts, "merged.exr") == one[1], "{shards} shards: another EXR");
-        // Film files of shards (parts) can also be merged in several steps.
+        // Film files of shards can also be merged in several steps.
         let (first, rest) = parts.split_at(parts.len() / 2);
         let args = ["merge", "--partial", "-o", "half.zk"];
         done(&desk, &[&args[..], &first.iter().map(String::as_str).collect::<Vec<_>>()].concat());

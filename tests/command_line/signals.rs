@@ -1,8 +1,8 @@
 //! Reactions of commands to SIGINT and SIGTERM, which tests send by `kill`.
 
 use super::*;
+use crate::harness::*;
 use std::process::Child;
-use std::time::{Duration, Instant};
 
 pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
@@ -43,7 +43,7 @@ pub fn wait_for_file(path: &Path) {
 /// Starts the program and waits until it handles SIGTERM and SIGINT: until it has threads that
 /// trace, which it starts after its handlers are complete. The system already reports a signal as
 /// caught (`SigCgt`) a moment before the handler knows what to do, and a signal is lost then.
-pub fn spawn(desk: &Desk, args: &[&str]) -> Child {
+pub(super) fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_status(child.id(), "Threads:", 10, |threads| threads > 1);
@@ -68,21 +68,13 @@ fn signal_saves_the_picture_so_far() {
 }
 
 /// Checks that a second signal ends the program at once. After the first signal alone, the program
-/// would write the picture when the wave (the set of concurrent tracing jobs) ends, minutes later.
+/// would write the picture when the wave ends, minutes later.
 #[test]
 fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();
-    let args = [
-        "render",
-        "scene.toml",
-        "-o",
-        "a.png",
-        "--size",
-        "4096x4096",
-        "--uniform",
-        "--spp",
-        "9999",
-    ];
+    let args = "render scene.toml -o a.png --size 4096x4096 --uniform --spp 9999"
+        .split(' ')
+        .collect::<Vec<_>>();
     let child = spawn(&desk, &args);
     signal("INT", child.id());
     // The first signal must be delivered before the second is sent, because two pending SIGINTs

@@ -1,14 +1,10 @@
-//! Files that `zerkalo watch` reads: film files of shards (parts), checkpoints, and files that
-//! change, vanish or are damaged.
+//! Files that `zerkalo watch` reads: film files of shards, checkpoints, and files that change,
+//! vanish or are damaged.
 
 use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
-use std::fs;
-use std::path::PathBuf;
-use std::time::{Duration, SystemTime};
-use zerkalo_render::film::Film;
-use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::film::testing::TestFilm;
+use crate::harness::*;
+use std::time::SystemTime;
 use zerkalo_render::plan::{WatchedFilms, WatchedShards, WatchedState};
 
 fn open(desk: &Desk, names: &[&str]) -> Result<WatchedFilms, String> {
@@ -191,14 +187,11 @@ fn next_round_is_watched_with_the_merged_film_of_the_first() {
     let films = open(&desk, &["next.plan", "merged.zk"]).unwrap();
     assert_eq!(films.complete_shards(), Some([2, 3]));
     assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
-    // Without the base (the film that the plan continues) the picture has the samples of the shard
-    // only.
+    // Without the base the picture has the samples of the shard only.
     let alone = open(&desk, &["next.plan"]).unwrap();
     assert!(alone.film().unwrap().bytes() == film(&desk, "next-1.zk").bytes());
 }
 
-/// Checks that damaged files are left out. Whatever a watched file contains, nothing panics, and
-/// the displayed film is the sum of the undamaged files.
 #[test]
 fn damaged_files_are_left_out() {
     let desk = Desk::new();

@@ -1,7 +1,6 @@
 //! Closed forms of the irradiance by spheres, polygons and disks.
 
-use glam::DVec3;
-use std::f64::consts::PI;
+use crate::harness::*;
 
 /// Returns the irradiance by a sphere of unit radiance on a surface at the origin with the given
 /// normal. The surface is outside of the sphere.

@@ -1,31 +1,12 @@
 //! Irradiance by spheres, rectangles and disks on matt surfaces, with and without an occluder.
 
 use crate::emitters::forms;
-use crate::emitters::setup::{array, check, scene};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_scene::Scene;
+use crate::harness::*;
 
-/// Allowed relative rounding errors in single and double precision. They arise because lights are
-/// lifted off surfaces and rays start above surfaces.
-const ROUNDING: [f64; 2] = [1e-4, 1e-9];
-
-/// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by the
-/// light `light`, which the camera does not see. `rest` is the text of further objects.
-fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
-    scene(&format!(
-        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
-         [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
-         [materials.black]\ndiffuse = 0.0\nspecular = 0.0\nambient = 0.0\n\
-         [[light]]\nvisible = false\n{light}\n\
-         [[object]]\nmaterial = \"white\"\n\
-         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
-        eye = array(normal * 0.01),
-        direction = array(-normal),
-        up = array(normal.any_orthonormal_vector()),
-        normal = array(normal),
-    ))
+/// Returns the scene of a white diffuse receiver that is lit by the light `light`, which the camera
+/// does not see. `rest` is the text of further objects.
+fn lit(normal: DVec3, light: &str, rest: &str) -> Scene {
+    receiver(normal, WHITE, &format!("[[light]]\nvisible = false\n{light}\n{rest}"))
 }
 
 /// Returns name, scene, and expected radiance of the receiver, which is `irradiance` / pi.
@@ -46,22 +27,12 @@ fn irradiance_of_a_sphere_light_is_the_closed_form() {
             let light = format!("sphere = {{ center = {}, radius = {radius} }}", array(center));
             cases.push(case(
                 format!("{distance} radii away at {degrees} degrees"),
-                receiver(normal, &light, ""),
+                lit(normal, &light, ""),
                 forms::sphere(center, radius, normal),
             ));
         }
     }
-    check(&cases, 1 << 15, ROUNDING);
-}
-
-#[test]
-fn receiver_inside_a_sphere_light_is_lit_from_all_sides() {
-    let normal = DVec3::Y;
-    let light = |center: DVec3| format!("sphere = {{ center = {}, radius = 0.5 }}", array(center));
-    let cases: Vec<_> = [DVec3::ZERO, DVec3::new(0.3, 0.2, 0.1), DVec3::Y * -0.499]
-        .map(|center| case(format!("{center}"), receiver(normal, &light(center), ""), PI))
-        .into();
-    check(&cases, 1 << 15, ROUNDING);
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
 /// Returns the description of a rectangular light, and its corners.
@@ -101,13 +72,13 @@ fn irradiance_of_a_rectangle_light_is_lamberts_formula() {
             let (light, corners) = rectangle(center, size, towards);
             cases.push(case(
                 format!("{center}, {size:?}, tilt {tilt}"),
-                receiver(normal, &light, ""),
+                lit(normal, &light, ""),
                 forms::polygon(&corners, normal),
             ));
         }
     }
     assert!(cases.len() > 12);
-    check(&cases, 1 << 15, ROUNDING);
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
 #[test]
@@ -123,22 +94,21 @@ fn irradiance_of_a_disk_light_is_the_closed_form() {
             );
             let expected = forms::parallel_disk(radius, height, aside);
             let name = format!("height {height}, {aside} aside");
-            cases.push(case(name, receiver(normal, &light, ""), expected));
+            cases.push(case(name, lit(normal, &light, ""), expected));
         }
     }
-    check(&cases, 1 << 15, ROUNDING);
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
 #[test]
 fn flat_lights_shine_from_one_side_only() {
     for shape in ["rectangle = { size = [1.0, 1.0], ", "disk = { radius = 1.0, "] {
-        for (normal, lit) in [(-1.0, true), (1.0, false)] {
+        for (normal, front) in [(-1.0, true), (1.0, false)] {
             let light =
                 format!("{shape}center = [0.0, 1.0, 0.0], normal = [0.0, {normal:?}, 0.0] }}");
-            let scene = receiver(DVec3::Y, &light, "");
-            let (mean, _) =
-                crate::emitters::setup::radiance::<zerkalo_kernel::lanes::Single>(&scene, 64, 1);
-            assert_eq!(mean > 0.0, lit, "{light}");
+            let scene = lit(DVec3::Y, &light, "");
+            let (mean, _) = radiance::<Single>(&scene, 64, 1);
+            assert_eq!(mean > 0.0, front, "{light}");
         }
     }
 }
@@ -149,7 +119,7 @@ fn flat_lights_shine_from_one_side_only() {
 #[test]
 fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
-    let cases: Vec<_> = [-0.45, -0.3, -0.15, 0.0, 0.1, 0.24, 0.4]
+    let mut cases: Vec<_> = [-0.45, -0.3, -0.15, 0.0, 0.1, 0.24, 0.4]
         .map(|edge| {
             let cover = format!(
                 "[[object]]\nmaterial = \"black\"\n\
@@ -159,10 +129,15 @@ fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
             // Directions to the light with x / y > edge pass.
             let plane = DVec3::new(1.0, -edge, 0.0);
             let expected = forms::polygon(&forms::clipped(&corners, plane), DVec3::Y);
-            case(format!("edge at {edge}"), receiver(DVec3::Y, &light, &cover), expected)
+            case(format!("edge at {edge}"), lit(DVec3::Y, &light, &cover), expected)
         })
         .into();
-    check(&cases, 1 << 15, ROUNDING);
+    // A light in a ceiling.
+    let ceiling = "[[object]]\nmaterial = \"black\"\n\
+                   shape.platform = { center = [0.0, 2.0, 0.0], size = [20.0, 20.0] }\n";
+    let expected = forms::polygon(&corners, DVec3::Y);
+    cases.push(case("ceiling".into(), lit(DVec3::Y, &light, ceiling), expected));
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
 /// Returns the description of a sun that shines downwards with an angular diameter in degrees.
@@ -185,10 +160,10 @@ fn irradiance_of_a_sun_is_independent_of_its_angle() {
                 false => forms::sphere(DVec3::Y, sin.min(1.0 - 1e-12), normal) / (sin * sin),
             };
             let name = format!("{angle} degrees at {tilt}");
-            cases.push(case(name, receiver(normal, &sun(angle), ""), expected));
+            cases.push(case(name, lit(normal, &sun(angle), ""), expected));
         }
     }
-    check(&cases, 1 << 15, ROUNDING);
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
 /// Checks the penumbra of a black half-plane that faces the sun. The receiver sees the part of a disk
@@ -208,11 +183,11 @@ fn penumbra_of_a_sun_is_the_part_of_a_disk_beyond_a_chord() {
             let cut = chord.clamp(-1.0, 1.0);
             let visible = (cut.acos() - cut * (1.0 - cut * cut).sqrt()) / PI;
             let name = format!("{angle} degrees, edge at {chord} of the penumbra, height {height}");
-            cases.push(case(name, receiver(DVec3::Y, &sun(angle), &cover), PI * visible));
+            cases.push(case(name, lit(DVec3::Y, &sun(angle), &cover), PI * visible));
         }
     }
     // Straight edges are chords of the disk if its angle is small.
-    check(&cases, 1 << 14, [1e-3, 1e-3]);
+    check_means(&cases, 1 << 14, [1e-3, 1e-3]);
 }
 
 /// Checks that the irradiance by a light of 1 W does not depend on the light's size. A faraway
@@ -229,10 +204,10 @@ fn power_is_independent_of_the_size() {
                 "unit = \"power\"\n{kind}center = [0.0, 1000.0, 0.0], radius = {radius:?} }}"
             );
             let name = format!("{kind} {radius}");
-            cases.push(case(name, receiver(DVec3::Y, &light, ""), intensity * 1e-6));
+            cases.push(case(name, lit(DVec3::Y, &light, ""), intensity * 1e-6));
         }
     }
-    check(&cases, 1 << 10, [1e-4, 1e-5]);
+    check_means(&cases, 1 << 10, [1e-4, 1e-5]);
 }
 
 /// Checks lights that touch the receiver's surface, and lights far larger or smaller than the
@@ -244,33 +219,19 @@ fn tiny_and_huge_lights_keep_their_irradiance() {
         let center = DVec3::Y * f64::max(2.0 * radius, 1.0);
         let light = format!("sphere = {{ center = {}, radius = {radius:?} }}", array(center));
         let expected = forms::sphere(center, radius, DVec3::Y);
-        cases.push(case(
-            format!("sphere of radius {radius}"),
-            receiver(DVec3::Y, &light, ""),
-            expected,
-        ));
+        cases.push(case(format!("sphere of radius {radius}"), lit(DVec3::Y, &light, ""), expected));
         let (light, corners) = rectangle(DVec3::Y, [radius, radius], -DVec3::Y);
         let expected = forms::polygon(&corners, DVec3::Y);
         let name = format!("square of side {radius}");
-        cases.push(case(name, receiver(DVec3::Y, &light, ""), expected));
+        cases.push(case(name, lit(DVec3::Y, &light, ""), expected));
     }
     // A sphere that rests on the receiver, and a vertical rectangle that stands on it.
     let center = DVec3::new(0.3, 0.25, 0.0);
     let light = format!("sphere = {{ center = {}, radius = 0.25 }}", array(center));
     let expected = forms::sphere(center, 0.25, DVec3::Y);
-    cases.push(case("resting sphere".into(), receiver(DVec3::Y, &light, ""), expected));
+    cases.push(case("resting sphere".into(), lit(DVec3::Y, &light, ""), expected));
     let (light, corners) = rectangle(DVec3::new(0.2, 0.5, 0.0), [1.0, 1.0], -DVec3::X);
     let expected = forms::polygon(&corners, DVec3::Y);
-    cases.push(case("standing rectangle".into(), receiver(DVec3::Y, &light, ""), expected));
-    check(&cases, 1 << 15, [1e-3, 1e-6]);
-}
-
-/// Checks that a light that lies in the surface of a ceiling is not covered by the ceiling.
-#[test]
-fn light_in_a_ceiling_shines_into_the_room() {
-    let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
-    let ceiling = "[[object]]\nmaterial = \"black\"\n\
-                   shape.platform = { center = [0.0, 2.0, 0.0], size = [20.0, 20.0] }\n";
-    let scene = receiver(DVec3::Y, &light, ceiling);
-    check(&[case("lit".into(), scene, forms::polygon(&corners, DVec3::Y))], 1 << 15, ROUNDING);
+    cases.push(case("standing rectangle".into(), lit(DVec3::Y, &light, ""), expected));
+    check_means(&cases, 1 << 15, [1e-3, 1e-6]);
 }

@@ -1,16 +1,7 @@
 //! Scenes with many point lights, of which each path samples only a few. The mean radiance is
 //! compared with the sum over all lights.
 
-use crate::common::Numbers;
-use crate::common::normal::two_sided_z;
-use crate::emitters::setup::{array, check, mean_and_error, radiance, samples, scene};
-use crate::support::{begin, pool, settings, trace};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_kernel::lanes::{Double, Single};
-use zerkalo_render::schedule::{Step, Stop, StoppedBy};
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;
@@ -25,22 +16,10 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
     (0..count).map(position).collect()
 }
 
-/// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit
-/// intensity. Every third light has no falloff.
-fn receiver(lights: &[DVec3]) -> Scene {
-    scene(&receiver_text(lights, |_| 1.0))
-}
-
-/// Returns the text of the scene of [`receiver`], in which light `i` has the intensity
-/// `intensity(i)`.
-fn receiver_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
-    let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
-         view_angle.vertical = 0.1\n\
-         [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
-         [[object]]\nmaterial = \"white\"\n\
-         shape.platform = { center = [0.0, 0.0, 0.0], size = [0.01, 0.01] }\n"
-        .to_string();
+/// Returns the text of a white diffuse receiver that faces up. Light `i` has the intensity
+/// `intensity(i)`; every third light has no falloff.
+fn lit_text(lights: &[DVec3], intensity: impl Fn(usize) -> f64) -> String {
+    let mut text = receiver_text(DVec3::Y, WHITE, "");
     for (i, position) in lights.iter().enumerate() {
         let falloff = if i.is_multiple_of(3) { "none" } else { "inverse-square" };
         text += &format!(
@@ -58,38 +37,27 @@ fn expected(i: usize, position: DVec3) -> f64 {
     irradiance * (position.y / position.length()).max(0.0) / PI
 }
 
+/// Checks lights of equal and of very different intensities. The brightest are sampled by all paths,
+/// and each path samples a few of the others.
 #[test]
 fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
-    let mut numbers = Numbers::new(22);
-    let mut cases = Vec::new();
-    for count in [CHOSEN, 23, 24, 33, 64, 100, 191, 1000] {
-        let lights = positions(count, &mut numbers);
-        let sum = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
-        cases.push((format!("{count} lights"), receiver(&lights), sum));
-    }
-    check(&cases, 1 << 15, [1e-4, 1e-9]);
-}
-
-/// Checks lights of very different intensities: the brightest are sampled by all paths, and each
-/// path samples a few of the others.
-#[test]
-fn irradiance_of_bright_and_dim_lights_is_the_sum_over_all_lights() {
     let mut numbers = Numbers::new(31);
     let mut cases = Vec::new();
-    for count in [CHOSEN, 33, 64, 1000] {
-        for bright in [1, 3, 9] {
+    for count in [CHOSEN, 23, 24, 33, 64, 100, 191, 1000] {
+        for bright in [0, 1, 3, 9] {
             let lights = positions(count, &mut numbers);
-            let intensity = |i: usize| match i % (count / bright) == 1 {
-                true => 40.0,
-                false => 0.002 * (1 + i % 50) as f64,
+            let intensity = |i: usize| match bright {
+                0 => 1.0,
+                _ if i % (count / bright) == 1 => 40.0,
+                _ => 0.002 * (1 + i % 50) as f64,
             };
             let light = |(i, position): (usize, &DVec3)| intensity(i) * expected(i, *position);
             let sum = lights.iter().enumerate().map(light).sum();
-            let scene = scene(&receiver_text(&lights, intensity));
-            cases.push((format!("{count} lights, {bright} of them bright"), scene, sum));
+            let scene = parsed(&lit_text(&lights, intensity));
+            cases.push((format!("{count} lights, {bright} brighter than the others"), scene, sum));
         }
     }
-    check(&cases, 1 << 15, [1e-4, 1e-9]);
+    check_means(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
 /// Returns the text of a spot light at `position` with the axis `axis`, and the radiance of the
@@ -116,7 +84,7 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
     let mut cases = Vec::new();
     for (points, spots) in [(0, 20), (0, 33), (0, 600), (CHOSEN, 20), (3, 64), (100, 29)] {
         let points = positions(points, &mut numbers);
-        let mut text = receiver_text(&points, |_| 1.0);
+        let mut text = lit_text(&points, |_| 1.0);
         let mut sum: f64 = points.iter().enumerate().map(|(i, light)| expected(i, *light)).sum();
         for position in positions(spots, &mut numbers) {
             let axis = numbers.in_cube(1.0) - position.normalize();
@@ -124,9 +92,9 @@ fn irradiance_of_chosen_spots_is_the_sum_over_all_lights() {
             text += &spot;
             sum += radiance;
         }
-        cases.push((format!("{} points, {spots} spots", points.len()), scene(&text), sum));
+        cases.push((format!("{} points, {spots} spots", points.len()), parsed(&text), sum));
     }
-    check(&cases, 1 << 16, [2e-4, 1e-9]);
+    check_means(&cases, 1 << 16, [2e-4, 1e-9]);
 }
 
 /// Checks the limit up to which each path samples all spot lights, although it samples only a few
@@ -138,11 +106,11 @@ fn few_spots_among_many_points_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
     // A cone of 80 degrees has 0.826 times the solid angle of a hemisphere.
     for (spots, is_chosen) in [(19, false), (20, true)] {
-        let mut text = receiver_text(&lights, |_| 1e-30);
+        let mut text = lit_text(&lights, |_| 1e-30);
         for position in positions(spots, &mut Numbers::new(4)) {
             text += &spot(position, -position).0;
         }
-        let (_, error) = radiance::<Double>(&scene(&text), 64, 1);
+        let (_, error) = radiance::<Double>(&parsed(&text), 64, 1);
         assert_eq!(error > 1e-6, is_chosen, "{spots} spots: {error}");
     }
 }
@@ -169,8 +137,8 @@ fn samples_to_half_a_level(lights: &[f64]) -> f64 {
         text += &format!("[[light]]\npoint = {{ position = {position} }}\nfalloff = \"none\"\n");
         text += &format!("intensity = {intensity:?}\n");
     }
-    let mut rendering = begin(&scene(&text), 4, Precision::Auto);
-    let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
+    let mut rendering = begin(&parsed(&text), 4, Precision::Auto);
+    let stop = noise_stop(0.5);
     let mut schedule = rendering.schedule(settings(true, 0, stop));
     let pool = pool(2);
     loop {
@@ -209,22 +177,14 @@ fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
     let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
                 inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
-    let scene = scene(&(receiver_text(&lights, |_| 1.0) + spot));
-    let count = 1 << 16;
-    let mut sums: Vec<(f64, f64)> = Vec::new();
-    samples::<Single>(&scene, count, 5, |groups| {
-        sums.resize(groups.len(), (0.0, 0.0));
-        for ((sum, squares), sample) in sums.iter_mut().zip(groups) {
-            *sum += sample;
-            *squares += sample * sample;
-        }
-    });
+    let scene = parsed(&(lit_text(&lights, |_| 1.0) + spot));
     let of_points = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
     let expected = [0.25 / PI, of_points];
-    assert_eq!(sums.len(), expected.len());
-    let limit = two_sided_z(1e-3 / sums.len() as f64);
-    for ((sum, squares), expected) in sums.into_iter().zip(expected) {
-        let (mean, error) = mean_and_error(sum, squares, count);
+    let mut means = group_means::<Single>(&scene, 1 << 16, 5);
+    means.pop();
+    assert_eq!(means.len(), expected.len());
+    let limit = two_sided_z(1e-3 / means.len() as f64);
+    for ((mean, error), expected) in means.into_iter().zip(expected) {
         let off = (mean - expected).abs() - 1e-4 * expected;
         assert!(off <= limit * error, "{mean} ± {error}, expected {expected}");
     }
@@ -235,13 +195,12 @@ fn chosen_lights_have_one_light_group() {
 #[test]
 fn few_lights_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
-    let (_, error) = radiance::<Double>(&receiver(&lights[1..]), 64, 1);
+    let (_, error) = radiance::<Double>(&parsed(&lit_text(&lights[1..], |_| 1.0)), 64, 1);
     assert!(error < 1e-9, "{error}");
-    let (_, error) = radiance::<Double>(&receiver(&lights), 64, 1);
+    let (_, error) = radiance::<Double>(&parsed(&lit_text(&lights, |_| 1.0)), 64, 1);
     assert!(error > 1e-3, "{error}");
 }
 
-/// Checks that lights at one place, on surfaces, far away and very near give finite samples.
 #[test]
 fn a_thousand_lights_at_extreme_places_have_finite_samples() {
     let mut lights = positions(1000, &mut Numbers::new(11));
@@ -254,7 +213,7 @@ fn a_thousand_lights_at_extreme_places_have_finite_samples() {
             _ => {}
         }
     }
-    let scene = receiver(&lights);
+    let scene = parsed(&lit_text(&lights, |_| 1.0));
     for (mean, error) in
         [radiance::<Single>(&scene, 1 << 12, 1), radiance::<Double>(&scene, 1 << 12, 2)]
     {

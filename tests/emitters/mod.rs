@@ -6,4 +6,3 @@ mod many;
 mod mirrors;
 mod objects;
 mod on_surfaces;
-pub(crate) mod setup;

@@ -1,39 +1,7 @@
 //! Light of emissive objects: closed forms, agreement with lights of the same size, white furnaces.
 
-use crate::common::normal::two_sided_z;
 use crate::emitters::forms;
-use crate::emitters::setup::{array, check, radiance, scene};
-use glam::{DMat3, DVec3};
-use std::f64::consts::PI;
-use std::fs;
-use zerkalo_kernel::lanes::{Double, Single};
-use zerkalo_scene::Scene;
-
-/// Allowed relative rounding errors in single and double precision. They arise because sampled
-/// points are lifted off the emitter and rays start above the receiver.
-pub const ROUNDING: [f64; 2] = [1e-4, 1e-9];
-
-/// Returns the scene of a camera that looks at a receiver at the origin. `white` is the text of the
-/// receiver's material. `rest` is the text of further objects; they may have the materials `lamp`
-/// (black and emissive), `front` (the same, one-sided) and `black`.
-pub fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
-    scene(&format!(
-        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-         [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
-         [materials.white]\n{white}\n\
-         [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
-         [materials.lamp]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\n\
-         [materials.front]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\ntwo_sided = false\n\
-         [[object]]\nmaterial = \"white\"\n\
-         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
-        eye = array(normal * 0.01),
-        direction = array(-normal),
-        up = array(normal.any_orthonormal_vector()),
-        normal = array(normal),
-    ))
-}
-
-pub const MATT: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
+use crate::harness::*;
 
 pub fn object(material: &str, shape: &str) -> String {
     format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
@@ -85,7 +53,7 @@ pub fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
 fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let mut cases = Vec::new();
     let mut case = |name: String, normal: DVec3, rest: String, irradiance: f64| {
-        cases.push((name, receiver(normal, MATT, &rest), irradiance / PI));
+        cases.push((name, receiver(normal, WHITE, &rest), irradiance / PI));
     };
     for (i, (center, size)) in [
         (DVec3::Y, [1.0, 0.7]),
@@ -160,11 +128,9 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             );
         }
     }
-    check(&cases, 1 << 15, ROUNDING);
+    check_means(&cases, 1 << 15, ROUNDING);
 }
 
-/// Checks an emissive box that stands on a surface. The box's lower face must light nothing behind
-/// the surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let turned = "transform = [{ rotate_y = 30.0 }]\n";
@@ -178,16 +144,16 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     ];
     let dark = floors.map(|floor| {
         let rest = object("black", floor) + turned + &lamp + turned;
-        (floor.to_string(), receiver(DVec3::Y, MATT, &rest), 0.0)
+        (floor.to_string(), receiver(DVec3::Y, WHITE, &rest), 0.0)
     });
-    check(&dark, 4096, ROUNDING);
+    check_means(&dark, 4096, ROUNDING);
     let (_, corners) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.4, 0.3]);
     // A floor that is smaller than the face covers a part of it.
     let small = "shape.platform = { center = [0.1, 1.0, 0.0], size = [0.2, 0.1] }";
     let (_, covered) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.2, 0.1]);
     let seen = forms::polygon(&corners, DVec3::Y) - forms::polygon(&covered, DVec3::Y);
-    let partly = receiver(DVec3::Y, MATT, &(object("black", small) + &lamp));
-    check(&[("a part of the face".to_string(), partly, seen / PI)], 1 << 14, ROUNDING);
+    let partly = receiver(DVec3::Y, WHITE, &(object("black", small) + &lamp));
+    check_means(&[("a part of the face".to_string(), partly, seen / PI)], 1 << 14, ROUNDING);
     // Shadow rays end at glass, even if the glass stands on the lamp.
     let glass = "[materials.glass]\ncolor = [0.0, 0.0, 0.0]\ntransmission = 1.0\n".to_string();
     let block = "shape.box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
@@ -198,9 +164,9 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     ]
     .map(|shape| {
         let rest = glass.clone() + &object("glass", block) + &object("lamp", shape);
-        (format!("glass on {shape}"), receiver(DVec3::NEG_Y, MATT, &rest), 0.0)
+        (format!("glass on {shape}"), receiver(DVec3::NEG_Y, WHITE, &rest), 0.0)
     });
-    check(&inside, 4096, ROUNDING);
+    check_means(&inside, 4096, ROUNDING);
     // The lamp's lower face is in the plane of a rotated square. The face is within the square's
     // bounding box, but beside the square.
     let beside =
@@ -208,47 +174,25 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let square =
         object("black", "shape.platform = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0] }")
             + "transform = [{ rotate_y = 45.0 }, { translate = [1.2, 1.0, 0.0] }]\n";
-    let alone = receiver(DVec3::Y, MATT, &beside);
-    let with_square = receiver(DVec3::Y, MATT, &(square + &beside));
-    agree("box beside a square", &alone, &with_square, 4096);
+    let alone = receiver(DVec3::Y, WHITE, &beside);
+    let with_square = receiver(DVec3::Y, WHITE, &(square + &beside));
+    means_agree("box beside a square", &alone, &with_square, 4096);
 }
 
-/// Checks that a flat emissive object emits on both sides if its material is two-sided, and only on
-/// its front if its material is one-sided.
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);
     let upward = text.replace("normal = [0.0, -1.0, 0.0]", "normal = [0.0, 1.0, 0.0]");
     let expected = forms::polygon(&corners, DVec3::Y) / PI;
     let scene =
-        |material: &str| receiver(DVec3::Y, MATT, &object(material, &format!("shape.{upward}")));
+        |material: &str| receiver(DVec3::Y, WHITE, &object(material, &format!("shape.{upward}")));
     let cases = [
         ("two-sided".to_string(), scene("lamp"), expected),
         ("one-sided".to_string(), scene("front"), 0.0),
     ];
-    check(&cases, 1 << 14, ROUNDING);
+    check_means(&cases, 1 << 14, ROUNDING);
 }
 
-/// Checks that the mean radiances of the scenes `a` and `b`, each over `count` samples, differ by
-/// no more than chance explains.
-pub fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
-    for (precision, rounding) in ["single", "double"].into_iter().zip(ROUNDING) {
-        let mean = |scene: &Scene, seed| match precision {
-            "single" => radiance::<Single>(scene, count, seed),
-            _ => radiance::<Double>(scene, count, seed),
-        };
-        let ((a, a_error), (b, b_error)) = (mean(a, 1), mean(b, 2));
-        let off = (a - b).abs() - rounding * a;
-        assert!(a > 0.0, "{name}: black");
-        assert!(
-            off <= two_sided_z(1e-5) * a_error.hypot(b_error),
-            "{name}, {precision} precision: {a} ± {a_error} and {b} ± {b_error}"
-        );
-    }
-}
-
-/// Checks rough mirrors, which combine sampled points with reflected rays. For each lobe, the
-/// reflected light of an emissive object equals that of a light of the same size.
 #[test]
 fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let center = DVec3::new(0.15, 0.7, 0.0);
@@ -264,66 +208,23 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             let light = |shape: &str| receiver(DVec3::Y, &mirror, &format!("[[light]]\n{shape}\n"));
             let lamp = |shape: &str| receiver(DVec3::Y, &mirror, &object("lamp", shape));
             let name = format!("{lobe} {roughness}");
-            agree(&name, &light(&text), &lamp(&format!("shape.{text}")), 1 << 14);
-            agree(&name, &light(&text), &lamp(&two), 1 << 14);
-            agree(&name, &light(&text), &lamp(&many), 1 << 14);
-            agree(&name, &light(&sphere), &lamp(&format!("shape.{sphere}")), 1 << 14);
+            means_agree(&name, &light(&text), &lamp(&format!("shape.{text}")), 1 << 14);
+            means_agree(&name, &light(&text), &lamp(&two), 1 << 14);
+            means_agree(&name, &light(&text), &lamp(&many), 1 << 14);
+            means_agree(&name, &light(&sphere), &lamp(&format!("shape.{sphere}")), 1 << 14);
         }
     }
 }
 
-/// Checks that white objects inside of a closed surface of radiance 1 have the radiance 1. The
-/// emission is found by sampled points, by rays, or by both. If no points of the emissive surface
-/// are sampled, matt objects need a diffuse bounce.
-#[test]
-fn furnace_of_emissive_walls_shows_white() {
-    let walls = [
-        ("sphere = { center = [0.1, 0.2, 0.0], radius = 2.0 }", true),
-        ("box = { center = [0.1, 0.2, 0.0], size = [2.0, 3.0, 2.5] }", true),
-        (
-            "mesh = { file = \"\", normals = \"flat\" }\ntransform = [{ scale = 4.0 }, { translate = [0.0, -2.0, 0.0] }]",
-            true,
-        ),
-        ("cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.5, 0.0], radius = 1.2 }", false),
-        (
-            "torus = { center = [0.0, 0.0, 2.0], axis = [0.0, 1.0, 0.0], ring = 2.0, tube = 0.8 }",
-            false,
-        ),
-    ];
-    let mut cases = Vec::new();
-    for (shape, sampled) in walls {
-        let mut add = |name: &str, white: &str, bounces: u32| {
-            let rest = object("lamp", &format!("shape.{shape}"));
-            let mut scene = receiver(DVec3::Y, white, &rest);
-            scene.trace.max_diffuse_depth = bounces;
-            cases.push((format!("{name} in {shape}"), scene, 1.0));
-        };
-        if sampled {
-            add("matt", MATT, 0);
-        }
-        add("matt with a bounce", MATT, 1);
-        add("cone lobe", "color = [0.0, 0.0, 0.0]\nreflection = 1.0\nroughness = 0.3", 0);
-        add("mirror", "color = [0.0, 0.0, 0.0]\nreflection = 1.0", 0);
-        add(
-            "glass",
-            "color = [0.0, 0.0, 0.0]\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"",
-            0,
-        );
-    }
-    check(&cases, 1 << 14, [1e-4, 1e-6]);
-}
-
-/// Checks shadows inside of an emissive sphere. A black platform hides a part of the wall from the
-/// receiver.
 #[test]
 fn inside_of_an_emissive_sphere_has_shadows() {
     // A black square above the receiver, larger than the sphere.
     let cover =
         object("black", "shape.platform = { center = [0.0, 0.5, 0.0], size = [100.0, 100.0] }");
     let wall = object("lamp", "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 2.0 }");
-    let scene = receiver(DVec3::Y, MATT, &(cover + &wall));
+    let scene = receiver(DVec3::Y, WHITE, &(cover + &wall));
     // The receiver sees the wall below the cover. This is a band of directions from the horizon up
     // to the elevation of the circle in which the cover cuts the sphere.
     let cos2 = 0.25 / 4.0;
-    check(&[("band".to_string(), scene, cos2)], 1 << 15, [1e-3, 1e-6]);
+    check_means(&[("band".to_string(), scene, cos2)], 1 << 15, [1e-3, 1e-6]);
 }

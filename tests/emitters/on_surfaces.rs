@@ -2,11 +2,8 @@
 //! and light the scene as with a vanishing gap.
 
 use crate::emitters::forms;
-use crate::emitters::objects::{MATT, ROUNDING, agree, mesh, object, receiver, rectangle};
-use crate::emitters::setup::{array, check, scene};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_scene::Scene;
+use crate::emitters::objects::{mesh, object, rectangle};
+use crate::harness::*;
 
 /// Centre of the lamps on ceilings, and their size.
 const LAMP: (DVec3, [f64; 2]) = (DVec3::new(0.2, 2.0, 0.1), [1.0, 0.7]);
@@ -20,7 +17,7 @@ fn look(eye: DVec3, target: DVec3, rest: &str) -> Scene {
 
 /// Returns the scene of [`look`] for a camera with the given angle of view in degrees.
 fn look_through(degrees: f64, eye: DVec3, target: DVec3, rest: &str) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "[film]\nsize = [1, 1]\n\
          [camera]\neye = {}\ntarget = {}\nup = [0.1, 0.2, 0.9]\nview_angle.vertical = {degrees:?}\n\
          [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
@@ -69,12 +66,12 @@ fn lights_on_planes_are_visible_and_light_the_scene() {
             let irradiance = forms::polygon(&corners, DVec3::Y);
             cases.push((
                 format!("floor below {text}"),
-                receiver(DVec3::Y, MATT, &lit),
+                receiver(DVec3::Y, WHITE, &lit),
                 irradiance / PI,
             ));
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
 /// Returns a box between two corners as six quadrilaterals, counter-clockwise as seen from outside.
@@ -114,7 +111,6 @@ fn rooms() -> Vec<String> {
     ]
 }
 
-/// Checks flat emissive objects on the ceiling of a room, or on the lower side of a slab.
 #[test]
 fn emissive_sheets_on_ceilings_are_visible_and_light_the_room() {
     let (center, size) = LAMP;
@@ -130,13 +126,13 @@ fn emissive_sheets_on_ceilings_are_visible_and_light_the_room() {
                     let target = center + DVec3::new(0.1, 0.0, 0.05);
                     let eye = DVec3::new(0.3, 0.4, -0.5);
                     cases.push((format!("look: {objects}"), look(eye, target, &objects), 1.0));
-                    let lit = receiver(DVec3::Y, MATT, &objects);
+                    let lit = receiver(DVec3::Y, WHITE, &objects);
                     cases.push((format!("lit: {objects}"), lit, irradiance / PI));
                 }
             }
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
 /// Checks that rays which hit an emissive sheet on a ceiling and points sampled on it agree: glossy
@@ -153,7 +149,7 @@ fn reflections_of_emissive_sheets_on_ceilings_are_the_limit_of_a_gap() {
             let objects = object("black", &room) + &object("lamp", &format!("shape.{text}"));
             receiver(DVec3::Y, &glossy, &objects)
         };
-        agree(&room, &scene(0.0), &scene(1e-4), 1 << 14);
+        means_agree(&room, &scene(0.0), &scene(1e-4), 1 << 14);
     }
 }
 
@@ -180,7 +176,7 @@ fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
             let lit = forms::polygon(&corners, DVec3::Y) / PI;
             cases.push((
                 format!("{material} below {block}"),
-                receiver(DVec3::Y, MATT, &objects),
+                receiver(DVec3::Y, WHITE, &objects),
                 lit,
             ));
             let eye = DVec3::new(0.3, 0.1, 0.4);
@@ -196,11 +192,9 @@ fn emissive_sheets_on_the_outside_of_solids_light_the_outside() {
             cases.push((format!("{material} behind {block}"), look(eye, image, &objects), 1.0));
         }
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }
 
-/// Checks that an emissive sheet on another sheet shows on the side of the eye, and lights nothing
-/// on the other side.
 #[test]
 fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
     let lamp = object("lamp", "shape.platform = { center = [0.0, 1.0, 0.0], size = [1.0, 1.0] }");
@@ -213,7 +207,7 @@ fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
         }
         let (_, corners) = rectangle(DVec3::Y, [1.0, 1.0]);
         let lit = forms::polygon(&corners, DVec3::Y) / PI;
-        cases.push((format!("lit: {objects}"), receiver(DVec3::Y, MATT, &objects), lit));
+        cases.push((format!("lit: {objects}"), receiver(DVec3::Y, WHITE, &objects), lit));
         // The eye is above both sheets. A mirror shows the back of the lower one.
         let below = "[materials.mirror]\ncolor = [0.0, 0.0, 0.0]\nreflection = 1.0\n\
                      [[object]]\nmaterial = \"mirror\"\n\
@@ -223,5 +217,5 @@ fn emissive_sheets_on_sheets_show_on_the_side_of_the_eye() {
         let from_below = look(eye, image, &(objects + below));
         cases.push(("back of the lower sheet".to_string(), from_below, 0.0));
     }
-    check(&cases, 4096, ROUNDING);
+    check_means(&cases, 4096, ROUNDING);
 }

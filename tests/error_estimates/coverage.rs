@@ -6,7 +6,6 @@
 /// Number of scanlines in a row of pixels.
 const LINES: usize = 4096;
 
-/// Distance of the eye from the origin; the eye is on the z axis.
 const EYE_Z: f64 = 10.0;
 /// Vertical view angle of the camera, in degrees.
 const VIEW_ANGLE: f64 = 40.0;

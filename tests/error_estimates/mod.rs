@@ -6,15 +6,10 @@ mod rays;
 mod scenes;
 mod survey;
 
-use crate::common::report;
-use crate::support;
-use std::f64::consts::PI;
-use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Estimator, Replicates, TILE};
-use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo_scene::{Filter, Scene};
-use zerkalo_world::Precision;
+use crate::harness::*;
+use crate::lobes::closed_forms::cone_share;
+use crate::reference::{Mutation, Tracer};
+use zerkalo_render::film::Estimator;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;
@@ -40,16 +35,10 @@ fn closed_form(filter: Filter) -> Scene {
     let [x, y] = [EDGE_X + 20.0 * c, 20.0 * s];
     let text = format!(
         r#"
-[film]
-size = [{width}, {height}]
-[camera]
-eye = [0.1, 0.05, 1.5]
-target = [0.0, 0.0, 0.0]
-view_angle.vertical = 40.0
-[background]
-color = {SKY:?}
-[ambient]
-color = [1.0, 1.0, 1.0]
+film.size = [{width}, {height}]
+camera = {{ eye = [0.1, 0.05, 1.5], target = [0.0, 0.0, 0.0], view_angle.vertical = 40.0 }}
+background.color = {SKY:?}
+ambient.color = [1.0, 1.0, 1.0]
 [materials.mirror]
 ambient = 0.0
 diffuse = 0.0
@@ -73,54 +62,16 @@ transform = [{{ rotate_z = {TILT} }}, {{ translate = [{x}, {y}, {SHEET_Z}] }}]
     scene
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn unit(a: [f64; 3]) -> [f64; 3] {
-    a.map(|x| x / dot(a, a).sqrt())
-}
-
-/// Returns the share of the directions in a cone that are inside of a half-space through the cone's
-/// apex. `theta` is the half-angle of the cone. `delta` is the angle of its axis above the plane of
-/// the half-space; it is positive inside of the half-space.
-fn cone_share(theta: f64, delta: f64) -> f64 {
-    if delta >= theta {
-        1.0
-    } else if delta <= -theta {
-        0.0
-    } else {
-        let below =
-            (delta.sin() / theta.sin()).acos() + theta.cos() * (-delta.tan() / theta.tan()).acos();
-        (PI - below) / (PI * (1.0 - theta.cos()))
-    }
-}
-
-/// Returns the share of the mirror's lobe that hits the bright sheet. The lobe is that of the
-/// camera ray through the point (x, y) of the picture, in pixels.
-fn sheet_share(x: f64, y: f64) -> f64 {
-    let eye = [0.1, 0.05, 1.5];
-    let w = unit([-0.1, -0.05, -1.5]);
-    let u = unit(cross(w, [0.0, 1.0, 0.0]));
-    let v = cross(u, w);
-    let [width, height] = SIZE.map(|n| n as f64);
-    let half = 20f64.to_radians().tan();
-    let (across, up) =
-        (half * width / height * (2.0 * x / width - 1.0), half * (1.0 - 2.0 * y / height));
-    let toward: [f64; 3] = [0, 1, 2].map(|i| w[i] + across * u[i] + up * v[i]);
-    let t = -eye[2] / toward[2];
-    let apex = [0, 1, 2].map(|i| eye[i] + t * toward[i]);
-    let axis = unit([toward[0], toward[1], -toward[2]]);
+/// Returns the share of the mirror's lobe that hits the bright sheet, for the camera ray `eye`,
+/// `toward`.
+fn sheet_share((eye, toward): Line) -> f64 {
+    let apex = eye - toward * (eye.z / toward.z);
+    let axis = toward * DVec3::new(1.0, 1.0, -1.0);
     // Normal, on the sheet's side, of the plane through the apex and the edge.
     let (s, c) = TILT.to_radians().sin_cos();
-    let edge = [-s, c, 0.0];
-    let to_edge = [EDGE_X - apex[0], -apex[1], SHEET_Z];
-    let normal = unit(cross(edge, to_edge));
-    cone_share(ROUGHNESS.atan(), dot(normal, axis).asin())
+    let to_edge = DVec3::new(EDGE_X, 0.0, SHEET_Z) - apex;
+    let normal = DVec3::new(-s, c, 0.0).cross(to_edge).normalize();
+    cone_share(ROUGHNESS.atan(), normal.dot(axis).asin())
 }
 
 /// Returns the true radiance of every pixel. For the box filter it is the mean over the pixel, by
@@ -140,12 +91,15 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
             })
         })
         .collect();
+    let scene = closed_form(filter);
+    let tracer = Tracer::new(&scene, Mutation::None).unwrap();
+    let share = |x: f64, y: f64| sheet_share(tracer.camera_ray(x, y, &mut Numbers::new(1)));
     let mean = |x: f64, y: f64| match filter {
-        Filter::Point => sheet_share(x + 0.5, y + 0.5),
+        Filter::Point => share(x + 0.5, y + 0.5),
         Filter::Box => nodes
             .iter()
             .flat_map(|a| nodes.iter().map(move |b| (a, b)))
-            .map(|((dx, wx), (dy, wy))| wx * wy * sheet_share(x + dx, y + dy))
+            .map(|((dx, wx), (dy, wy))| wx * wy * share(x + dx, y + dy))
             .sum(),
     };
     (0..SIZE[0] * SIZE[1])
@@ -265,7 +219,7 @@ fn outcomes(filter: Filter, adaptive: bool, stop: Stop, expected: StoppedBy) -> 
 /// Also checks that the mean error is 0 within noise. Returns the true RMSE of the displayed
 /// picture, divided by the estimated one, averaged over the seeds.
 fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let stop = spp_stop(spp);
     let outcomes = outcomes(filter, adaptive, stop, StoppedBy::Spp);
     let case = format!("{filter:?}, {spp} spp, adaptive {adaptive}");
 
@@ -312,7 +266,7 @@ fn assert_always_honest(adaptive: bool) {
     let ratios: Vec<f64> = cases.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
     let sampling = if adaptive { "adaptive" } else { "uniform" };
-    report::report(30, "both", &format!("{sampling}: true / estimated {low:.3} to {high:.3}"));
+    report(30, "both", &format!("{sampling}: true / estimated {low:.3} to {high:.3}"));
 }
 
 #[test]
@@ -328,11 +282,11 @@ fn extreme_30_adaptive_estimates_are_honest() {
 #[test]
 fn extreme_30_noise_target_is_reached() {
     for (filter, target) in [(Filter::Box, 2.0), (Filter::Point, 0.5)] {
-        let stop = Stop { noise_levels: Some(target), ..Stop::default() };
+        let stop = noise_stop(target);
         let outcomes = outcomes(filter, true, stop, StoppedBy::Noise);
         let achieved = mean(outcomes.iter().map(|o| o.levels * o.levels)).sqrt();
         assert!(achieved <= 1.1 * target, "{filter:?}: target {target}, achieved {achieved}");
-        report::report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
+        report(30, "both", &format!("target {target} 8-bit levels: {achieved:.2}"));
     }
 }
 
@@ -350,7 +304,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
     let reference_spp = 1408;
-    let stop = Stop { spp: Some(reference_spp), ..Stop::default() };
+    let stop = spp_stop(reference_spp);
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.mix, &display).unwrap().rmse_levels;
     assert!(own < 0.1, "the reference has an error of {own} levels itself");
@@ -358,7 +312,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
 
     for seed in 0..5 {
         let mut rendering = begin(&scene, seed, Precision::Auto);
-        let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
+        let stop = noise_stop(0.5);
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
         let spp = rendering.film.samples() / (240 * 180);
         assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
@@ -378,7 +332,7 @@ fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let pool = pool(2);
     let values = |rendering: &RenderState| picture(rendering, Replicates::Both).concat();
     let mut reference = begin(&scene, 1000, Precision::Auto);
-    let stop = Stop { spp: Some(3072), ..Stop::default() };
+    let stop = spp_stop(3072);
     let linear = |stop| Settings { criterion: Criterion::Linear, ..settings(true, 0, stop) };
     assert_eq!(follow(&mut reference, linear(stop), &pool), StoppedBy::Spp);
     let noise = reference.film.noise(&reference.mix, &Display::default()).unwrap();
@@ -404,12 +358,4 @@ fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
 #[test]
 fn linear_target_is_met() {
     assert_linear_target_is_met([96, 72], 4);
-}
-
-/// Checks a linear noise target on a picture of 640x480 pixels, the size at which speed is
-/// measured.
-#[test]
-#[ignore = "half a minute: cargo test --test engine error_estimates:: -- --ignored --nocapture"]
-fn linear_target_is_met_at_full_size() {
-    assert_linear_target_is_met([640, 480], 3);
 }

@@ -3,9 +3,7 @@
 
 use crate::error_estimates::scenes::{KINDS, Sample, scene};
 use crate::error_estimates::survey::{LIMIT_SPP, Reference, run, target_of};
-use crate::support::{begin, pool, trace, wave};
-use zerkalo_render::schedule::Stop;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Number of rays at which the survey of rays ends an adaptive picture, unless the picture has less
 /// than 64 samples per pixel.
@@ -81,8 +79,7 @@ pub fn ray_ratio(
 }
 
 /// Returns the convergence curve of a uniform picture: the numbers of rays and the errors after 4,
-/// 8, 16 and so on samples per pixel in each of the two replicates (halves of the samples). The
-/// curve ends when `ends` returns `true`.
+/// 8, 16 and so on samples per pixel in each replicate. The curve ends when `ends` returns `true`.
 fn uniform_curve(
     sample: &Sample,
     seed: u64,
@@ -131,7 +128,7 @@ fn survey_of_rays() {
     let mut highest = 0.0f64;
     for number in numbers {
         let sample = scene(number);
-        let kind = KINDS[(number % 10) as usize];
+        let kind = KINDS.split('|').nth((number % 10) as usize).unwrap();
         let seeds = variable("ZERKALO_SEEDS", 4) * if kind == "one ball" { 48 } else { 1 };
         let seeds: Vec<u64> = (0..seeds).map(|i| number + 1 + 1000 * i).collect();
         let target = target_of(number);

@@ -4,15 +4,11 @@
 //! The short form runs with all tests. The long form prints a table of 200 scenes: `cargo test
 //! --test engine survey_of_200 -- --ignored --nocapture`.
 
-use crate::common::Numbers;
 use crate::error_estimates::coverage::Balls;
 use crate::error_estimates::rays::{Point, ray_ratio};
 use crate::error_estimates::scenes::{Sample, balls_text, scene};
-use crate::support::{begin, picture, pool, rendered, settings, trace};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_render::schedule::{Schedule, Step, Stop, StoppedBy};
-use zerkalo_world::Precision;
+use crate::harness::*;
+use zerkalo_render::schedule::Schedule;
 
 /// Number of samples per pixel at which the survey ends a picture that has not reached its noise
 /// target.
@@ -36,7 +32,7 @@ pub struct Reference {
 
 impl Reference {
     /// Creates the reference of a scene. If the scene has no closed form, the reference picture has
-    /// `count` samples per pixel in each of the two replicates (halves of the samples).
+    /// `count` samples per pixel in each replicate.
     pub fn new(sample: &Sample, count: u32) -> Self {
         if let Some(balls) = &sample.balls {
             let radiance = balls.pixels(sample.scene.film.size.map(|n| n as usize));
@@ -167,7 +163,6 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// Compares true with reported errors in 12 scenes, of the eight kinds that are cheap to render.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 25, 35];
@@ -196,7 +191,6 @@ fn reported_error_of_few_pixels_is_that_of_all() {
     assert!((0.88..1.12).contains(&mean), "true/reported {ratios:?}");
 }
 
-/// Prints the survey of 200 scenes, or of `ZERKALO_SCENES` scenes from number `ZERKALO_FIRST` on.
 #[test]
 #[ignore = "hours: cargo test --test engine survey_of_200 -- --ignored --nocapture"]
 fn survey_of_200_scenes() {
@@ -229,7 +223,7 @@ fn single_ball_ends_with_few_samples() {
         [materials.white]\ncolor = [1.0, 1.0, 1.0]
         [[object]]\nmaterial = \"white\"
         shape.sphere = { center = [1.222713, -2.075768, 0.0], radius = 0.019905 }";
-    let scene = crate::support::parsed(text);
+    let scene = parsed(text);
     let sample = Sample { name: "single ball".into(), scene, balls: None };
     for seed in 0..6 {
         let stop = Stop { noise_levels: Some(0.2), spp: Some(4 * LIMIT_SPP), ..Stop::default() };
@@ -245,11 +239,10 @@ fn single_ball_ends_with_few_samples() {
     }
 }
 
-/// Returns a picture of unshaded balls of radiance 5 on black, seen by the camera of
-/// [`Balls`].
+/// Returns a picture of unshaded balls of radiance 5 on black, seen by the camera of [`Balls`].
 fn bright_balls(size: [u32; 2], balls: Vec<([f64; 3], f64)>) -> Sample {
     let balls = Balls { balls, radiance: 5.0, background: 0.0 };
-    let scene = crate::support::parsed(&balls_text(&balls, size));
+    let scene = parsed(&balls_text(&balls, size));
     Sample { name: "bright balls".into(), scene, balls: Some(balls) }
 }
 
@@ -262,7 +255,7 @@ fn few_stars_meet_the_target() {
     let star = |_| ([n.between(-4.0, 4.0), n.between(-3.4, 3.4), 0.0], 0.01);
     let sample = bright_balls([160, 120], (0..20).map(star).collect());
     let reference = Reference::new(&sample, 0);
-    let stop = Stop { noise_levels: Some(0.4), ..Stop::default() };
+    let stop = noise_stop(0.4);
     let squares =
         (0..32).map(|seed| reference.square(&run(&sample, seed, true, stop, |_, _| false).0));
     let error = (squares.sum::<f64>() / 32.0).sqrt();
@@ -275,7 +268,7 @@ fn few_stars_meet_the_target() {
 fn samples_of_two_stars_go_to_their_tiles() {
     let stars = vec![([0.3, 0.2, 0.0], 0.006), ([1.3, 0.2, 0.0], 0.004)];
     let sample = bright_balls([640, 360], stars);
-    let stop = Stop { noise_levels: Some(0.05), ..Stop::default() };
+    let stop = noise_stop(0.05);
     for seed in 0..4 {
         let (_, schedule, _) =
             run(&sample, seed, true, stop, |_, schedule| schedule.spp().mean > 256.0);
@@ -293,7 +286,7 @@ fn adaptive_mean_of_a_closed_room_is_unbiased() {
     sample.scene.film.size = [64, 48];
     let mean_and_error = |adaptive: bool, spp: u32, first: u64, seeds: u64| {
         let mean_of = |seed: u64| {
-            let stop = Stop { spp: Some(spp), ..Stop::default() };
+            let stop = spp_stop(spp);
             let (rendering, ..) = run(&sample, first + seed, adaptive, stop, |_, _| false);
             let all = picture(&rendering, Replicates::Both);
             all.iter().flatten().sum::<f64>() / (3 * all.len()) as f64

@@ -1,12 +1,6 @@
 //! Extremes of brightness: samples inside and outside of the range of the film.
 
-use crate::common::report::report;
-use crate::support::{begin, parsed, picture, pool, rendered, uniform};
-use std::fs;
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 
@@ -28,25 +22,21 @@ fn mean(rendering: &RenderState) -> f64 {
 }
 
 /// Colour of objects without a material.
-const MATT: f64 = 0.8;
+const GRAY: f64 = 0.8;
 
-/// Returns a scene that looks straight down on a surface from `height`, with a lamp beside the eye.
-/// The view angle is small. Every pixel therefore has the radiance [`MATT`] x intensity / (pi x
-/// height^2).
-fn below_a_lamp(height: f64, place: [f64; 3], object: &str) -> Scene {
-    parsed(&to_toml(height, place, object))
-}
-
-fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
+/// Returns the text of a scene that looks straight down on a surface from `height`, with a lamp
+/// beside the eye. The view angle is small. Every pixel therefore has the radiance [`GRAY`] x
+/// intensity / (pi x height^2).
+fn below_a_lamp(height: f64, [x, y, z]: [f64; 3], shape: &str) -> String {
     format!(
         "film = {{ size = [8, 8] }}\n\
          camera = {{ eye = [{x}, {}, {z}], direction = [0.0, -1.0, 0.0], up = [0.0, 0.0, 1.0], \
          view_angle.vertical = 2.0 }}\n\
          light = [{{ point = {{ position = [{x}, {}, {z}] }}, intensity = {}, falloff = \"inverse-square\" }}]\n\
-         [[object]]\n{object}\n",
+         [[object]]\nshape.{shape}\n",
         y + 0.99 * height,
         y + height,
-        std::f64::consts::PI * height * height / MATT,
+        PI * height * height / GRAY,
     )
 }
 
@@ -54,82 +44,48 @@ fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
 /// scene's bounding box.
 #[test]
 fn surface_near_lamp_is_lit_at_every_scene_extent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    fs::write(folder.path().join("room.obj"), obj_box(DVec3::splat(-500.0), DVec3::splat(500.0)))
+        .unwrap();
     let cases = [
+        // As large as the earth.
+        (6.0, [0.0; 3], "sphere = { center = [0, -6.371e6, 0], radius = 6.371e6 }"),
+        // From inside.
         (
-            "earth",
-            6.0,
-            [0.0, 0.0, 0.0],
-            "shape.sphere = { center = [0.0, -6.371e6, 0.0], radius = 6.371e6 }",
-        ),
-        (
-            "cylinder from inside",
             1e-4,
             [0.0, -50.0, 0.0],
-            "shape.cylinder = { base = [0.0, 0.0, -900.0], top = [0.0, 0.0, 900.0], radius = 50.0 }",
+            "cylinder = { base = [0, 0, -900], top = [0, 0, 900], radius = 50 }",
         ),
         (
-            "ellipsoid from inside",
             1e-3,
             [0.0, -3000.0, 0.0],
-            "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1000.0 }\n\
-             transform = [{ scale = [1.0, 3.0, 7.0] }]",
+            "sphere = { center = [0, 0, 0], radius = 1000 }\ntransform = [{ scale = [1, 3, 7] }]",
         ),
         (
-            "compound",
             1e-3,
             [0.0, 500.0, 0.0],
-            "shape.difference.of = [\
-             { shape.box = { center = [0.0, 0.0, 0.0], size = [1000.0, 1000.0, 1000.0] } }, \
-             { shape.sphere = { center = [900.0, 0.0, 0.0], radius = 500.0 } }]",
+            "difference.of = [{ shape.box = { center = [0, 0, 0], size = [1000, 1000, 1000] } }, \
+             { shape.sphere = { center = [900, 0, 0], radius = 500 } }]",
         ),
-        (
-            "plane",
-            2e4,
-            [0.0, 0.0, 0.0],
-            "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }",
-        ),
+        (2e4, [0.0; 3], "plane = { point = [0, 0, 0], normal = [0, 1, 0] }"),
+        (1e-3, [30.0, -500.0, 70.0], "mesh = { file = \"room.obj\", normals = \"flat\" }"),
     ];
     let mut worst = 0f64;
-    for (name, height, place, object) in cases {
-        let scene = below_a_lamp(height, place, object);
+    for (height, place, shape) in cases {
+        let text = below_a_lamp(height, place, shape);
+        let scene = Scene::parse(&text, &path.display().to_string()).unwrap();
         for precision in PRECISIONS {
             let rendering = rendered(&scene, 1, precision, 8);
-            assert_no_sample_lost(&rendering, name);
+            assert_no_sample_lost(&rendering, shape);
             let found = mean(&rendering);
-            assert!((found - 1.0).abs() < 2e-3, "{name} in {precision:?}: {found}");
+            assert!((found - 1.0).abs() < 2e-3, "{shape} in {precision:?}: {found}");
             worst = worst.max((found - 1.0).abs());
         }
     }
     report(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
 }
 
-/// Checks a lamp close to a wall in a room whose walls are triangles.
-#[test]
-fn mesh_wall_near_lamp_is_lit() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut room = String::new();
-    for corner in 0..8 {
-        let coordinate = |axis: u32| if corner >> axis & 1 == 0 { -500 } else { 500 };
-        room += &format!("v {} {} {}\n", coordinate(0), coordinate(1), coordinate(2));
-    }
-    for face in ["1 2 4 3", "5 6 8 7", "1 2 6 5", "3 4 8 7", "1 3 7 5", "2 4 8 6"] {
-        room += &format!("f {face}\n");
-    }
-    fs::write(folder.path().join("room.obj"), room).unwrap();
-    let text = to_toml(
-        1e-3,
-        [30.0, -500.0, 70.0],
-        "shape.mesh = { file = \"room.obj\", normals = \"flat\" }",
-    );
-    let path = folder.path().join("room.toml");
-    fs::write(&path, text).unwrap();
-    let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
-    let rendering = rendered(&scene, 1, Precision::Auto, 8);
-    assert_no_sample_lost(&rendering, "mesh");
-    assert!((mean(&rendering) - 1.0).abs() < 2e-3, "{}", mean(&rendering));
-}
-
-/// Returns the scene of a floor of the material `material` in directional light of `intensity`.
 fn floor(material: &str, intensity: f64) -> Scene {
     parsed(&format!(
         "film = {{ size = [8, 8] }}\n\
@@ -141,7 +97,6 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// Checks that a surface of the colour c in light of the intensity 1 / c is white.
 #[test]
 fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
@@ -155,8 +110,6 @@ fn dim_colour_in_bright_light_is_white() {
     }
 }
 
-/// Checks that a colour of 1e6 does not saturate the film after half a million samples in each of
-/// two pixels.
 #[test]
 fn bright_colour_does_not_saturate_film() {
     let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
@@ -200,44 +153,6 @@ fn amplifying_mirrors_give_finite_white() {
                 noise.rmse_levels.is_finite() && noise.rmse_linear.is_finite(),
                 "{name}: {noise:?}"
             );
-        }
-    }
-}
-
-/// Checks that an object far from the lamp leaves the picture near the lamp unchanged.
-#[test]
-fn distant_object_leaves_surface_near_lamp_unchanged() {
-    let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";
-    let far = "\n[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 9e8 }";
-    let alone = below_a_lamp(0.5, [0.0; 3], ball);
-    let both = below_a_lamp(0.5, [0.0; 3], &format!("{ball}{far}"));
-    let [alone, both] = [alone, both].map(|scene| mean(&rendered(&scene, 1, Precision::Double, 8)));
-    assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
-}
-
-/// Checks that multiplying the intensity of a light by 2^40 or 2^-40 multiplies every pixel by
-/// exactly this factor. One of the films has a scale of its fixed-point numbers other than the
-/// default.
-#[test]
-fn light_intensity_in_powers_of_two_scales_picture_exactly() {
-    let scenes = [
-        floor("color = [1e-9, 0.5, 1e3]", 1.0),
-        below_a_lamp(
-            1e-3,
-            [0.0; 3],
-            "shape.sphere = { center = [0.0, -500.0, 0.0], radius = 500.0 }",
-        ),
-    ];
-    for scene in scenes {
-        let pixels_of =
-            |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
-        let expected = pixels_of(&scene);
-        for ev in [-40, 40] {
-            let factor = f64::from(ev).exp2();
-            let mut other = scene.clone();
-            other.lights[0].intensity *= factor;
-            let scaled: Vec<_> = pixels_of(&other).iter().map(|p| p.map(|c| c / factor)).collect();
-            assert_eq!(scaled, expected, "{ev}");
         }
     }
 }

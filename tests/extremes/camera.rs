@@ -1,13 +1,7 @@
 //! Extremes of cameras and of orthonormal frames.
 
-use crate::common::Numbers;
-use crate::common::rays::to_dvec3;
-use crate::common::report::{precision, report};
-use glam::DVec3;
-use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Single, Vec3};
-use zerkalo_scene::Scene;
-use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
+use crate::harness::*;
+use zerkalo_scene::camera::PerspectiveCamera;
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
@@ -59,7 +53,6 @@ fn extreme_17_odd_cameras() {
     report(17, "both", "rays finite");
 }
 
-/// Checks that the angle between the outermost camera rays equals the view angle.
 #[test]
 fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;

@@ -1,19 +1,11 @@
 //! Chords of isotropic uniform lines, for every registered kind of shape. Let a convex body with
-//! the surface area S and the volume V be inside of another one with the surface area S'. Of the
-//! lines that hit the outer body, the share S / S' hits the inner body, with the mean chord 4 V / S
+//! the surface area S and the volume V be inside another one with the surface area S'. Of the lines
+//! that hit the outer body, the share S / S' hits the inner body, with the mean chord 4 V / S
 //! (Cauchy, Crofton).
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, bounding_sphere, closest, every_kind};
-use crate::common::report::{LEFT_TO_DOUBLE, report};
-use glam::{DMat3, DVec3};
-use std::f64::consts::{PI, TAU};
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{
-    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, HalfSpace,
-    ParallelogramForm, PlaneForm, SphereForm,
-};
-use zerkalo_scene::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
+use crate::harness::*;
+use zerkalo_kernel::primitive::{HalfSpace, ParallelogramForm};
+use zerkalo_scene::shape::{Prism, Pyramid};
 
 /// Returns the area of one face of a polyhedron. The corners on the face are sorted around their
 /// mean.

@@ -1,12 +1,7 @@
 //! Cameras in the cavity of a compound solid.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, closest};
 use crate::extremes::compound::{block, difference, geometry};
-use glam::DVec3;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{Form, SphereForm};
-use zerkalo_scene::shape::{Cylinder, ShapeDesc};
+use crate::harness::*;
 
 fn ball(radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::ZERO, radius })

@@ -1,13 +1,7 @@
 //! Compound solids with coincident faces, and with a light inside.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, blocked, closest, scene};
-use crate::common::report::report;
 use crate::extremes::compound::{block, difference, geometry, union};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Returns `x` moved by about `units` rounding errors. `epsilon` is the relative rounding error of
 /// the precision.
@@ -121,8 +115,6 @@ fn extreme_10_touching_parts_have_no_crack() {
     report(10, "both", "0 cracks");
 }
 
-/// Checks that coincident faces of two parts show the material of the part listed first. Rounding
-/// must not mix the materials.
 #[test]
 fn coincident_faces_show_the_first_part() {
     let parts =
@@ -133,19 +125,17 @@ fn coincident_faces_show_the_first_part() {
         let at = DVec3::new(numbers.between(-0.7, 0.7), 0.5, numbers.between(-0.4, 0.4));
         let from = at + DVec3::new(numbers.between(-1.0, 1.0), 1.0, numbers.between(-1.0, 1.0));
         let line = (from, (at - from).normalize());
-        let (ray, _) = crate::common::rays::packets::<Single>(&[line]).next().unwrap();
+        let (ray, _) = packets::<Single>(&[line]).next().unwrap();
         let hit = geometry.closest(&ray, geometry.all());
         let primitive = geometry.sources()[hit.primitive.id_lane(0) as usize];
         assert_eq!((primitive.form, primitive.part), (0, 0), "{line:?}");
     }
 }
 
-/// Checks that a lamp in a hollow ball lights the inside, and that light leaves only through a
-/// window.
 #[test]
 fn lamp_in_hollow_ball_lights_only_its_inside() {
     let room = |window: &str| {
-        scene(&format!(
+        parsed(&format!(
             "[camera]\neye = [0, 0, 9]\ntarget = [0, 0, 0]\n\
              [[light]]\npoint = {{ position = [0.1, 0.0, 0.1] }}\n\
              [[object]]\nshape.platform = {{ center = [0, -3, 0], size = [20, 20] }}\n\

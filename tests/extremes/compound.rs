@@ -1,15 +1,7 @@
 //! Compound solids: volumes, parity of surfaces along a line, laws of set operations.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, LineHit, blocked, closest};
-use crate::common::report::report;
-use glam::{DAffine3, DQuat, DVec3};
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{
-    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, CsgSolid, CsgTree as Tree, EllipsoidForm,
-    Form, PlaneForm, SphereForm,
-};
-use zerkalo_scene::shape::{Cuboid, ShapeDesc};
+use crate::harness::*;
+use zerkalo_kernel::primitive::{CsgSolid, CsgTree as Tree, TorusForm};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::new(x, y, z), radius })
@@ -19,7 +11,10 @@ pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
     Cuboid { center, size }.form()
 }
 
-/// Returns a compound of all `parts`, combined by `join`.
+pub fn torus(ring: f64, tube: f64) -> Form {
+    TorusForm { scene_from_torus: DAffine3::IDENTITY, ring, tube }.into()
+}
+
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
     let tree = join((0..parts.len()).map(Tree::Part).collect());
     CsgSolid::new(parts, tree).unwrap().into()
@@ -77,7 +72,7 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
     out
 }
 
-/// Returns the length of a line inside of a solid, from the hits of the line. Checks that the line
+/// Returns the length of a line inside a solid, from the hits of the line. Checks that the line
 /// enters and leaves the solid alternately at these hits.
 fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
     let context = || format!("{name}: {line:?} {hits:?}");
@@ -89,7 +84,6 @@ fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
     hits.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
 }
 
-/// Returns the length of each line inside of `form`.
 pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
     let all = surfaces(&geometry::<L>(form), lines);
     lines.iter().zip(all).map(|(line, hits)| chord(name, line, &hits)).collect()
@@ -98,11 +92,12 @@ pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64>
 fn random_solid(numbers: &mut Numbers) -> Form {
     let place = numbers.in_cube(0.8);
     let size = numbers.between(0.3, 1.2);
-    let form = match numbers.below(5) {
+    let form = match numbers.below(6) {
         0 => return Form::Sphere(SphereForm { center: place, radius: size }),
         1 => block([0.0; 3], [1.3, 0.9, 1.1]),
         2 => Form::conical_frustum(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
         3 => ball(0.0, 0.0, 0.0, 1.0),
+        4 => torus(1.0, 0.4),
         _ => Form::conical_frustum(DAffine3::IDENTITY, [0.0, 1.0][numbers.below(2)]),
     };
     let turn = DQuat::from_axis_angle(numbers.direction(), numbers.between(0.0, 3.0));
@@ -144,6 +139,10 @@ fn contains(part: &Form, p: DVec3) -> bool {
             (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
         }
         Form::Plane(PlaneForm { normal, offset }) => normal.dot(p) <= *offset,
+        Form::Torus(TorusForm { scene_from_torus, ring, tube }) => {
+            let q = scene_from_torus.inverse().transform_point3(p);
+            (q.x.hypot(q.z) - ring).hypot(q.y) <= *tube
+        }
         _ => unreachable!("no solid"),
     }
 }
@@ -203,14 +202,13 @@ fn check_parity(rays: usize) {
                 }
                 let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
                 let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
-                // Slivers of the solid that are thinner than the tie tolerance (within which
-                // surfaces count as coincident) are lost. A random point is almost never in such a
-                // sliver.
+                // Slivers of the solid that are thinner than the tie tolerance are lost. A random
+                // point is almost never in such a sliver.
                 assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
             }
         }
-        // Rays that start inside of the solid, in its cavities or outside of it. If the first hit
-        // is on the inner side of a surface, the origin is inside.
+        // Rays that start inside the solid, in its cavities or outside of it. If the first hit is
+        // on the inner side of a surface, the origin is inside.
         let starts: Vec<Line> =
             (0..rays).map(|_| (numbers.in_cube(1.5), numbers.direction())).collect();
         for (line, hit) in starts.iter().zip(closest(&double, &starts)) {

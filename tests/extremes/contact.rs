@@ -1,16 +1,8 @@
 //! Transparent objects in contact with others. The picture must be the limit of pictures with a gap
 //! between the objects as the gap vanishes.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced};
-use crate::support::{parsed, picture, rendered};
-use glam::{DAffine3, DQuat, DVec3};
-use std::fs;
-use std::path::Path;
+use crate::harness::*;
 use tempfile::TempDir;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
 
 /// Width of the gap in scenes that are compared with the same scene without a gap.
 const GAP: f64 = 1e-4;
@@ -50,24 +42,13 @@ const MATERIALS: [(&str, &str); 8] = [
     ("thin", "thin"),
 ];
 
-/// Returns the OBJ text of a box between two corners.
-fn slab(low: DVec3, high: DVec3) -> String {
-    let mut out = String::new();
-    for z in [low.z, high.z] {
-        for (x, y) in [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)] {
-            out += &format!("v {x} {y} {z}\n");
-        }
-    }
-    out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
-}
-
 /// Returns a folder with the files `upper.obj` and `lower.obj`, the meshes of two boxes that touch
 /// in the plane y = 0.
 fn meshes() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write_file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-    write_file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
-    write_file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
+    write_file("upper.obj", &obj_box(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
+    write_file("lower.obj", &obj_box(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
     folder
 }
 
@@ -87,20 +68,11 @@ const INNER: &str = "box = { center = [0, 0.25, 0], size = [1.4, 0.5, 1.4] }";
 impl Setting<'_> {
     /// Compiles the scene, with the upper shape lifted by `gap`.
     fn traced(&self, gap: f64, precision: Precision) -> Traced {
-        let (scale, turn, offset) = self.place.to_scale_rotation_translation();
-        let (axis, angle) = turn.to_axis_angle();
-        let vector_text = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
         let transform_text = |lift: f64| {
-            format!(
-                "transform = [{{ translate = [0, {lift:?}, 0] }}, {{ scale = {:?} }}, \
-                 {{ rotate = {{ axis = {}, degrees = {:?} }} }}, {{ translate = {} }}]\n",
-                scale.x,
-                vector_text(axis),
-                angle.to_degrees(),
-                vector_text(offset)
-            )
+            let steps = steps(&self.place);
+            format!("transform = [{{ translate = [0, {lift:?}, 0] }}, {steps}]\n")
         };
-        let placed_text = |p: DVec3| vector_text(self.place.transform_point3(p));
+        let placed_text = |p: DVec3| array(self.place.transform_point3(p));
         let text = format!(
             "background.color = [0.2, 0.5, 0.9]\nambient.color = [1, 1, 1]\n\
              trace.max_depth = 6\n[camera]\neye = {}\ntarget = {}\n\

@@ -1,14 +1,6 @@
 //! Rays that start inside solids or on faces, or run in planes of faces or along axes.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
-use crate::common::report::{precision, report};
-use glam::DVec3;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{
-    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, SphereForm,
-};
-use zerkalo_scene::shape::{Cuboid, ShapeDesc};
+use crate::harness::*;
 
 /// Returns `true` if `form` is a convex solid. Compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
@@ -92,13 +84,6 @@ fn extreme_04_camera_inside() {
     check_all_inside(25_000);
 }
 
-#[test]
-#[ignore = "long: 100,000 rays in each solid"]
-fn extreme_04_camera_inside_at_length() {
-    check_all_inside(100_000);
-}
-
-/// Checks `rays` rays from inside of each solid, in each precision.
 fn check_all_inside(rays: usize) {
     let solids = forms().iter().filter(|f| is_solid(&f.1)).count();
     for (i, (name, form)) in forms().into_iter().enumerate() {

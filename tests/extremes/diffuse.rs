@@ -1,10 +1,6 @@
-//! Indirect diffuse light against closed forms: a white furnace, and the inside of a sphere.
+//! Indirect diffuse light against a closed form.
 
-use crate::support::{picture, rendered};
-use std::f64::consts::PI;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 const SAMPLES: u32 = 64;
 
@@ -27,60 +23,7 @@ fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     [mean, deviation, (variance / n).sqrt()]
 }
 
-/// Checks that white surfaces in a white furnace are white for every limit on the number of diffuse
-/// bounces, also in mirrors and behind glass. Ambient light of the same radiance replaces the
-/// bounces beyond the limit.
-#[test]
-fn furnace_is_white_at_every_diffuse_depth() {
-    let text = "film.size = [24, 18]
-        background.color = [1.0, 1.0, 1.0]
-        ambient.color = [1.0, 1.0, 1.0]
-        camera = { eye = [0.0, 1.0, 4.0], target = [0.0, 0.4, 0.0] }
-        [materials.white]
-        color = [1.0, 1.0, 1.0]
-        ambient = 1.0
-        diffuse = 1.0
-        [materials.half]
-        color = [1.0, 1.0, 1.0]
-        ambient = 0.5
-        diffuse = 0.5
-        reflection = 0.5
-        roughness = 0.3
-        [materials.glass]
-        color = [1.0, 1.0, 1.0]
-        ambient = 0.25
-        diffuse = 0.25
-        reflection = 0.25
-        transmission = 0.5
-        [[object]]
-        material = \"white\"
-        shape.platform = { center = [0.0, 0.0, 0.0], size = [4.0, 4.0] }
-        [[object]]
-        material = \"half\"
-        shape.sphere = { center = [-0.7, 0.5, 0.0], radius = 0.5 }
-        [[object]]
-        material = \"white\"
-        shape.cube = { corner = [0.1, 0.0, 0.3], edge = 0.7, rotation = 25.0 }
-        ";
-    let glass = "[[object]]
-        material = \"glass\"
-        shape.rectangle = { center = [0.2, 0.5, 1.2], size = [0.8, 0.8], normal = [0.1, 0.0, 1.0] }
-        ";
-    for (name, text) in [("opaque", text.to_string()), ("glass", format!("{text}{glass}"))] {
-        for bounces in [0, 1, 2, 5] {
-            for precision in [Precision::Single, Precision::Double] {
-                let mut scene = scene(&text, bounces);
-                scene.trace.max_depth = 64;
-                let [mean, deviation, _] = moments(&scene, precision);
-                println!("{name}, {bounces} bounces, {precision:?}: {mean} +- {deviation:.1e}");
-                // Every path has throughput 1 where it ends, apart from rounding.
-                assert!((mean - 1.0).abs() < 1e-5 && deviation < 1e-3, "{name}, {bounces}: {mean}");
-            }
-        }
-    }
-}
-
-/// Checks the inside of a sphere of albedo rho and radius R around a light of intensity I. Every
+/// Checks the inside wall of a sphere of albedo rho and radius R around a light of intensity I. Every
 /// bounce adds rho times the radiance of the one before. The first radiance is rho I / (pi R^2).
 #[test]
 fn sphere_from_inside_is_a_geometric_series() {
@@ -114,45 +57,5 @@ fn sphere_from_inside_is_a_geometric_series() {
                 "{bounces}: {mean}"
             );
         }
-    }
-}
-
-/// Checks a floor beside a wall. Directional light falls on the wall only, which is 1 high and
-/// infinitely wide. The form factor between a point of the floor and the wall is known.
-#[test]
-fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
-    let rho = 0.5;
-    for distance in [0.2, 0.5, 1.0] {
-        let text = format!(
-            "film = {{ size = [8, 8], filter = \"point\" }}
-            camera = {{ eye = [{distance:?}, 0.5, 0.0], target = [{distance:?}, 0.0, 0.0], \
-            up = [0.0, 0.0, 1.0], view_angle.vertical = 0.01 }}
-            [[light]]
-            directional.direction = [-1.0, 0.0, 0.0]
-            [materials.white]
-            color = [{rho:?}, {rho:?}, {rho:?}]
-            ambient = 0.0
-            diffuse = 1.0
-            [[object]]
-            material = \"white\"
-            shape.rectangle = {{ center = [0.0, 0.5, 0.0], size = [8000.0, 1.0], normal = [1.0, 0.0, 0.0] }}
-            [[object]]
-            material = \"white\"
-            shape.platform = {{ center = [5.0, 0.0, 0.0], size = [10.0, 10.0] }}"
-        );
-        // A white matt wall would have the radiance 1, this one has rho. As seen from the floor, it
-        // extends from the horizon to the angle phi above it, and has the form factor (1 - cos phi)
-        // / 2.
-        let cos = distance / f64::hypot(distance, 1.0);
-        let expected = rho * rho * 0.5 * (1.0 - cos);
-        // The directional light is parallel to the floor and leaves it dark.
-        let scene = scene(&text, 1);
-        let [mean, _, error] = moments(&scene, Precision::Double);
-        let z = (mean - expected).abs() / error;
-        println!("distance {distance}: {mean}, expected {expected}, z {z:.2}");
-        assert!(
-            z < 4.5 && error < 0.02 * expected,
-            "distance {distance}: {mean}, {expected}, z {z}"
-        );
     }
 }

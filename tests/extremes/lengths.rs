@@ -1,13 +1,6 @@
 //! Lengths of directions: a direction of any length that a file can contain gives the same picture.
 
-use crate::common::tables::{keys, scene, table, value_at};
-use crate::support::{parsed, rendered};
-use std::collections::BTreeSet;
-use toml::Value;
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_scene::value::{Field, ValueType};
-use zerkalo_scene::{FIELDS, Scene};
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Scene that sets every key whose value is a direction.
 const TEXT: &str = "
@@ -54,9 +47,8 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
     }
 }
 
-/// Returns the scene with each of its directions multiplied by `factor`.
 fn stretched(base: &Scene, factor: f64) -> Scene {
-    let mut changed = table(base);
+    let mut changed = base.to_table();
     let mut stretched_keys = BTreeSet::new();
     for key in keys(&changed).iter().filter(|key| matches!(key.takes, ValueType::Direction)) {
         let Some(Value::Array(numbers)) = value_at(&mut changed, &key.path) else { continue };
@@ -71,7 +63,8 @@ fn stretched(base: &Scene, factor: f64) -> Scene {
         stretched_keys.iter().map(String::as_str).eq(all),
         "the scene has only {stretched_keys:?}"
     );
-    scene(&changed, &base.resolver).unwrap_or_else(|| panic!("{factor:e}: the scene is invalid"))
+    scene_of_table(&changed, &base.resolver)
+        .unwrap_or_else(|| panic!("{factor:e}: the scene is invalid"))
 }
 
 #[test]
@@ -89,7 +82,7 @@ fn length_of_directions_does_not_change_the_picture() {
     // Other factors change the last digits, which an 8-bit picture does not show.
     let green_values = |scene: &Scene| {
         let rendering = rendered(scene, 1, Precision::Single, 4);
-        let picture = crate::support::picture(&rendering, zerkalo_render::film::Replicates::Both);
+        let picture = picture(&rendering, zerkalo_render::film::Replicates::Both);
         picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
     };
     let expected = green_values(&base);

@@ -1,14 +1,7 @@
 //! Thin lens: circles of confusion against their closed form, and lenses of zero size and of the
 //! size of the room.
 
-use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
-use std::f64::consts::PI;
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::Replicates;
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_scene::camera::{Aperture, Focus};
-use zerkalo_scene::{Filter, Scene};
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Largest allowed deviation of a pixel from a closed form, in standard errors. The comparisons of
 /// this file, some 4,000 pixels, give a false alarm in 1 of 1,000 runs.
@@ -38,7 +31,6 @@ fn edge(depth: f64, radius: f64, focus: f64) -> Scene {
     .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Returns the share of a unit disk on the side x < `t` of a line.
 fn disk_share(t: f64) -> f64 {
     let t = t.clamp(-1.0, 1.0);
     0.5 + (t * (1.0 - t * t).sqrt() + t.asin()) / PI
@@ -108,52 +100,10 @@ fn circle_of_confusion_matches_its_closed_form() {
     }
 }
 
-/// Returns the scene without random numbers other than those of the lens.
-fn sharp(mut scene: Scene) -> Scene {
-    scene.film.filter = Filter::Point;
-    for material in scene.materials.values_mut() {
-        material.roughness = 0.0;
-    }
-    sized(scene, [48, 36])
-}
-
 fn with_radius(scene: &Scene, radius: f64) -> Scene {
     let mut scene = scene.clone();
     scene.camera.aperture = Some(Aperture::Radius(radius));
     scene
-}
-
-#[test]
-fn tiny_aperture_equals_the_pinhole() {
-    for name in ["mirror-room.toml", "glass.toml", "reflecting-tracks-lit.toml"] {
-        let scene = sharp(shipped(name));
-        for precision in [Precision::Single, Precision::Double] {
-            let pixels = |scene: &Scene| {
-                let rendering = rendered(scene, 1, precision, 2);
-                picture(&rendering, Replicates::Both)
-            };
-            let (pinhole, lens) = (pixels(&scene), pixels(&with_radius(&scene, 1e-9)));
-            let different = pinhole
-                .iter()
-                .zip(&lens)
-                .filter(|(a, b)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * (1.0 + a[c].abs())))
-                .count();
-            println!("{name}, {precision:?}: {different} pixels differ");
-            // With a lens, rays in glass choose between reflection and transmission by other random
-            // numbers than without. The agreement tests compare these pictures.
-            let allowed = if name == "mirror-room.toml" { 0 } else { pinhole.len() / 100 };
-            assert!(different <= allowed, "{name}, {precision:?}: {different} pixels differ");
-        }
-        assert_eq!(
-            pixels_bytes(&scene),
-            pixels_bytes(&with_radius(&scene, 0.0)),
-            "{name}: a radius of 0 is a pinhole"
-        );
-    }
-}
-
-fn pixels_bytes(scene: &Scene) -> Vec<u8> {
-    rendered(scene, 1, Precision::Auto, 2).film.bytes()
 }
 
 /// Checks that all samples are finite for lenses as large as the room and larger, at any focus

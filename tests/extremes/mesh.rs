@@ -1,19 +1,9 @@
 //! Watertight meshes: no ray passes between two triangles, at edges, at corners or in slivers.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, closest, packets};
-use crate::common::report::{LEFT_TO_DOUBLE, report};
-use glam::{DAffine3, DQuat, DVec3};
+use crate::harness::*;
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::fmt::Write;
-use std::sync::Arc;
-use zerkalo_kernel::lanes::{Double, Mask, SimdFloat, Single};
 use zerkalo_kernel::primitive::Mesh;
-use zerkalo_kernel::primitive::{Aggregate, Form, MeshForm};
-use zerkalo_scene::Scene;
-use zerkalo_scene::asset::Assets;
-use zerkalo_world::{AnyWorld, Options};
+use zerkalo_kernel::primitive::mesh::intersection;
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
@@ -78,8 +68,8 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 }
 
 /// Returns the number of rays that miss the mesh, by closest hit or by occlusion. `rays` rays start
-/// inside of the mesh and point to its corners, its edges and into its triangles. `place`
-/// transforms the mesh, an ellipsoid with the half-axes `axes`.
+/// inside the mesh and point to its corners, its edges and into its triangles. `place` transforms
+/// the mesh, an ellipsoid with the half-axes `axes`.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
@@ -105,6 +95,11 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
         let lost = closest(&geometry, &lines).iter().filter(|hit| hit.is_none()).count();
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
+                let [together, alone] = [true, false].map(|packet| {
+                    let hit = intersection::closest_with(mesh, &ray, L::from_f64(L::MAX), packet);
+                    (0..count).map(|i| (hit.t.lane(i), hit.triangle.id_lane(i))).collect::<Vec<_>>()
+                });
+                assert!(together == alone, "{ray:?}: {together:?}, {alone:?}");
                 let blocked =
                     geometry.occluded(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
                 (0..count).filter(|lane| !blocked.lane(*lane)).count()
@@ -117,8 +112,8 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
 
 /// Checks meshes of few and of many triangles. One of them is scaled, rotated and moved. A needle
 /// and a sheet have the relative thickness 1e-6, and their triangles are slivers. Single precision
-/// resolves the inside of a sliver to a tenth of its thickness and loses one ray in a million
-/// there; `auto` selects double.
+/// resolves the inside a sliver to a tenth of its thickness and loses one ray in a million there;
+/// `auto` selects double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),

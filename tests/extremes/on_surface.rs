@@ -1,12 +1,6 @@
 //! Lamps that lie exactly on surfaces.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced};
-use glam::{DAffine3, DQuat, DVec3};
-use std::fs;
-use std::path::Path;
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 /// Ceilings that contain the point lamp at (0, 3, 0). The number determines which points above the
 /// ceiling, at y = 4, the lamp lights: those farther from the y axis than this distance. It is 0 for
@@ -27,10 +21,6 @@ const CEILINGS: [(&str, f64); 9] = [
     ),
 ];
 
-/// OBJ text of a box that extends from -3 to 3 in x and z, and from 3 to 3.2 in y.
-const SLAB: &str = "v -3 3 -3\nv 3 3 -3\nv 3 3.2 -3\nv -3 3.2 -3\nv -3 3 3\nv 3 3 3\nv 3 3.2 3\nv -3 3.2 3\n\
-    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
-
 /// Returns two lists of points, each with its normal. The points of the first list are on a room's
 /// floor and on a wall that reaches up to the ceiling, those of the second on a board above the
 /// ceiling.
@@ -49,17 +39,7 @@ fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
 }
 
 fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: Precision) {
-    let (scale, turn, offset) = place.to_scale_rotation_translation();
-    let (axis, angle) = turn.to_axis_angle();
-    let vector_text = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
-    let transform = format!(
-        "transform = [{{ scale = {:?} }}, {{ rotate = {{ axis = {}, degrees = {:?} }} }}, \
-         {{ translate = {} }}]\n",
-        scale.x,
-        vector_text(axis),
-        angle.to_degrees(),
-        vector_text(offset)
-    );
+    let transform = format!("transform = [{}]\n", steps(place));
     let lamp = DVec3::new(0.0, 3.0, 0.0);
     let text = format!(
         "[camera]\neye = {}\ntarget = {}\n[[light]]\npoint.position = {}\nfalloff = \"none\"\n\
@@ -69,12 +49,13 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
          [[object]]\nmaterial = \"white\"\nshape.platform = {{ center = [0, 4, 0], size = [4, 4] }}\n{transform}\
          [[object]]\nmaterial = \"white\"\nshape.rectangle = {{ center = [-2, 1.5, 0], size = [4, 3], \
          normal = [1, 0, 0] }}\n{transform}",
-        vector_text(place.transform_point3(DVec3::new(1.0, 1.0, 1.0))),
-        vector_text(place.transform_point3(DVec3::ZERO)),
-        vector_text(place.transform_point3(lamp)),
+        array(place.transform_point3(DVec3::new(1.0, 1.0, 1.0))),
+        array(place.transform_point3(DVec3::ZERO)),
+        array(place.transform_point3(lamp)),
     );
     let path = folder.join("scene.toml");
-    fs::write(folder.join("slab.obj"), SLAB).unwrap();
+    let slab = obj_box(DVec3::new(-3.0, 3.0, -3.0), DVec3::new(3.0, 3.2, 3.0));
+    fs::write(folder.join("slab.obj"), slab).unwrap();
     fs::write(&path, &text).unwrap();
     let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let traced = Traced::new(&scene, precision);
@@ -114,8 +95,6 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     }
 }
 
-/// Checks that a lamp on a surface lights exactly those points that a lamp slightly off the surface
-/// would light.
 #[test]
 fn lamp_on_surface_lights_like_lamp_just_off_it() {
     let folder = tempfile::tempdir().unwrap();

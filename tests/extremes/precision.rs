@@ -3,20 +3,13 @@
 //! radius of a ball on a floor of constant size. The error of single precision is the RMSE against
 //! double precision with the same samples, in 8-bit levels.
 
-use crate::common::report::report;
-use crate::support::{all_shipped, begin, parsed, picture, pool, shipped, sized, uniform};
-use std::collections::BTreeMap;
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_scene::Scene;
-use zerkalo_world::{AnyWorld, Options, Precision};
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [24, 18];
 /// Picture size in pixels for scenes of a [`Family`].
 const FAMILY_SIZE: [u32; 2] = [32, 24];
-/// Number of samples per pixel in each of the two replicates (halves of the samples). Rounding
-/// diverts some paths, as often to one side of an edge as to the other. With this number of
-/// samples, diverted paths add no visible noise.
+/// Number of samples per pixel in each replicate. Rounding diverts some paths, as often to one side
+/// of an edge as to the other. With this number of samples, diverted paths add no visible noise.
 const SAMPLES: u32 = 128;
 
 /// Largest error of single precision in scenes for which `auto` selects it, in 8-bit levels: a
@@ -30,7 +23,7 @@ fn takes_single(scene: &Scene) -> bool {
 /// Pictures of a scene in single and in double precision, with the same samples.
 struct Pair {
     pictures: [RenderState; 2],
-    /// Samples per pixel in each replicate (half of the samples).
+    /// Samples per pixel in each replicate.
     samples: u32,
 }
 
@@ -59,168 +52,122 @@ fn error(scene: &Scene, samples: u32) -> f64 {
     Pair::new(scene).error(samples)
 }
 
-/// Family of scenes with one parameter, such as the radius of a ball on a floor of constant size.
+/// Family of scenes with one parameter.
 struct Family {
     name: &'static str,
-    /// Function that returns the scene text for a value of the parameter, which is at most 1/4.
-    text: fn(f64) -> String,
     /// Lower limit of the tested values of the parameter.
     least: f64,
     /// Lower limit of the error of single precision, in 8-bit levels, at the smallest tested value
     /// of the parameter.
     visible: f64,
+    /// Function that returns the scene text for a value of the parameter, which is at most 1/4.
+    text: fn(f64) -> String,
+}
+
+fn family(name: &'static str, least: f64, visible: f64, text: fn(f64) -> String) -> Family {
+    Family { name, least, visible, text }
 }
 
 fn camera(eye: [f64; 3], target: [f64; 3], degrees: f64) -> String {
     format!(
-        "[film]\nsize = [48, 36]\n[camera]\neye = {eye:?}\ntarget = {target:?}\n\
-         view_angle.vertical = {degrees:e}\n[background]\ncolor = [0.2, 0.4, 0.6]\n\
-         [ambient]\ncolor = [0.1, 0.1, 0.1]\n"
+        "film.size = [48, 36]\nbackground.color = [0.2, 0.4, 0.6]\n\
+         ambient.color = [0.1, 0.1, 0.1]\n\
+         camera = {{ eye = {eye:?}, target = {target:?}, view_angle.vertical = {degrees:e} }}\n"
     )
+}
+
+fn object(material: &str, shape: &str) -> String {
+    format!("{material}[[object]]\nmaterial = \"m\"\nshape.{shape}\n")
+}
+
+fn ball(material: &str, x: f64, y: f64, radius: f64) -> String {
+    object(material, &format!("sphere = {{ center = [{x:?}, {y:?}, 0], radius = {radius:?} }}"))
+}
+
+fn lamp(position: [f64; 3], intensity: f64) -> String {
+    format!("[[light]]\npoint = {{ position = {position:?} }}\nintensity = {intensity:e}\n")
 }
 
 const SUN: &str = "[[light]]\ndirectional = { direction = [-0.4, -1.0, -0.3] }\n";
 const FLOOR: &str = "[materials.floor]\ncolor = [0.6, 0.55, 0.5]\n[[object]]\n\
     material = \"floor\"\nshape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }\n";
-const RED: &str = "[materials.red]\ncolor = [0.8, 0.2, 0.1]\n\
+const PLAIN: &str = "[materials.m]\n";
+const RED: &str = "[materials.m]\ncolor = [0.8, 0.2, 0.1]\n\
     specular = 0.5\nexponent = 80.0\nreflection = 0.3\n";
+const GLASS: &str = "[materials.m]\nambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\n\
+    transmission = 1.0\nior = 1.5\nfresnel = \"dielectric\"\n";
+/// Ball on the floor.
+const RED_BALL: &str = "[[object]]\nmaterial = \"m\"\n\
+    shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }\n";
 
 /// Returns the scene of a ball of radius `r` on a large floor, seen from close.
 fn small_ball(r: f64) -> String {
-    camera([2.0 * r, 2.5 * r, 5.0 * r], [0.0, r, 0.0], 40.0)
-        + SUN
-        + FLOOR
-        + RED
-        + &format!(
-            "[[object]]\nmaterial = \"red\"\n\
-             shape.sphere = {{ center = [0.0, {r:e}, 0.0], radius = {r:e} }}\n"
-        )
-}
-
-/// Returns the scene of a sheet of thickness `t` on a floor, seen from close to its edge.
-fn thin_slab(t: f64) -> String {
-    camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0)
-        + SUN
-        + FLOOR
-        + RED
-        + &format!(
-            "[[object]]\nmaterial = \"red\"\nshape.box = {{ center = [1.0, {:e}, 0.0], \
-             size = [2.0, {t:e}, 3.0] }}\n",
-            0.5 * t
-        )
+    camera([2.0 * r, 2.5 * r, 5.0 * r], [0.0, r, 0.0], 40.0) + SUN + FLOOR + &ball(RED, 0.0, r, r)
 }
 
 /// Returns the scene of a pane of glass at the height `g` above a floor.
 fn narrow_gap(g: f64) -> String {
-    camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
-        + SUN
-        + FLOOR
-        + &format!(
-            "[materials.glass]\nambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
-             ior = 1.5\nfresnel = \"dielectric\"\n[[object]]\nmaterial = \"glass\"\n\
-             shape.box = {{ center = [0.0, {:e}, 0.0], size = [2.0, 0.1, 2.0] }}\n",
-            0.05 + g
-        )
-}
-
-/// Returns the scene of a hollow ball with a wall of thickness `t` and a lamp inside.
-fn thin_shell(t: f64) -> String {
-    camera([1.0, 2.5, 4.0], [0.0, 0.6, 0.0], 40.0)
-        + "[[light]]\npoint = { position = [0.1, 1.1, 0.1] }\n"
-        + FLOOR
-        + &format!(
-            "[[object]]\nshape.difference.of = [\n\
-             {{ shape.sphere = {{ center = [0.0, 1.0, 0.0], radius = 1.0 }} }},\n\
-             {{ shape.sphere = {{ center = [0.0, 1.0, 0.0], radius = {:?} }} }},\n]\n",
-            1.0 - t
-        )
-}
-
-/// Returns the scene of a lamp at the height `h` above a floor, bright enough for the floor to be
-/// visible.
-fn low_lamp(h: f64) -> String {
-    camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
-        + FLOOR
-        + &format!(
-            "[[light]]\npoint = {{ position = [0.3, {h:e}, 0.2] }}\nintensity = {:e}\n",
-            0.3 / h
-        )
-}
-
-/// Returns a scene with a narrow view, 40 degrees times `a`, of a corner of a cube on a floor.
-fn narrow_view(a: f64) -> String {
-    camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a)
-        + SUN
-        + FLOOR
-        + RED
-        + "[[object]]\nmaterial = \"red\"\nshape.cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }\n"
-}
-
-/// Returns the scene of an eye at the height `h` above a floor that looks at the edge of a box's
-/// shadow.
-fn low_eye(h: f64) -> String {
-    camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
-        + &format!("[[light]]\npoint = {{ position = [3.0, 4.0, {:?}] }}\n", 0.2 - 3.0 * h)
-        + FLOOR
-        + &format!(
-            "[[object]]\nshape.box = {{ center = [1.6, 1.5, {:?}], size = [0.5, 1.0, 1.0] }}\n",
-            0.7 - 3.0 * h
-        )
-}
-
-/// Returns the scene of a ball on the ground, which is a ball of radius 1 / `p`.
-fn round_ground(p: f64) -> String {
-    let r = 1.0 / p;
-    camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
-        + SUN
-        + RED
-        + &format!(
-            "[[object]]\nshape.sphere = {{ center = [0.0, {:?}, 0.0], radius = {r:?} }}\n\
-             [[object]]\nmaterial = \"red\"\n\
-             shape.sphere = {{ center = [0.0, 0.5, 0.0], radius = 0.5 }}\n",
-            -r
-        )
+    let shape = format!("box = {{ center = [0.0, {:e}, 0.0], size = [2.0, 0.1, 2.0] }}", 0.05 + g);
+    camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0) + SUN + FLOOR + &object(GLASS, &shape)
 }
 
 /// Returns the scene of bare ground, a ball of radius 1 / `p`, seen from the height 1.7.
 fn bare_round_ground(p: f64) -> String {
-    let r = 1.0 / p;
-    camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0)
-        + SUN
-        + &format!(
-            "[[object]]\nshape.sphere = {{ center = [0.0, {:?}, 0.0], radius = {r:?} }}\n",
-            -r
-        )
+    camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0) + SUN + &ball(PLAIN, 0.0, -1.0 / p, 1.0 / p)
 }
 
-/// Returns the scene of two balls at the distance 1 / `p` from each other, seen from near one of
-/// them.
-fn far_apart(p: f64) -> String {
-    camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
-        + SUN
-        + FLOOR
-        + RED
-        + "[[object]]\nmaterial = \"red\"\nshape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }\n"
-        + &format!(
-            "[[object]]\nshape.sphere = {{ center = [{:?}, 0.5, 0.0], radius = 0.5 }}\n",
-            1.0 / p
-        )
+fn families() -> [Family; 10] {
+    [
+        family("a small ball on a floor", 1e-6, 1.0, small_ball),
+        family("a slab of thickness t, seen from close to its edge", 1e-6, 1.0, |t| {
+            let shape =
+                format!("box = {{ center = [1.0, {:e}, 0.0], size = [2.0, {t:e}, 3.0] }}", 0.5 * t);
+            let camera = camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0);
+            camera + SUN + FLOOR + &object(RED, &shape)
+        }),
+        // Single precision is right even for the smallest gap, because surfaces within a rounding
+        // error of each other are hit in the right order. Therefore `visible` is 0.
+        family("a narrow gap under glass", 1e-7, 0.0, narrow_gap),
+        family("a hollow ball with a wall of thickness t and a lamp inside", 1e-7, 1.0, |t| {
+            let sphere = |radius: f64| {
+                format!("{{ shape.sphere = {{ center = [0.0, 1.0, 0.0], radius = {radius:?} }} }}")
+            };
+            let shape = format!("difference.of = [{}, {}]", sphere(1.0), sphere(1.0 - t));
+            let camera = camera([1.0, 2.5, 4.0], [0.0, 0.6, 0.0], 40.0);
+            camera + &lamp([0.1, 1.1, 0.1], 1.0) + FLOOR + &object(PLAIN, &shape)
+        }),
+        family("a lamp at the height h, bright enough to show the floor", 1e-6, 1.0, |h| {
+            let camera = camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0);
+            camera + FLOOR + &lamp([0.3, h, 0.2], 0.3 / h)
+        }),
+        family("a narrow view of a corner of a cube", 1e-6, 1.0, |a| {
+            let cube = object(RED, "cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }");
+            camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a) + SUN + FLOOR + &cube
+        }),
+        family("the edge of a box's shadow from the height h", 5e-7, 1.0, |h| {
+            let z = 0.7 - 3.0 * h;
+            let shape = format!("box = {{ center = [1.6, 1.5, {z:?}], size = [0.5, 1.0, 1.0] }}");
+            camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
+                + &lamp([3.0, 4.0, 0.2 - 3.0 * h], 1.0)
+                + FLOOR
+                + &object(PLAIN, &shape)
+        }),
+        family("a ball on a ground that is a ball of radius 1 / p", 1e-8, 1.0, |p| {
+            let ground = ball("", 0.0, -1.0 / p, 1.0 / p).replace("\"m\"", "\"ground\"");
+            camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
+                + SUN
+                + "[materials.ground]\n"
+                + RED
+                + RED_BALL
+                + &ground
+        }),
+        family("a bare round ground", 1e-8, 1.0, bare_round_ground),
+        family("two balls at the distance 1 / p, seen from near one of them", 1e-7, 1.0, |p| {
+            let other = ball("", 1.0 / p, 0.5, 0.5).replace("\"m\"", "\"floor\"");
+            camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0) + SUN + FLOOR + RED + RED_BALL + &other
+        }),
+    ]
 }
-
-const FAMILIES: [Family; 10] = [
-    Family { name: "a small ball on a floor", text: small_ball, least: 1e-6, visible: 1.0 },
-    Family { name: "a thin slab", text: thin_slab, least: 1e-6, visible: 1.0 },
-    // Single precision is right even for the smallest gap, because surfaces within a rounding error
-    // of each other are hit in the right order. Therefore `visible` is 0.
-    Family { name: "a narrow gap under glass", text: narrow_gap, least: 1e-7, visible: 0.0 },
-    Family { name: "a thin shell around a lamp", text: thin_shell, least: 1e-7, visible: 1.0 },
-    Family { name: "a low lamp", text: low_lamp, least: 1e-6, visible: 1.0 },
-    Family { name: "a narrow view", text: narrow_view, least: 1e-6, visible: 1.0 },
-    Family { name: "a low eye", text: low_eye, least: 5e-7, visible: 1.0 },
-    Family { name: "a round ground with a ball", text: round_ground, least: 1e-8, visible: 1.0 },
-    Family { name: "a bare round ground", text: bare_round_ground, least: 1e-8, visible: 1.0 },
-    Family { name: "two balls far apart", text: far_apart, least: 1e-7, visible: 1.0 },
-];
 
 /// Checks families of scenes whose parameter shrinks. `auto` must select single precision at first,
 /// and double precision from some value of the parameter on. Where it selects single precision, the
@@ -229,7 +176,7 @@ const FAMILIES: [Family; 10] = [
 #[test]
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
-    for Family { name, text, least, visible } in FAMILIES {
+    for Family { name, least, visible, text } in families() {
         let (mut single_before, mut p, mut worst) = (true, 0.25, 0.0f64);
         let mut last = 0.0;
         let begins_single = takes_single(&sized(parsed(&text(0.25)), FAMILY_SIZE));
@@ -268,23 +215,12 @@ fn auto_takes_double_where_single_would_show() {
 #[test]
 fn auto_takes_single_where_proportions_are_harmless() {
     let scene_text = |place: f64, size: f64| {
-        let x = |offset: f64| place + size * offset;
+        let [eye, center, light] = [[1.0, 2.0, 8.0], [0.0; 3], [3.0, 5.0, 3.0]]
+            .map(|offsets| offsets.map(|offset| place + size * offset));
         format!(
-            "[camera]\neye = [{:?}, {:?}, {:?}]\ntarget = [{:?}, {:?}, {:?}]\n\
-             [[light]]\npoint = {{ position = [{:?}, {:?}, {:?}] }}\n\
-             [[object]]\nshape.sphere = {{ center = [{:?}, {:?}, {:?}], radius = {size:?} }}\n",
-            x(1.0),
-            x(2.0),
-            x(8.0),
-            x(0.0),
-            x(0.0),
-            x(0.0),
-            x(3.0),
-            x(5.0),
-            x(3.0),
-            x(0.0),
-            x(0.0),
-            x(0.0)
+            "camera = {{ eye = {eye:?}, target = {center:?} }}\n\
+             [[light]]\npoint.position = {light:?}\n\
+             [[object]]\nshape.sphere = {{ center = {center:?}, radius = {size:?} }}\n"
         )
     };
     for (place, size) in [(0.0, 1e-6), (0.0, 1e6), (1e6, 1.0), (-1e7, 10.0), (1e3, 1e-3)] {
@@ -292,80 +228,50 @@ fn auto_takes_single_where_proportions_are_harmless() {
     }
     // Two balls almost touch. The gap between them is smaller than a pixel, except in a close view.
     let two_balls = |degrees: f64| {
-        let ball = |x: f64| {
-            format!("[[object]]\nshape.sphere = {{ center = [{x:?}, 0.0, 0.0], radius = 0.25 }}\n")
-        };
         let camera = camera([0.0, 0.5, 2.0], [0.0, 0.0, 0.0], degrees);
-        parsed(&(camera + SUN + &ball(-0.25) + &ball(0.250_001)))
+        let balls = ball(PLAIN, -0.25, 0.0, 0.25) + &ball("", 0.250_001, 0.0, 0.25);
+        parsed(&(camera + SUN + &balls))
     };
     assert!(takes_single(&two_balls(40.0)) && !takes_single(&two_balls(0.4)));
 }
 
-/// Checks the choice of precision for scenes of all thirty numbered extremes. `auto` selects double
-/// precision for the extremes that single precision cannot represent, and single for the others.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
     let scene_from = |eye: [f64; 3], degrees: f64, shape: &str| {
-        camera(eye, [0.0, 0.0, 0.0], degrees) + SUN + "[[object]]\nshape." + shape + "\n"
+        camera(eye, [0.0, 0.0, 0.0], degrees) + SUN + &object(PLAIN, shape)
     };
-    let ball = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }";
+    let sphere = |radius: f64| format!("sphere = {{ center = [0, 0, 0], radius = {radius:e} }}");
+    let ball = &sphere(1.0);
+    let cuboid = |h: f64| format!("box = {{ center = [0, 0, 0], size = [1, {h:e}, 1] }}");
     let cylinder = |height: f64| {
         format!("cylinder = {{ base = [0, 0, 0], top = [0, {height:e}, 0], radius = 1.0 }}")
     };
     let inline_scenes = [
         (1, true, scene_from([1e6, 0.0, 0.0], 1e-4, ball)),
         (2, true, bare_round_ground(1e-9)),
-        (
-            3,
-            true,
-            scene_from([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }"),
-        ),
+        (3, true, scene_from([1.0, 0.0, 0.0], 1e-3, &sphere(1e-6))),
         (4, false, scene_from([0.1, 0.2, 0.3], 90.0, ball)),
         (5, false, scene_from([3.0, 1.0, 0.0], 40.0, ball)),
-        (
-            6,
-            false,
-            scene_from([3.0, 0.5, 0.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1, 1] }"),
-        ),
+        (6, false, scene_from([3.0, 0.5, 0.0], 40.0, &cuboid(1.0))),
         (11, true, scene_from([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
         (11, true, scene_from([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
-        (
-            13,
-            true,
-            scene_from([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }"),
-        ),
+        (13, true, scene_from([3.0, 2.0, 3.0], 40.0, &cuboid(1e-6))),
         (15, false, small_ball(0.5)),
         (16, true, narrow_gap(1e-6)),
         (17, true, scene_from([3.0, 2.0, 3.0], 1e-3, ball)),
         // Near the border of a view as wide as this, adjacent rays are nearly parallel.
         (17, true, scene_from([3.0, 2.0, 3.0], 179.9, ball)),
     ];
-    let shipped_scenes = [
-        (7, "extents"),
-        (8, "compound-nested"),
-        (9, "compound-intersection"),
-        (10, "compound-difference"),
-        (12, "shape-tapered-cylinder"),
-        (14, "shape-mesh"),
-        (18, "lobe-cone"),
-        (19, "slope-lobe"),
-        (20, "lobe-square"),
-        (21, "horizon-fold"),
-        (22, "lobe-ggx"),
-        (23, "furnace"),
-        (24, "metals"),
-        (25, "glass"),
-        (26, "facing-mirrors"),
-        (27, "transmission"),
-        (28, "mirror-room"),
-        (29, "light-groups"),
-        (30, "slope-aa"),
-    ];
+    let shipped_scenes = "7 extents, 8 compound-nested, 9 compound-intersection, \
+        10 compound-difference, 12 shape-tapered-cylinder, 14 shape-mesh, 18 lobe-cone, \
+        19 slope-lobe, 20 lobe-square, 21 horizon-fold, 22 lobe-ggx, 23 furnace, 24 metals, \
+        25 glass, 26 facing-mirrors, 27 transmission, 28 mirror-room, 29 light-groups, 30 slope-aa";
     let inline_scenes =
         inline_scenes.into_iter().map(|(number, double, text)| (number, double, parsed(&text)));
-    let shipped_scenes = shipped_scenes
-        .into_iter()
-        .map(|(number, name)| (number, false, shipped(&format!("{name}.toml"))));
+    let shipped_scenes = shipped_scenes.split(", ").map(|entry| {
+        let (number, name) = entry.split_once(' ').unwrap();
+        (number.parse().unwrap(), false, shipped(&format!("{name}.toml")))
+    });
     let mut chosen: BTreeMap<usize, Vec<&str>> = BTreeMap::new();
     for (number, double, scene) in inline_scenes.chain(shipped_scenes) {
         assert_eq!(takes_single(&scene), !double, "extreme {number}");
@@ -378,7 +284,7 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     }
 }
 
-/// Checks eyes inside of the bounding box of a cylinder, a cone or an ellipsoid. The box contains
+/// Checks eyes inside the bounding box of a cylinder, a cone or an ellipsoid. The box contains
 /// points close to the surface, for which `auto` selects double precision, and points far from it,
 /// for which it selects single.
 #[test]
@@ -405,7 +311,6 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
     }
 }
 
-/// Checks that shipped scenes are traced in single precision, without visible error.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
     // Rounding diverts some paths in glass and between mirrors. The result is noise, not an error,

@@ -1,12 +1,7 @@
 //! Scenes that are scaled by a millionth or a million, or moved by ten million units, against the
 //! original scene: the pictures are equal.
 
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_scene::light::Falloff;
-use zerkalo_scene::{Scale, Scene, TransformOp};
-use zerkalo_world::Precision;
+use crate::harness::*;
 
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;
@@ -106,13 +101,3 @@ const FLIPPED: usize = 2;
 /// levels: in double precision, and in the precision that `auto` selects. Measured are 3e-7 in
 /// double and 5e-5 in single precision.
 const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
-
-/// Checks moved scenes. Coordinates that are moved by ten million units are rounded to 2e-9 in the
-/// scene file.
-#[test]
-fn shifted_scenes_give_the_same_picture() {
-    let aside = DVec3::new(1.0, -0.7, 0.3);
-    for by in [1.0, 1e3, 1e5, 1e7] {
-        check(&format!("shifted by {by:e}"), 1.0, aside * by, DOUBLE_AUTO, FLIPPED);
-    }
-}

@@ -1,17 +1,12 @@
 //! Convergence rate: the slope of the error against the number of samples, both logarithmic, in
 //! scenes made for this test.
 
-use crate::support::{begin_with, pool, shipped, sized, uniform};
+use crate::harness::*;
 use zerkalo::measure::{Reference, Slope};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::Display;
-use zerkalo_scene::Scene;
-use zerkalo_scene::camera::Aperture;
-use zerkalo_world::Precision;
 
 const SIZE: [u32; 2] = [24, 16];
 /// Smallest number of samples per pixel of the pictures whose errors are fitted, in both replicates
-/// (halves of the samples) together.
+/// together.
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
 /// Number of samples of the reference, divided by [`LAST`], the largest number of samples of the
@@ -48,7 +43,7 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
 /// Returns the slopes of the error of `scene` against the number of samples, both logarithmic: with
 /// Sobol points and with random numbers.
 fn slopes(name: &str, scene: &Scene) -> [Slope; 2] {
-    let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
+    let settings = sobol(77);
     let mut best = begin_with(scene, settings, Precision::Auto);
     uniform(&mut best, 0, REFERENCE * LAST / 2, &pool(2));
     let reference = Reference::of_film(&best.film, &best.mix, &Display::default());
@@ -69,14 +64,11 @@ fn check_scene(name: &str, scene: &Scene, at_most: f64) {
     assert!((random.value + 0.5).abs() <= error, "{name}, random: {random:?}");
 }
 
-/// Checks the convergence of samples with two dimensions: the direction in the lobe.
 #[test]
 fn lobe_error_converges_like_two_dimensions() {
     check("slope-lobe.toml", -0.70);
 }
 
-/// Checks the convergence of samples with four dimensions: the positions in the pixel and on the
-/// lens.
 #[test]
 fn lens_error_converges_like_four_dimensions() {
     let mut scene = sized(shipped("slope-aa.toml"), SIZE);
@@ -98,8 +90,6 @@ fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
     assert!((random.value + 0.5).abs() <= 3.0 * random.standard_error, "{random:?}");
 }
 
-/// Checks the convergence of samples with four dimensions: the position in the pixel and the
-/// direction in the lobe.
 #[test]
 fn lobe_error_with_anti_aliasing_converges_like_four_dimensions() {
     check("slope-aa.toml", -0.58);

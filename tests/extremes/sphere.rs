@@ -1,15 +1,7 @@
 //! Spheres seen from afar, from inside, as ground, and at the limb.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, Traced, closest, scene};
-use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single, Vec3};
-use zerkalo_kernel::primitive::{Aggregate, Form, SphereForm};
-use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
-use zerkalo_world::{AnyWorld, Options, Precision};
+use crate::harness::*;
+use zerkalo_scene::camera::PerspectiveCamera;
 
 /// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]
@@ -166,7 +158,7 @@ fn extreme_02_sphere_as_ground() {
     assert!((below - row).abs() < 0.01, "horizon in row {below}, expected {row}");
 
     for light in ["[0.0, -1.0, 0.0]", "[0.3, -0.2, 0.1]", "[1.0, -0.001, 0.0]"] {
-        let scene = scene(&text(light));
+        let scene = parsed(&text(light));
         // `auto` selects double precision, because single precision rounds coordinates of such a
         // ground to about 100 units.
         let auto = AnyWorld::compile(&scene, &Options::default());
@@ -250,45 +242,6 @@ fn closed_form_10_silhouettes() {
     {
         check_silhouette(center, radius, 200_000, 10 + i as u64);
     }
-}
-
-/// Checks that a pixel shows the sphere exactly if the pixel's centre is inside of the sphere's
-/// silhouette, for which there is a closed form. The camera rays are those of the compiled camera.
-#[test]
-fn closed_form_10_every_pixel_of_a_sphere() {
-    let camera = Camera {
-        eye: [1.0, 2.0, 7.0],
-        target: Some([0.2, 0.3, 0.0]),
-        view_angle: ViewAngle::Horizontal(35.0),
-        ..Camera::default()
-    };
-    let (center, radius) = (DVec3::new(0.4, 0.1, -0.5), 1.3);
-    let view = PerspectiveCamera::new(&camera, [320, 200], DVec3::ZERO);
-    let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
-    let eye = DVec3::from(camera.eye);
-    let [u, v, w] = view.frame();
-    let c = center - eye;
-    let half = 17.5f64.to_radians().tan();
-    let mut covered = 0;
-    for y in 0..200 {
-        for x in 0..320 {
-            let Ray { origin: o, direction: d } =
-                view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((x, y))), (0.5, 0.5));
-            let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
-            let hit = closest(&geometry, &[line])[0].is_some();
-            let step = 2.0 * half / 320.0;
-            let (i, j) = (f64::from(x) + 0.5 - 160.0, 100.0 - f64::from(y) - 0.5);
-            let ray = w + u * (i * step) + v * (j * step);
-            let along = ray.dot(c);
-            let inside =
-                along * along - (c.length_squared() - radius * radius) * ray.length_squared();
-            if inside.abs() > 1e-12 {
-                assert_eq!(hit, inside > 0.0 && along > 0.0, "pixel {x} {y}");
-            }
-            covered += usize::from(hit);
-        }
-    }
-    assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
 }
 
 /// Returns the longest chord that rounding can give a tangent of the unit sphere. Rounding moves a

@@ -1,12 +1,7 @@
 //! Extremes of cylinders, cones and conical frusta.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, LineHit, closest};
-use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
-use glam::{DAffine3, DQuat, DVec3};
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{Aggregate, Form};
-use zerkalo_scene::shape::{Cone, Cylinder, ShapeDesc, TaperedCylinder, UnitFrustum};
+use crate::harness::*;
+use zerkalo_scene::shape::{Cone, TaperedCylinder, UnitFrustum};
 
 fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)
@@ -40,49 +35,6 @@ fn lines(seed: u64, count: usize) -> Vec<Line> {
         .collect()
 }
 
-/// Returns the distances at which a line enters and leaves a canonical solid (radius 1 at z = 0,
-/// radius `s` at z = 1), by the plain quadratic formula. Returns `None` if the line misses, or is
-/// too close to a tangent for the formula.
-fn quadratic_span(s: f64, (o, d): Line) -> Option<(f64, f64)> {
-    let k = s - 1.0;
-    let r = 1.0 + k * o.z;
-    let a = d.x * d.x + d.y * d.y - k * k * d.z * d.z;
-    let b = o.x * d.x + o.y * d.y - k * d.z * r;
-    let c = o.x * o.x + o.y * o.y - r * r;
-    let mut ts = vec![-o.z / d.z, (1.0 - o.z) / d.z];
-    let root = (b * b - a * c).sqrt();
-    if root.is_finite() {
-        ts.extend([(-b - root) / a, (-b + root) / a]);
-    }
-    let inside = |t: f64| {
-        let p = o + d * t;
-        (-1e-9..=1.0 + 1e-9).contains(&p.z) && p.x.hypot(p.y) <= 1.0 + k * p.z + 1e-9
-    };
-    ts.retain(|t| t.is_finite() && inside(*t));
-    let low = ts.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = ts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (high - low > 1e-3).then_some((low, high))
-}
-
-#[test]
-fn frustum_spans_match_the_quadratic_formula() {
-    for s in [0.0, 0.3, 1.0, 1.7, 20.0] {
-        let mut counted = 0;
-        for line in lines(11, 20_000) {
-            let Some((low, high)) = quadratic_span(s, line) else { continue };
-            let form = canonical(s);
-            // Rays start far outside on both sides, because a wide solid contains the origin of the
-            // line.
-            let (enter, leave) =
-                ends(&form, line, 60.0).unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
-            let error = (enter - low).abs().max((leave - high).abs());
-            assert!(error < 1e-7, "s = {s}, {line:?}: {enter} {leave}, not {low} {high}");
-            counted += 1;
-        }
-        assert!(counted > 10_000, "s = {s}: {counted}");
-    }
-}
-
 /// Checks that hits change by no more than rounding from a cylinder to solids with almost equal
 /// radii, where the quadratic changes its degree.
 #[test]
@@ -113,8 +65,6 @@ fn extreme_11_tapered_cylinders() {
     report(11, "single", LEFT_TO_DOUBLE);
 }
 
-/// Checks that a tapered cylinder of two equal radii is bit-equal to a cylinder, and one with the
-/// top radius 0 to a cone.
 #[test]
 fn extreme_11_untapered_solid_is_bit_equal_to_cylinder() {
     let (base, end) = ([0.1, -0.2, 0.3], [0.5, 0.9, -0.4]);

@@ -1,14 +1,9 @@
 //! Volumes of compounds from the chords of lines.
 
-use crate::common::Numbers;
-use crate::common::rays::Line;
-use crate::common::report::report;
-use crate::extremes::compound::{ball, block, chords, difference, intersection, lines, union};
-use glam::{DAffine3, DQuat, DVec3};
-use std::f64::consts::PI;
-use zerkalo_kernel::lanes::Double;
-use zerkalo_kernel::primitive::{Form, PlaneForm};
-use zerkalo_scene::shape::{Cylinder, ShapeDesc};
+use crate::extremes::compound::{
+    ball, block, chords, difference, intersection, lines, torus, union,
+};
+use crate::harness::*;
 
 /// Returns the volume of `form`, which is in the cube from -`half` to `half`, and the standard
 /// error of this volume. They are computed from the chords of parallel lines, one in each cell of a
@@ -86,6 +81,12 @@ fn extreme_09_volumes() {
             difference(vec![ball(0.0, 0.0, 0.0, 1.0), rod([0.0, 2.0, 0.0], hole)]),
             PI * ring.powi(3) / 6.0,
         ),
+        ("torus", torus(1.0, 0.4), 2.0 * PI * PI * 0.16),
+        (
+            "half a torus",
+            intersection(vec![torus(0.9, 0.45), half_space(DVec3::X, 0.0)]),
+            PI * PI * 0.9 * 0.45 * 0.45,
+        ),
         (
             "Steinmetz",
             intersection(vec![rod([2.0, 0.0, 0.0], 0.7), rod([0.0, 2.0, 0.0], 0.7)]),
@@ -126,7 +127,7 @@ fn extreme_09_volumes() {
 }
 
 /// Checks the inclusion-exclusion principle on every line: L(A or B) + L(A and B) = L(A) + L(B),
-/// where L is the length of the line inside of a solid.
+/// where L is the length of the line inside a solid.
 #[test]
 fn extreme_09_inclusion_and_exclusion() {
     let solids = [
@@ -147,8 +148,8 @@ fn extreme_09_inclusion_and_exclusion() {
             for n in 0..lines.len() {
                 let sum = alone[i][n] + alone[j][n];
                 let context = || format!("{i} {j} {:?}", lines[n]);
-                // Intervals thinner than the tie tolerance (within which surfaces count as
-                // coincident) are dropped. Along grazing lines, the tolerance is larger.
+                // Intervals thinner than the tie tolerance are dropped. Along grazing lines, the
+                // tolerance is larger.
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
                 assert!(close(either[n] + both[n], sum), "{}: {}", context(), either[n] + both[n]);
                 assert!(close(first[n] + both[n], alone[i][n]), "{}", context());

@@ -1,13 +1,8 @@
 //! Tests of the camera's frame and of navigation.
 
-use crate::agreement::compare::zoomed;
-use crate::features::first_hits::hits_agree;
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Verdict, ensure, row};
-use crate::support::shipped;
-use glam::DVec3;
-use zerkalo_scene::Scene;
-use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
 
 fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))

@@ -1,14 +1,9 @@
 //! Tests of lights with a size, and of many lights.
 
-use crate::agreement::REFERENCE_SAMPLES;
-use crate::emitters::setup::check;
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Change, material, row};
-use crate::support::{parsed, shipped};
-use zerkalo_scene::light::{
-    Directional, Environment, Falloff, Light, LightKind, LightUnit, Point, RectangleLight,
-};
-use zerkalo_scene::{RayTypes, Scene};
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
+use zerkalo_scene::light::{Environment, LightUnit};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
 /// `mutations`, changed versions of the scene, must disagree.
@@ -71,22 +66,17 @@ fn d5_rectangle_light() {
     );
     let filled = |height: f64| {
         let side = 0.5 * height;
-        let scene = parsed(&format!(
-            "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
-             [camera]\neye = [0.0, 0.1, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
-             view_angle.vertical = 0.1\n\
-             [materials.mirror]\nambient = 0.0\ndiffuse = 0.0\nspecular = 0.0\nreflection = 0.7\n\
-             lobe = \"cone\"\nroughness = 0.2\n\
-             [[light]]\nrectangle = {{ center = [0.0, {height:?}, 0.0], size = [{side:?}, {side:?}], \
-             normal = [0.0, -1.0, 0.0] }}\n\
-             [[object]]\nmaterial = \"mirror\"\n\
-             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [0.2, 0.2] }}\n"
-        ));
+        let light = format!(
+            "[[light]]\nrectangle = {{ center = [0.0, {height:?}, 0.0], size = [{side:?}, {side:?}], \
+             normal = [0.0, -1.0, 0.0] }}"
+        );
+        let mirror = "ambient = 0\ndiffuse = 0\nreflection = 0.7\nlobe = \"cone\"\nroughness = 0.2";
+        let scene = receiver(DVec3::Y, mirror, &light);
         (format!("height {height}"), scene, 0.7)
     };
     // A light that fills the cone lobe. Sampled points of the light and reflected rays both find
     // all of its light. The weights of these two techniques are 0.22 and 0.78.
-    check(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
+    check_means(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
 }
 
 #[test]

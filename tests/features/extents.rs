@@ -1,11 +1,9 @@
 //! Bounding boxes and the other acceleration structures.
 
-use crate::features::first_hits::hits_agree;
-use crate::features::row::{Verdict, ensure, row};
-use crate::support::{rendered, shipped, sized};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_scene::{Acceleration, Scene};
-use zerkalo_world::{AnyWorld, Options, Precision};
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
+use zerkalo_scene::Acceleration;
 
 /// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {

@@ -1,11 +1,9 @@
 //! Tests of rough transmission and absorption.
 
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{material, row};
-use crate::support::shipped;
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
 use zerkalo_scene::light::SphereLight;
-use zerkalo_scene::material::Lobe;
-use zerkalo_scene::value::Color;
 
 #[test]
 fn d6_rough_transmission() {
@@ -21,8 +19,7 @@ fn d6_rough_transmission() {
             ("microfacets for the cone", &|s| material(s, "spread").lobe = Lobe::Beckmann),
         ],
     );
-    // A lamp instead of the sun: points of it are sampled through the pane and from inside of
-    // solids.
+    // A lamp instead of the sun: points of it are sampled through the pane and from inside solids.
     let mut lit = original;
     let lamp = &mut lit.lights[0];
     lamp.kind = SphereLight { center: [1.0, 1.2, -3.0], radius: 0.5 }.into();

@@ -1,16 +1,8 @@
 //! Tests of mirrors and blurred reflection.
 
-use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
-use crate::features::plain_tracer::{agrees, without_chance};
-use crate::features::row::{Verdict, ensure, material, number, object, row, shape};
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::material::Lobe;
-use zerkalo_scene::shape::Shape;
-use zerkalo_scene::{Filter, Scale, Scene, TransformOp};
-use zerkalo_world::Precision;
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
 
 /// Returns `scene` with the mirror as its only reflecting object. The mirror's material has no
 /// ambient and no diffuse part.
@@ -26,8 +18,6 @@ fn stripped(scene: &Scene) -> Scene {
     scene
 }
 
-/// Returns `scene` without the mirror, and with objects and lights mirrored at the mirror's plane z
-/// = -2.
 fn mirrored_scene(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");
@@ -46,8 +36,8 @@ fn mirrored_scene(scene: &Scene) -> Scene {
 fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
     let mirror = number(original, "mirror") as u32;
     let hits = first_hits(&sized(original.clone(), RASTER));
-    let mirrored = without_chance(&mirrored_scene(original));
-    let pixels = without_chance(&stripped(tested));
+    let mirrored = without_noise(&mirrored_scene(original));
+    let pixels = without_noise(&stripped(tested));
     let (mut compared, mut objects) = (0, 0);
     for ((hit, mirrored), pixel) in hits.iter().zip(&mirrored).zip(&pixels) {
         if hit.object == Some(mirror) {
@@ -150,9 +140,9 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     let hits = first_hits(&original);
     let mirrors = (0..a.len()).filter(|i| hits[*i].object == Some(0));
     let pixel = |i: usize| {
-        let ray = pixel_ray(&original.camera, FINE, centers(FINE)[i]);
-        let on_mirror = ray.origin + ray.direction * ((-1.0 - ray.origin.z) / ray.direction.z);
-        let mirrored = ray.direction * DVec3::new(1.0, 1.0, -1.0);
+        let (origin, direction) = pixel_ray(&original, centers(FINE)[i]);
+        let on_mirror = origin + direction * ((-1.0 - origin.z) / direction.z);
+        let mirrored = direction * DVec3::new(1.0, 1.0, -1.0);
         let spot = |o: &zerkalo_scene::Object| match &o.shape {
             Shape::Sphere(s) => {
                 let to_center = DVec3::from(s.center) - on_mirror;

@@ -1,9 +1,7 @@
 //! Mutations of the source code, which must make the test of a feature fail. `mutate.sh` runs them;
 //! the test here checks that they still apply to the source.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
+use crate::harness::*;
 
 /// Mutation of the source code: replacement of one expression.
 pub struct Mutation {

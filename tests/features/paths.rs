@@ -1,20 +1,12 @@
 //! Tests of path depth, of transmission, and of faults of earlier ray tracers.
 
-use crate::features::first_hits::{RASTER, centers, hits_agree, pixel_ray};
-use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
-use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::material::Fresnel;
-use zerkalo_scene::shape::Shape;
-use zerkalo_scene::value::Color;
-use zerkalo_scene::{Filter, RayTypes, Scene};
-use zerkalo_world::Precision;
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
 
 #[test]
 fn b1_tracing_depth() {
-    let levels: [(&str, crate::features::row::Change); 3] = [
+    let levels: [(&str, Change); 3] = [
         ("camera rays only", &|s| s.trace.ray_types = RayTypes::Primary),
         ("shadows", &|s| s.trace.ray_types = RayTypes::Shadows),
         ("everything", &|s| s.trace.ray_types = RayTypes::Full),
@@ -34,7 +26,6 @@ fn b1_tracing_depth() {
 /// Upright pane of a scene of panes, each of which reflects and transmits rays.
 struct Pane {
     center: DVec3,
-    /// Half the width and half the height of the pane.
     half: [f64; 2],
     /// Radiance that the pane emits.
     glow: DVec3,
@@ -89,9 +80,8 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
         let (mut sum, mut variance) = (DVec3::ZERO, DVec3::ZERO);
         let first = band * 6 * RASTER[0] as usize;
         for (i, center) in (first..).zip(centers) {
-            let ray = pixel_ray(&original.camera, RASTER, *center);
-            let expected =
-                tree(&panes, background, ray.origin, ray.direction, original.trace.max_depth);
+            let (origin, direction) = pixel_ray(&sized(original.clone(), RASTER), *center);
+            let expected = tree(&panes, background, origin, direction, original.trace.max_depth);
             let [a, b] = [DVec3::from(a[i]), DVec3::from(b[i])];
             sum += (a + b) / 2.0 - expected;
             variance += ((a - b) / 2.0).powf(2.0) + DVec3::splat(1e-14);
@@ -130,7 +120,7 @@ fn sums_reflections(
     tested.ambient.color = Color::WHITE;
     tested.lights.clear();
     let sum: f64 = terms.sum();
-    for pixel in without_chance(&tested) {
+    for pixel in without_noise(&tested) {
         let difference = (pixel - DVec3::splat(sum)).abs().max_element();
         ensure(difference < 1e-5, || format!("{pixel} between the mirrors, not {sum}"))?;
     }
@@ -168,14 +158,14 @@ fn b2_ray_tree() {
 }
 
 /// Checks a large ball that reflects all light on its outside and transmits a fifth at each
-/// surface. In front of a white background its radiance is 1 + 0.2 x 0.2, because light inside of
-/// the ball is not reflected.
+/// surface. In front of a white background its radiance is 1 + 0.2 x 0.2, because light inside the
+/// ball is not reflected.
 fn has_no_inner_reflections(tested: &Scene) -> Verdict {
     let mut alone = tested.clone();
     alone.objects.truncate(1);
     alone.background.color = Color::WHITE;
     alone.lights.clear();
-    for pixel in without_chance(&alone) {
+    for pixel in without_noise(&alone) {
         let equals = |x: f64| (pixel - DVec3::splat(x)).abs().max_element() < 1e-6;
         ensure(equals(1.0) || equals(1.04), || format!("{pixel} on the ball"))?;
     }
@@ -220,7 +210,7 @@ fn c4_old_faults() {
         // Twelve lossless reflections, then the path ends.
         sums_reflections(tested, ["left mirror", "right mirror"], [1.0; 13].into_iter())?;
         // The white ball, lit by more than 1, keeps its brightness in the mirrors.
-        let brightest = |s: &Scene| without_chance(s).iter().map(|p| p.x).fold(0.0, f64::max);
+        let brightest = |s: &Scene| without_noise(s).iter().map(|p| p.x).fold(0.0, f64::max);
         let bright = brightest(tested);
         ensure(bright > 1.5, || format!("the brightest pixel has {bright}"))
     };
@@ -230,9 +220,7 @@ fn c4_old_faults() {
         &[
             ("the room not seen from inside", &|s| material(s, "plaster").two_sided = false),
             ("the ball before the lamp", &|s| {
-                let Shape::Sphere(ball) =
-                    &mut crate::features::row::object(s, "above the lamp").shape
-                else {
+                let Shape::Sphere(ball) = &mut object(s, "above the lamp").shape else {
                     unreachable!()
                 };
                 ball.center[1] = 1.6;

@@ -1,34 +1,15 @@
 //! Tests of features of the program: cap on rays per pixel, threads, edits during rendering,
 //! demonstrations.
 
-use crate::features::first_hits::{RASTER, first_hits, hits_agree};
-use crate::features::plain_tracer::agrees;
-use crate::features::row::{Verdict, ensure, material, number};
-use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
-use std::path::Path;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::export::Provenance;
-use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::film::{Display, Film, Replicates, TILE};
-use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
-use zerkalo_render::session::{Session, State};
-use zerkalo_render::{Checkpoint, Options, SyncRender};
-use zerkalo_scene::disk::Existing;
-use zerkalo_scene::edit::{self, Edit, EditError, Target};
-use zerkalo_scene::material::Material;
-use zerkalo_scene::shape::Shape;
-use zerkalo_scene::{History, Scene};
-use zerkalo_world::{self as world, Precision};
+use crate::features::row::*;
+use crate::harness::*;
+use crate::reference::*;
+use zerkalo_render::{Options, SyncRender};
+use zerkalo_scene::History;
+use zerkalo_scene::edit::{Edit, EditError};
 
 fn options() -> Options {
-    Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed: 1, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    }
+    render_options(sobol(1))
 }
 
 /// Returns two values for each tile: its samples per pixel, and `true` if the camera sees a
@@ -53,7 +34,7 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
 /// 16 samples in such a tile.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
-    let stop = Stop { noise_levels: Some(levels), ..Stop::default() };
+    let stop = noise_stop(levels);
     let settings =
         Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let mut render = SyncRender::new(&scene, &options(), settings, 2).map_err(|e| e.to_string())?;
@@ -117,7 +98,7 @@ fn is_the_experiment(scene: &Scene) -> Verdict {
 /// different sample counts.
 fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     let mut rendering = begin(&sized(scene.clone(), [100, 70]), seed, Precision::Auto);
-    let stop = Stop { spp: Some(96), ..Stop::default() };
+    let stop = spp_stop(96);
     follow(&mut rendering, settings(true, 0, stop), &pool(threads));
     rendering.film
 }
@@ -164,7 +145,6 @@ impl Desk {
         Self { session: Session::new(2, options(), settings).unwrap() }
     }
 
-    /// Returns the session's finished picture of `scene`.
     fn finished_picture(&mut self, scene: &Scene) -> Vec<[f64; 3]> {
         let generation = self.session.set_scene(Arc::new(scene.clone()));
         let end = Instant::now() + Duration::from_secs(60);
@@ -188,11 +168,10 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
     picture(&rendering, Replicates::Both)
 }
 
-/// Name of an edit, and the function that applies it to a scene.
 type NamedEdit<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, EditError> + 'a>);
 
 /// Returns the edit that sets the property `key` of a part of the scene. `label` is the part's
-/// label in the outline (the list of all parts).
+/// label in the outline.
 fn set<'a>(label: &'a str, key: &'a str, text: &'a str) -> NamedEdit<'a> {
     let edit = move |scene: &Scene| {
         let subject = edit::outline(scene).into_iter().map(|(_, s)| s).find(|s| {
@@ -293,8 +272,7 @@ fn left_to_right(scene: &Scene) -> f64 {
     scene.camera.view_angle = zerkalo_scene::camera::ViewAngle::Vertical(14.0);
     scene.objects.retain(|o| ["floor", "ball"].contains(&o.name.as_str()));
     let floor = number(&scene, "floor") as u32;
-    let (hits, pixels) =
-        (first_hits(&scene), crate::features::plain_tracer::without_chance(&scene));
+    let (hits, pixels) = (first_hits(&scene), without_noise(&scene));
     let side = |left: bool| -> f64 {
         let half = RASTER[0] as usize / 2;
         let indices = (0..hits.len()).filter(|i| (i % RASTER[0] as usize >= half) != left);
@@ -386,7 +364,7 @@ fn a19_checkpoints() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.zk");
     let scene = Arc::new(sized(shipped("mirror-room.toml"), [96, 72]));
-    let stop = Stop { noise_levels: Some(0.7), ..Stop::default() };
+    let stop = noise_stop(0.7);
     let settings =
         Settings { adaptive: true, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
     let start = || Session::new(2, options(), settings).unwrap();

@@ -1,30 +1,19 @@
 //! Test of rendering in regions, the feature for big pictures.
 
-use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::{begin, follow, pool, settings, shipped, sized};
-use std::sync::Arc;
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::export::Provenance;
-use zerkalo_render::film::{Display, Film, Replicates};
+use crate::features::row::*;
+use crate::harness::*;
+use zerkalo_render::RegionRender;
 use zerkalo_render::image_file::Bands;
-use zerkalo_render::schedule::Stop;
-use zerkalo_render::{Options, RegionRender};
-use zerkalo_scene::{Filter, Scene};
-use zerkalo_world::{self as world, Precision};
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
 
-/// Renders `scene` in regions (bands of the picture, one after the other) of `rows` rows. Compares
-/// each row with `whole`, a uniform render of the whole picture.
+/// Renders `scene` in regions of `rows` rows. Compares each row with `whole`, a uniform render of
+/// the whole picture.
 fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
     let scene = Arc::new(sized(scene.clone(), SIZE));
-    let options = Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed: SEED, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    let stop = Stop { spp: Some(8), ..Stop::default() };
+    let options = render_options(sobol(SEED));
+    let stop = spp_stop(8);
     let provenance = Provenance {
         source: String::new(),
         scene_hash: String::new(),
@@ -52,7 +41,7 @@ fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
 #[test]
 fn e3_regions() {
     let mut state = begin(&sized(shipped("mirror-room.toml"), SIZE), SEED, Precision::Auto);
-    follow(&mut state, settings(false, 0, Stop { spp: Some(8), ..Stop::default() }), &pool(2));
+    follow(&mut state, settings(false, 0, spp_stop(8)), &pool(2));
     let whole = state.film;
     let check = |scene: &Scene| {
         [16, 32, 48, 80].iter().try_for_each(|rows| regions_equal(&whole, scene, *rows))

@@ -1,13 +1,7 @@
 //! Test of a row of docs/features.md: a check that passes for the shipped scene and fails for each
 //! mutation of it.
 
-use crate::support::{parsed, shipped};
-use zerkalo_scene::material::Material;
-use zerkalo_scene::shape::Shape;
-use zerkalo_scene::{Object, Scene};
-
-/// Result of a check: success, or a description of the failure.
-pub type Verdict = Result<(), String>;
+use crate::harness::*;
 
 /// Mutation of a scene, which replaces a feature by a similar one.
 pub type Change<'a> = &'a dyn Fn(&mut Scene);
@@ -37,29 +31,20 @@ fn checked_row(file: &str, check: &dyn Fn(&Scene) -> Verdict, mutations: &[(&str
     }
 }
 
-/// Returns the object of the scene with the name `name`.
 pub fn object<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Object {
     let found = scene.objects.iter_mut().find(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// Returns the index of the object with the name `name`.
 pub fn number(scene: &Scene, name: &str) -> usize {
     let found = scene.objects.iter().position(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// Returns the material of the scene with the name `name`.
 pub fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
     scene.materials.get_mut(name).unwrap_or_else(|| panic!("no material \"{name}\""))
 }
 
-/// Returns the shape that scene files write as `shape.` followed by `text`.
 pub fn shape(text: &str) -> Shape {
     parsed(&format!("[[object]]\nshape.{text}")).objects.remove(0).shape
-}
-
-/// Returns `Err` with the text of `error` unless `condition` holds.
-pub fn ensure(condition: bool, error: impl FnOnce() -> String) -> Verdict {
-    if condition { Ok(()) } else { Err(error()) }
 }

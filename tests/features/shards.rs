@@ -1,24 +1,12 @@
 //! Tests of renders that are divided among machines.
 
-use crate::features::row::{Verdict, ensure, material, row};
-use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
+use crate::features::row::*;
+use crate::harness::*;
+use std::time::SystemTime;
 use zerkalo_render::film::file::{
     FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
 };
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::film::{Display, Film, LightWeights};
-use zerkalo_render::plan::{
-    Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,
-};
-use zerkalo_render::schedule::Stop;
-use zerkalo_scene::Scene;
-use zerkalo_scene::disk::Existing;
-use zerkalo_world::Precision;
-
-use std::fs;
-use std::path::Path;
-use std::time::SystemTime;
+use zerkalo_render::plan::{Part, PartShard, PlannedTile, ShardRender, WatchedFilms, WatchedState};
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
@@ -27,12 +15,12 @@ const SEED: u64 = 5;
 /// sample counts.
 fn film_of_one(scene: &Scene) -> Film {
     let mut state = begin(&sized(scene.clone(), SIZE), SEED, Precision::Auto);
-    follow(&mut state, settings(true, 0, Stop { spp: Some(96), ..Stop::default() }), &pool(2));
+    follow(&mut state, settings(true, 0, spp_stop(96)), &pool(2));
     state.film
 }
 
 /// Returns a plan that divides a render with the sample counts of `film` into `shards` shards. The
-/// base (samples that the plan starts from) has 4 samples in each tile.
+/// base has 4 samples in each tile.
 fn plan(film: &Film, shards: u32) -> Plan {
     let tile = |i: usize| PlannedTile {
         base: 4,
@@ -60,11 +48,10 @@ fn plan(film: &Film, shards: u32) -> Plan {
     }
 }
 
-/// Returns the films of the plan's base (samples that the plan starts from) and of all shards.
 fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
     let scene = sized(scene.clone(), SIZE);
     let part = |shard: u32| {
-        let sampling = SampleSettings { seed: SEED, kind: SamplerKind::Sobol };
+        let sampling = sobol(SEED);
         let state = begin_with(&scene, sampling, Precision::Auto);
         let mut render = ShardRender::new(state, &plan.ranges(shard), 0, 2)?;
         while render.step() {}
@@ -73,8 +60,6 @@ fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
     (0..=plan.settings.shards).map(part).collect()
 }
 
-/// Checks that the films of `shards` shards add up to the film `one`, both in ascending and in
-/// descending order of the shards.
 fn shards_add_to(one: &Film, scene: &Scene, shards: u32) -> Verdict {
     let parts = parts(scene, &plan(one, shards))?;
     for descending in [false, true] {

@@ -2,9 +2,7 @@
 //! exist.
 
 use crate::features::mutations;
-use std::collections::BTreeSet;
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::harness::*;
 
 /// Returns the names of the rows of docs/features.md: A1 to A19, B1 to B15, C1 to C4, D1 to D12, E1
 /// to E3.

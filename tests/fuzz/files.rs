@@ -1,11 +1,9 @@
 //! Small valid files of every format that the program reads. Together they contain every feature
 //! that the readers support.
 
-use crate::support::png_file::PngImage;
+use crate::harness::*;
 use png::{BitDepth, ColorType};
-use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_render::film::Display;
-use zerkalo_render::plan::{Plan, PlanSettings, PlannedTile};
+use zerkalo_render::plan::PlannedTile;
 use zerkalo_scene::value::fnv1a64;
 
 /// Returns a triangle mesh of a sphere: its vertices, and the vertex indices of each triangle.

@@ -4,22 +4,11 @@
 mod files;
 mod mutate;
 
+use crate::harness::*;
 use mutate::Random;
-use std::path::Path;
-use std::sync::{Arc, LazyLock};
-use std::time::{Duration, Instant};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::export::Provenance;
-use zerkalo_render::film::Display;
-use zerkalo_render::film::file::{FilmFileHeader, FilmReader};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::plan::Plan;
-use zerkalo_render::schedule::{Criterion, Settings, Stop};
-use zerkalo_render::session::{Session, State};
-use zerkalo_render::{Checkpoint, Options, SampleInputs};
-use zerkalo_scene::Scene;
-use zerkalo_scene::asset::Assets;
-use zerkalo_scene::disk::Existing;
+use std::sync::LazyLock;
+use zerkalo_render::SampleInputs;
+use zerkalo_render::film::file::FilmFileHeader;
 
 /// Number of mutations that are read for each format; `ZERKALO_CASES` sets another one.
 static CASES: LazyLock<u64> = LazyLock::new(|| {
@@ -98,7 +87,6 @@ fn mesh(path: &Path, bytes: &[u8]) -> bool {
     accepts_mesh(path)
 }
 
-/// Reads the mesh file `path`. Returns `true` if it is accepted.
 fn accepts_mesh(path: &Path) -> bool {
     match Assets::default().mesh(path) {
         Ok(mesh) => {
@@ -259,12 +247,8 @@ fn checkpoints() -> Vec<Vec<u8>> {
 }
 
 fn session(spp: u32) -> Session {
-    let options = Options {
-        world: zerkalo_world::Options::default(),
-        sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let options = render_options(sobol(0));
+    let stop = spp_stop(spp);
     let criterion = Criterion::Levels;
     let settings = Settings { adaptive: true, criterion, rays_per_pixel: 0, stop };
     Session::new(1, options, settings).unwrap()

@@ -1,32 +1,13 @@
 //! Mutations of files, similar to those that faulty writers, transfers and editors cause.
 
-use crate::common::Numbers;
+use crate::harness::*;
 
 /// Generator of random mutations.
 pub struct Random(Numbers);
 
 /// Texts that replace numbers in a file.
-const NUMBERS: &[&str] = &[
-    "0",
-    "-1",
-    "1",
-    "2",
-    "-0.0",
-    "nan",
-    "inf",
-    "-inf",
-    "1e400",
-    "1e-400",
-    "9999999999",
-    "4294967295",
-    "2147483648",
-    "-9223372036854775808",
-    "18446744073709551615",
-    "0.5",
-    ".",
-    "1e",
-    "",
-];
+const NUMBERS: &str = "0 -1 1 2 -0.0 nan inf -inf 1e400 1e-400 9999999999 4294967295 2147483648 \
+     -9223372036854775808 18446744073709551615 0.5 . 1e ";
 
 impl Random {
     /// Creates the generator with the given seed.
@@ -89,7 +70,7 @@ impl Random {
         let digit = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-');
         let Some(begin) = out[at..].iter().position(digit).map(|b| b + at) else { return };
         let length = out[begin..].iter().position(|b| !digit(b)).unwrap_or(out.len() - begin);
-        let number = NUMBERS[self.below(NUMBERS.len())];
+        let number = NUMBERS.split(' ').nth(self.below(NUMBERS.split(' ').count())).unwrap();
         out.splice(begin..begin + length, number.bytes());
     }
 }

@@ -1,11 +1,7 @@
 //! Comparison of packets with vectors of width 1: their results must be equal in every bit.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, packets, surface};
-pub use crate::common::rays::{any_line, forms};
-use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo_kernel::primitive::{Aggregate, Form};
+use crate::harness::*;
+pub use crate::harness::{any_line, forms};
 
 fn lane_of<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     v: Vec3<L>,

@@ -1,8 +1,6 @@
 //! Ray intersection against closed forms and exact arithmetic.
 
 mod bits;
-mod light;
-mod mirror;
 mod torus;
 mod transforms;
 mod tree;

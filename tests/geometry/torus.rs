@@ -5,14 +5,8 @@
 //! - self-shadowing
 //! - tori in compounds
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, blocked, closest};
-use glam::{DAffine3, DQuat, DVec3};
-use std::f64::consts::PI;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_kernel::primitive::{
-    Aggregate, BoundingVolume, CsgSolid, CsgTree, Form, PlaneForm, SphereForm, TorusForm,
-};
+use crate::harness::*;
+use zerkalo_kernel::primitive::{BoundingVolume, TorusForm};
 
 /// Ratios of the tube's radius to the ring's radius.
 const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];
@@ -149,70 +143,6 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Checks that hits in a lane depend neither on the other lanes of the packet nor on the width of
-/// the packet.
-#[test]
-fn torus_hits_do_not_depend_on_other_lanes() {
-    let mut numbers = Numbers::new(3);
-    let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
-    let bits = |all: Vec<Option<crate::common::rays::LineHit>>| -> Vec<Option<u64>> {
-        all.into_iter().map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
-    };
-    let form = torus(0.3);
-    let single = bits(closest(&geometry::<Single>(&form), &lines));
-    assert_eq!(single, bits(closest(&geometry::<f32>(&form), &lines)));
-    let double = bits(closest(&geometry::<Double>(&form), &lines));
-    assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
-}
-
-/// Returns the distances of all hits along each line, in ascending order. The lines start outside
-/// of the object.
-fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
-    let mut out = vec![Vec::new(); lines.len()];
-    for (hits, (origin, d)) in out.iter_mut().zip(lines) {
-        let mut from = 0.0;
-        while let Some(hit) = closest(geometry, &[(*origin + *d * from, *d)])[0] {
-            hits.push(from + hit.t);
-            from += hit.t + 1e-9;
-            assert!(hits.len() < 16, "{origin} {d}: {hits:?}");
-        }
-    }
-    out
-}
-
-/// Returns lines along `d` through an even grid of `side` by `side` points. The grid is a square of
-/// half-width `half` around the origin, perpendicular to `d`.
-fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
-    let (u, v) = d.any_orthonormal_pair();
-    let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
-    (0..side * side).map(|i| (u * place(i % side) + v * place(i / side) - d * 5.0, d)).collect()
-}
-
-#[test]
-fn torus_volume_and_projected_area_match_closed_forms() {
-    for tube in [0.1, 0.4, 1.0] {
-        let geometry = geometry::<Double>(&torus(tube));
-        let (half, side) = (1.0 + tube, 300);
-        let cell = (2.0 * half / side as f64).powi(2);
-        let oblique = DVec3::new(0.3, 0.8, -0.5).normalize();
-        for (d, area) in [
-            (DVec3::Y, Some(4.0 * PI * tube)),
-            (DVec3::X, Some(4.0 * tube + PI * tube * tube)),
-            (oblique, None),
-        ] {
-            let hits = all_hits(&geometry, &grid(d, half, side));
-            let pairs = |hits: &Vec<f64>| hits.chunks(2).map(|pair| pair[1] - pair[0]).sum::<f64>();
-            let volume = hits.iter().map(pairs).sum::<f64>() * cell;
-            let expected = 2.0 * PI * PI * tube * tube;
-            assert!((volume / expected - 1.0).abs() < 3e-3, "{tube} {d}: {volume} {expected}");
-            let seen = hits.iter().filter(|hits| !hits.is_empty()).count() as f64 * cell;
-            if let Some(area) = area {
-                assert!((seen / area - 1.0).abs() < 3e-2, "{tube} {d}: {seen} {area}");
-            }
-        }
-    }
-}
-
 /// Checks that a shadow ray from the inner side of the ring across the hole is blocked by the
 /// opposite side.
 #[test]
@@ -226,8 +156,6 @@ fn torus_casts_shadows_on_itself() {
     assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
-/// Checks rays that start on the outside of the ring, offset from the surface by the ray offset of
-/// their precision. They must not hit the surface again near their start.
 #[test]
 fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     fn check<L: SimdFloat>(tube: f64) {
@@ -255,60 +183,6 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
         check::<Single>(tube);
         check::<Double>(tube);
     }
-}
-
-/// Checks hits on compounds (CSG) of a torus, a ball and a half-space. A line has an odd number of
-/// hits before a point exactly if the point is inside of the compound. The test compares both for
-/// the middle of each interval between two hits.
-#[test]
-fn torus_in_compounds_has_two_intervals() {
-    let contains = |part: usize, p: DVec3| match part {
-        0 => height(p, 0.35) <= 0.0,
-        1 => p.distance(DVec3::new(0.9, 0.1, 0.2)) <= 0.5,
-        _ => p.dot(DVec3::new(0.0, 0.6, 0.8)) <= 0.05,
-    };
-    let ball = SphereForm { center: DVec3::new(0.9, 0.1, 0.2), radius: 0.5 };
-    let parts: Vec<Form> = vec![
-        torus(0.35),
-        ball.into(),
-        PlaneForm { normal: DVec3::new(0.0, 0.6, 0.8), offset: 0.05 }.into(),
-    ];
-    let leaves = || vec![CsgTree::Part(0), CsgTree::Part(1)];
-    let mut numbers = Numbers::new(5);
-    let lines: Vec<Line> = (0..3000)
-        .map(|_| {
-            let d = numbers.direction();
-            (numbers.in_cube(1.2) - d * 5.0, d)
-        })
-        .collect();
-    type Inside<'a> = &'a dyn Fn(&[bool; 3]) -> bool;
-    let trees: [(CsgTree, Inside); 4] = [
-        (CsgTree::Union(leaves()), &|c| c[0] || c[1]),
-        (CsgTree::Intersection(leaves()), &|c| c[0] && c[1]),
-        (CsgTree::Difference(leaves()), &|c| c[0] && !c[1]),
-        (CsgTree::Difference(vec![CsgTree::Part(1), CsgTree::Part(0)]), &|c| c[1] && !c[0]),
-    ];
-    let mut several = 0;
-    for (tree, inside) in trees {
-        let swapped = matches!(&tree, CsgTree::Difference(list) if list[0] == CsgTree::Part(1));
-        let used =
-            if swapped { vec![parts[1].clone(), parts[0].clone()] } else { parts[..2].to_vec() };
-        let tree = if swapped { CsgTree::Difference(leaves()) } else { tree };
-        let cut = CsgTree::Intersection(vec![tree, CsgTree::Part(2)]);
-        let used = [used, vec![parts[2].clone()]].concat();
-        let form: Form = CsgSolid::new(used, cut).unwrap().into();
-        for ((origin, d), hits) in lines.iter().zip(all_hits(&geometry::<Double>(&form), &lines)) {
-            assert!(hits.len().is_multiple_of(2), "{origin} {d} {hits:?}");
-            several += usize::from(hits.len() > 2);
-            let ends = [vec![0.0], hits, vec![12.0]].concat();
-            for (n, gap) in ends.windows(2).enumerate().filter(|(_, gap)| gap[1] - gap[0] > 1e-6) {
-                let p = *origin + *d * (0.5 * (gap[0] + gap[1]));
-                let in_parts = [0, 1, 2].map(|part| contains(part, p));
-                assert_eq!(inside(&in_parts) && in_parts[2], n % 2 == 1, "{origin} {d} {ends:?}");
-            }
-        }
-    }
-    assert!(several > 30, "{several}");
 }
 
 /// Checks bounds, clearance and normals of a torus under three affine maps. The bounds must touch

@@ -1,12 +1,9 @@
 //! BVHs, and bounding boxes in object or scene space, against a linear list: their hits must be
 //! equal.
 
-use crate::common::Numbers;
-use crate::common::rays::{Line, packets};
 use crate::geometry::bits::{any_line, forms};
-use glam::{DAffine3, DQuat, DVec3};
-use zerkalo_kernel::lanes::{Double, Float, Mask, SimdFloat, Single};
-use zerkalo_kernel::primitive::{AccelerationStructure, Aggregate, Form, SphereForm};
+use crate::harness::*;
+use zerkalo_kernel::primitive::AccelerationStructure;
 
 /// Returns `count` random primitives of every kind, crowded in a cube of half-width 10. In half of
 /// the cases they are on a lattice, where many faces are coplanar.

@@ -8,26 +8,20 @@
 //! machine permits.
 #![cfg(unix)]
 
-mod pty;
 mod states;
 
-use crate::common;
-use common::Numbers;
-use pty::{Pty, find, screen};
+use crate::command_line::signals::signal;
+use crate::harness::*;
+use crate::pty::terminal::{REPLIES, Start, Terminal};
 use states::{KEYS, SAVE, SCENE, states};
-use std::fs;
-use std::path::Path;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::panic::catch_unwind;
+use std::sync::atomic::AtomicUsize;
 use zerkalo_render::image_file::read_exr;
 use zerkalo_scene::Recovery;
 use zerkalo_terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
 const RUNS: usize = 100;
-/// Number of programs in the long form of the test.
-const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
@@ -72,7 +66,6 @@ struct Plan {
     end: End,
     /// Time from the first picture to the end of the program.
     moment: Duration,
-    /// Keys that are pressed: the time of each, and its index into `KEYS`.
     keys: Vec<(Duration, usize)>,
 }
 
@@ -132,6 +125,23 @@ fn stall_allowance(start: Instant) -> Duration {
     4 * longest.unwrap_or_default()
 }
 
+/// Starts the dashboard with `scene.toml` in `folder`, in a terminal that replies to only one
+/// request. Several can run at the same time. Returns once the first picture is shown.
+fn open(folder: &Path) -> Terminal {
+    let start = Start {
+        command: &[env!("CARGO_BIN_EXE_zerkalo"), "scene.toml", "--threads", "1"],
+        folder,
+        size: [60, 18],
+        env: &[],
+        replies: true,
+    };
+    let terminal = Terminal::open(&start, vec![REPLIES[0]], None);
+    // `ENTER` contains the control sequences that enter the alternate screen. The first picture
+    // counts as shown when 2000 bytes have followed them.
+    terminal.wait_for_bytes(ENTER.len() + 2000);
+    terminal
+}
+
 /// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
 /// program's end, or 0 if no edit is lost.
 ///
@@ -143,10 +153,7 @@ fn run(number: usize) -> Result<Duration, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let scene = folder.path().join("scene.toml");
     fs::write(&scene, SCENE).map_err(|error| error.to_string())?;
-    let mut pty = Pty::open(folder.path());
-    // `ENTER` contains the control sequences that enter the alternate screen. The first picture
-    // counts as shown when 2000 bytes have followed them.
-    pty.wait_for("first picture", |bytes| bytes.len() > ENTER.len() + 2000)?;
+    let mut terminal = open(folder.path());
     let start = Instant::now();
     let mut sent = Vec::new();
     for (at, key) in &plan.keys {
@@ -154,25 +161,28 @@ fn run(number: usize) -> Result<Duration, String> {
         if start.elapsed() >= plan.moment {
             break;
         }
-        pty.send(KEYS[*key].1);
+        terminal.send(KEYS[*key].1);
         sent.push((Instant::now(), *key));
     }
     std::thread::sleep(plan.moment.saturating_sub(start.elapsed()));
     let ended_at = Instant::now();
     match plan.end {
-        End::Term => pty.signal("TERM"),
-        End::Hup => pty.signal("HUP"),
-        End::Kill => pty.signal("KILL"),
-        End::Closed => pty.hang_up(),
+        End::Term => signal("TERM", terminal.process_id()),
+        End::Hup => signal("HUP", terminal.process_id()),
+        End::Kill => signal("KILL", terminal.process_id()),
+        End::Closed => terminal.hang_up(),
     }
     let (status, kept_after) = plan.end.consequences();
-    let actual = pty.end()?;
+    let actual = terminal.status();
     if let Some(expected) = status.filter(|expected| *expected != actual) {
         return Err(format!("exit status {actual}, not {expected}"));
     }
-    let (bytes, restored) = pty.afterwards();
     if [End::Term, End::Hup].contains(&plan.end) {
-        check_terminal(&bytes, restored)?;
+        let (_, output) = terminal.end();
+        let (_, after) = output.split_once(LEAVE).ok_or("the terminal was not left")?;
+        if after.contains('\x1b') {
+            return Err(format!("after leaving: {after:?}"));
+        }
     }
     let keys: Vec<_> = sent.iter().map(|(_, key)| *key).collect();
     let states = states(&keys);
@@ -196,23 +206,6 @@ fn run(number: usize) -> Result<Duration, String> {
         recover(folder.path(), &kept)?;
     }
     Ok(sent.get(state).map_or(Duration::ZERO, |(at, _)| ended_at - *at))
-}
-
-/// Checks that the output `bytes` leaves the alternate screen and contains no control sequences
-/// afterwards. Also checks `restored`, which is `true` if the terminal has its original modes.
-fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
-    let left = find(bytes, LEAVE.as_bytes()).ok_or("the terminal was not left")?;
-    let after = &bytes[left + LEAVE.len()..];
-    if after.contains(&0x1b) || !restored {
-        let after = String::from_utf8_lossy(after);
-        return Err(format!("after leaving: {after:?}; modes restored: {restored}"));
-    }
-    let screen = screen(bytes);
-    let mouse = screen.mouse_protocol_mode() != vt100::MouseProtocolMode::None;
-    if screen.alternate_screen() || screen.hide_cursor() || screen.bracketed_paste() || mouse {
-        return Err("some mode of the screen is still set".to_string());
-    }
-    Ok(())
 }
 
 /// Checks that every file in `folder` is complete. The scene file must have its original text or a
@@ -272,18 +265,18 @@ fn recover(folder: &Path, kept: &str) -> Result<(), String> {
     let scene = folder.join("scene.toml");
     let is_saved = || fs::read_to_string(&scene).is_ok_and(|text| text == kept);
     let offered = !is_saved();
-    let mut pty = Pty::open(folder);
+    let mut terminal = open(folder);
     if offered {
-        pty.wait_for_text("ended unexpectedly")?;
-        pty.send(b"r");
-        pty.wait_for_text("recovered")?;
-        pty.send(b"\x13");
-        pty.wait_for_text("saved scene.toml")?;
+        terminal.wait_for_text("ended unexpectedly");
+        terminal.send("r");
+        terminal.wait_for_text("recovered");
+        terminal.send("\x13");
+        terminal.wait_for_text("saved scene.toml");
     } else {
-        pty.wait_for_text("scene.toml")?;
+        terminal.wait_for_text("scene.toml");
     }
-    pty.send(b"q");
-    let status = pty.end()?;
+    terminal.send("q");
+    let status = terminal.status();
     let left = folder.join(".scene.toml.unsaved").exists();
     if status != 0 || left || !is_saved() {
         return Err(format!(
@@ -300,12 +293,6 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
     check_runs(only.map_or_else(|| (0..RUNS).collect(), |number| vec![number]));
 }
 
-#[test]
-#[ignore = "long: 400 runs"]
-fn many_random_ends_damage_no_file_and_lose_no_old_edit() {
-    check_runs((0..MANY_RUNS).collect());
-}
-
 /// Executes the runs with the given numbers, several at a time. Panics if a run fails.
 fn check_runs(numbers: Vec<usize>) {
     let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -314,7 +301,9 @@ fn check_runs(numbers: Vec<usize>) {
         scope.spawn(|| watch_for_stalls(&over));
         let work = || {
             while let Some(number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let result = run(*number);
+                let result = catch_unwind(|| run(*number)).unwrap_or_else(|panic| {
+                    Err(panic.downcast_ref::<String>().cloned().unwrap_or_default())
+                });
                 results.lock().unwrap().push((*number, result));
             }
         };
@@ -357,17 +346,14 @@ fn check_runs(numbers: Vec<usize>) {
     );
 }
 
-/// Checks the exit status if the terminal is lost while an export is still running. The program
-/// then prints the result of the export to a closed stdout.
 #[test]
 fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
     for _ in 0..4 {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-        let mut pty = Pty::open(folder.path());
-        pty.wait_for("first picture", |bytes| bytes.len() > ENTER.len() + 2000).unwrap();
-        pty.send(b"p");
-        pty.hang_up();
-        assert_eq!(pty.end(), Ok(129));
+        let mut terminal = open(folder.path());
+        terminal.send("p");
+        terminal.hang_up();
+        assert_eq!(terminal.status(), 129);
     }
 }

@@ -1,14 +1,10 @@
 //! Expected texts of a scene file after key presses, computed by the dashboard's model without
 //! running the program.
 
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
+use crate::harness::*;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::update::update;
-use zerkalo_render::schedule::Stop;
-use zerkalo_scene::Document;
 
 /// Text of a scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.
@@ -44,17 +40,17 @@ shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0,
 
 /// Keys that a test presses: the name of each, and the bytes that a terminal sends for it. The
 /// effect of each key on the scene is independent of the time between keys.
-pub const KEYS: [(&str, &[u8]); 10] = [
-    ("'", b"'"),
-    (";", b";"),
-    ("]", b"]"),
-    ("[", b"["),
-    ("Left", b"\x1b[D"),
-    ("Up", b"\x1b[A"),
-    ("PageUp", b"\x1b[5~"),
-    ("Ctrl-s", b"\x13"),
-    ("p", b"p"),
-    ("P", b"P"),
+pub const KEYS: [(&str, &str); 10] = [
+    ("'", "'"),
+    (";", ";"),
+    ("]", "]"),
+    ("[", "["),
+    ("Left", "\x1b[D"),
+    ("Up", "\x1b[A"),
+    ("PageUp", "\x1b[5~"),
+    ("Ctrl-s", "\x13"),
+    ("p", "p"),
+    ("P", "P"),
 ];
 /// Index in `KEYS` of the key that saves the scene.
 pub const SAVE: usize = 7;

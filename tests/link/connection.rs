@@ -1,8 +1,8 @@
 //! Simulated connection with a rate and a delay, and a simulated terminal that replies.
 
+use crate::harness::*;
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
-use std::time::Duration;
 use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
@@ -90,7 +90,6 @@ impl Connection {
         }
     }
 
-    /// Simulates the duration `time`, during which `target` is the frame to be shown.
     pub fn pass(&mut self, target: &TargetFrame, time: Duration) {
         let end = self.now + time;
         // At most one frame is computed in each frame interval.

@@ -1,10 +1,8 @@
 //! Bytes that a connection transmits, and errors of the screen, while a picture converges.
 
+use crate::harness::*;
 use crate::link::connection::Connection;
 use crate::link::picture::{SCREEN, Work};
-use crate::support;
-use std::time::Duration;
-use zerkalo_scene::Scene;
 use zerkalo_terminal::diff::TargetFrame;
 
 /// Scene seen in a rough mirror, whose picture is noisy everywhere.
@@ -55,8 +53,7 @@ struct Figures {
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean OKLab distance between the screen and the picture, measured at the end of each wave
-    /// (set of concurrent jobs).
+    /// Mean OKLab distance between the screen and the picture, measured at the end of each wave.
     mean_error: f64,
     /// Seconds from the end of the last wave until the screen shows the picture exactly.
     exact_after: f64,
@@ -66,8 +63,8 @@ struct Figures {
     busy: f64,
 }
 
-/// Renders a scene in waves (sets of concurrent jobs). The next wave starts when no visible
-/// difference and no text waits to be sent.
+/// Renders a scene in waves. The next wave starts when no visible difference and no text waits to
+/// be sent.
 fn converge(scene: &Scene) -> Figures {
     let mut work = Work::new(scene, SPP);
     let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
@@ -128,7 +125,7 @@ fn report(name: &str, f: &Figures) {
 
 #[test]
 fn mirror_room_stays_within_bytes_and_error() {
-    let figures = converge(&support::shipped("mirror-room.toml"));
+    let figures = converge(&shipped("mirror-room.toml"));
     report("mirror room", &figures);
     assert!(figures.total <= 2_500_000, "{} bytes", figures.total);
     assert!(figures.mean_error <= 0.0065, "{}", figures.mean_error);
@@ -138,7 +135,7 @@ fn mirror_room_stays_within_bytes_and_error() {
 
 #[test]
 fn noisy_scene_stays_within_bytes() {
-    let figures = converge(&support::parsed(NOISY));
+    let figures = converge(&parsed(NOISY));
     report("noisy everywhere", &figures);
     assert!(figures.total <= 4_000_000, "{} bytes", figures.total);
     assert!(figures.busy >= 0.6, "{}", figures.busy);
@@ -147,7 +144,7 @@ fn noisy_scene_stays_within_bytes() {
 /// Checks that frames depend only on the shown cells and on the simulated time.
 #[test]
 fn frames_are_deterministic() {
-    let scene = support::shipped("roughness-0.3.toml");
+    let scene = shipped("roughness-0.3.toml");
     let sent = |_| {
         let mut work = Work::new(&scene, 16);
         let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
@@ -162,18 +159,16 @@ fn frames_are_deterministic() {
     assert_eq!(first, second);
 }
 
-/// Checks that the first frame after an edit covers the whole picture. If the byte limit of a frame
-/// requires it, the frame shows a mosaic of larger cells.
 #[test]
 fn new_picture_shows_in_its_first_frame() {
-    let scene = support::shipped("mirror-room.toml");
+    let scene = shipped("mirror-room.toml");
     let mut work = Work::new(&scene, 8);
     let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
     while !work.done {
         work.wave();
         connection.pass(&work.target(), Duration::from_secs(3));
     }
-    let other = support::shipped("viewpoint-left.toml");
+    let other = shipped("viewpoint-left.toml");
     work.edit(&other, 8);
     work.wave();
     let before = work.error(connection.parser.screen());
@@ -193,7 +188,7 @@ fn new_picture_shows_in_its_first_frame() {
 /// 0.15 s.
 #[test]
 fn connection_is_busy_while_differences_wait() {
-    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
+    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(shipped);
     for acting in [false, true] {
         let mut work = Work::new(&scenes[0], 8);
         let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
@@ -220,7 +215,7 @@ fn connection_is_busy_while_differences_wait() {
 #[test]
 fn keys_wait_for_one_frame_only() {
     use zerkalo_terminal::flow::PacingMode::{AckClocked, SendQueue};
-    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
+    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(shipped);
     let works = scenes.map(|scene| {
         let mut work = Work::new(&scene, 16);
         while !work.done {
@@ -260,7 +255,7 @@ fn keys_wait_for_one_frame_only() {
 
 #[test]
 fn picture_becomes_exact_without_replies() {
-    let mut work = Work::new(&support::shipped("mirror-room.toml"), 16);
+    let mut work = Work::new(&shipped("mirror-room.toml"), 16);
     let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
     connection.is_replying = false;
     while !work.done {

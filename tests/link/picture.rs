@@ -1,27 +1,23 @@
 //! Screen of 160 x 45 cells: a picture that converges, and a row of text below.
 
-use crate::support;
+use crate::harness::*;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_render::schedule::{Schedule, Step, Stop};
-use zerkalo_scene::Scene;
+use zerkalo_render::schedule::Schedule;
 use zerkalo_terminal::cells::{Colors, Oklab, PictureCells, Raster};
 use zerkalo_terminal::diff::TargetFrame;
-use zerkalo_world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
 /// Area of the picture on the screen: all rows except the last one, which shows text.
 const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
 
-/// Picture that converges. Its first wave (set of concurrent jobs) has one sample per half cell
-/// (upper or lower half of a terminal cell).
+/// Picture that converges. Its first wave has one sample per half cell (upper or lower half of a
+/// terminal cell).
 pub struct Work {
     rendering: RenderState,
     schedule: Schedule,
-    pool: support::Pool,
+    pool: Pool,
     cells: Buffer,
     uncovered: Vec<bool>,
     subject: u64,
@@ -34,15 +30,15 @@ impl Work {
     /// Prepares a render of `scene` with up to `spp` samples per pixel.
     pub fn new(scene: &Scene, spp: u32) -> Self {
         let size = [PICTURE.width, 2 * PICTURE.height].map(u32::from);
-        let scene = support::sized(scene.clone(), size);
-        let rendering = support::begin(&scene, 0, Precision::Auto);
-        let stop = Stop { spp: Some(spp), ..Stop::default() };
-        let schedule = rendering.schedule(support::settings(false, 0, stop));
+        let scene = sized(scene.clone(), size);
+        let rendering = begin(&scene, 0, Precision::Auto);
+        let stop = spp_stop(spp);
+        let schedule = rendering.schedule(settings(false, 0, stop));
         let [width, height] = SCREEN;
         Self {
             rendering,
             schedule,
-            pool: support::pool(2),
+            pool: pool(2),
             cells: Buffer::empty(Rect { x: 0, y: 0, width, height }),
             uncovered: vec![true; usize::from(PICTURE.width) * usize::from(PICTURE.height)],
             subject: 0,
@@ -52,12 +48,12 @@ impl Work {
         }
     }
 
-    /// Traces one wave (set of concurrent jobs), or sets `done` if the picture is complete.
+    /// Traces one wave, or sets `done` if the picture is complete.
     pub fn wave(&mut self) {
         match self.schedule.next(0.0) {
             Step::Finished(_) => self.done = true,
             Step::Trace(wave) => {
-                let report = support::trace(&mut self.rendering, &wave, &self.pool);
+                let report = trace(&mut self.rendering, &wave, &self.pool);
                 self.schedule.complete(&wave, &report);
             }
         }
@@ -65,7 +61,7 @@ impl Work {
         let counts = film.tile(0).map_or([0, 0], |tile| tile.counts());
         self.samples = f64::from(counts[0] + counts[1]);
         self.version += 1;
-        let radiance = support::picture(&self.rendering, Replicates::Both);
+        let radiance = picture(&self.rendering, Replicates::Both);
         let to_8 = Display::default().to_8();
         let [width, height] = [PICTURE.width, 2 * PICTURE.height].map(usize::from);
         let raster = Raster::from_fn(width, height, |i| to_8(radiance[i]));

@@ -1,43 +1,27 @@
-//! Changes that a client makes while a session (background renderer) runs: lights, stop criteria,
-//! display, threads. Samples must be kept where possible, and noise estimates must equal those of a
-//! fresh render.
+//! Changes that a client makes while a session runs: lights, stop criteria, display, threads.
+//! Samples must be kept where possible, and noise estimates and films must equal those of a fresh
+//! render.
 
 mod noise;
 
-use crate::support;
-use std::sync::Arc;
+use crate::harness::*;
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
-use zerkalo_kernel::lanes::{SimdFloat, Single};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::film::{Display, LinearImage, Tone};
-use zerkalo_render::schedule::{Stop, StoppedBy};
-use zerkalo_render::session::{Session, Snapshot, State, View};
-use zerkalo_scene::Scene;
-use zerkalo_scene::value::Color;
+use zerkalo_render::film::LinearImage;
+use zerkalo_render::session::{Snapshot, View};
 
 const SCENE: &str = r#"
-[film]
-size = [100, 70]
-[camera]
-eye = [0.0, 1.0, 4.0]
-target = [0.0, 0.5, 0.0]
-[ambient]
-color = [0.05, 0.05, 0.1]
-[background]
-color = [0.1, 0.2, 0.3]
+film.size = [100, 70]
+camera = { eye = [0.0, 1.0, 4.0], target = [0.0, 0.5, 0.0] }
+ambient.color = [0.05, 0.05, 0.1]
+background.color = [0.1, 0.2, 0.3]
+materials.red = { color = [0.8, 0.2, 0.1] }
+materials.mirror = { diffuse = 0.1, reflection = 0.9, roughness = 0.3 }
 [[light]]
 name = "lamp"
 point = { position = [2.0, 4.0, 3.0] }
 [[light]]
 directional = { direction = [1.0, -1.0, -1.0] }
 intensity = 0.3
-[materials.red]
-color = [0.8, 0.2, 0.1]
-[materials.mirror]
-diffuse = 0.1
-reflection = 0.9
-roughness = 0.3
 [[object]]
 material = "red"
 shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
@@ -52,16 +36,8 @@ fn scene() -> Scene {
     Scene::parse(SCENE, "test").unwrap()
 }
 
-fn spp(spp: u32) -> Stop {
-    Stop { spp: Some(spp), ..Stop::default() }
-}
-
-fn noise(levels: f64) -> Stop {
-    Stop { noise_levels: Some(levels), ..Stop::default() }
-}
-
 fn session(stop: Stop, adaptive: bool) -> Session {
-    support::session(2, 3, stop, adaptive)
+    new_session(2, 3, stop, adaptive)
 }
 
 fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {
@@ -105,13 +81,13 @@ fn relit() -> Scene {
 
 #[test]
 fn relit_picture_equals_fresh_render() {
-    let mut fresh = session(spp(64), false);
+    let mut fresh = session(spp_stop(64), false);
     let expected = finish(&mut fresh, &relit());
     let film = bytes(&fresh);
 
     // The lights change after the first render has finished, or at some moment during it.
     for wait_us in [None, Some(0), Some(300), Some(3000), Some(9000)] {
-        let mut session = session(spp(64), false);
+        let mut session = session(spp_stop(64), false);
         let first = match wait_us {
             None => finish(&mut session, &scene()).report.generation,
             Some(us) => {
@@ -135,7 +111,7 @@ fn relit_picture_equals_fresh_render() {
 
 #[test]
 fn light_changes_keep_samples() {
-    let mut session = session(spp(64), true);
+    let mut session = session(spp_stop(64), true);
     session.set_view(View { raster: Some([10, 7]), probe: None });
     let before = finish(&mut session, &scene());
     let newer = relit();
@@ -165,7 +141,7 @@ fn light_changes_keep_samples() {
     let mut moved = newer;
     moved.lights[0].position_mut().unwrap()[0] = 1.0;
     assert_eq!(after.lighting.unwrap().mix(&moved), None);
-    session.set_stop(spp(16));
+    session.set_stop(spp_stop(16));
     let generation = session.set_scene(Arc::new(moved));
     let first = wait(&session, |s| s.report.generation == generation);
     assert!(first.report.samples < before.report.samples);
@@ -173,7 +149,7 @@ fn light_changes_keep_samples() {
 
 #[test]
 fn noisy_light_change_resumes_finished_session() {
-    let mut session = session(noise(0.15), true);
+    let mut session = session(noise_stop(0.15), true);
     let dim = finish(&mut session, &scene()).report;
     assert_eq!(dim.state, State::Finished(StoppedBy::Noise));
     let mut bright = scene();
@@ -197,7 +173,7 @@ fn noisy_light_change_resumes_finished_session() {
 
 #[test]
 fn switched_off_light_keeps_group_until_restart() {
-    let mut session = session(spp(32), true);
+    let mut session = session(spp_stop(32), true);
     let groups = |session: &Session| session.with(|r, _| r.film.groups());
     let before = finish(&mut session, &scene()).report;
     let mut dark = scene();
@@ -217,16 +193,16 @@ fn switched_off_light_keeps_group_until_restart() {
 
 #[test]
 fn stop_display_and_threads_change_keeps_samples() {
-    let mut plain = session(spp(96), false);
+    let mut plain = session(spp_stop(96), false);
     finish(&mut plain, &scene());
 
-    let mut session = session(spp(40), false);
+    let mut session = session(spp_stop(40), false);
     let first = finish(&mut session, &scene()).report;
     assert_eq!((first.spp.min, first.threads, first.lanes), (40, 2, Single::NAME));
     assert!(first.inventory.contains("1 sphere"), "{}", first.inventory);
     assert!(first.recent_samples_per_second > 0.0);
     session.set_threads(1, 5).unwrap();
-    session.set_stop(spp(96));
+    session.set_stop(spp_stop(96));
     let more =
         wait(&session, |s| s.report.spp.min == 96 && s.report.state != State::Tracing).report;
     assert_eq!((more.threads, more.generation), (1, first.generation));
@@ -234,7 +210,7 @@ fn stop_display_and_threads_change_keeps_samples() {
     assert!(bytes(&session) == bytes(&plain));
 
     // A stop criterion that is already met ends the render without new samples.
-    session.set_stop(noise(1000.0));
+    session.set_stop(noise_stop(1000.0));
     let met = |s: &Snapshot| s.report.state == State::Finished(StoppedBy::Noise);
     assert_eq!(wait(&session, met).report.samples, more.samples);
 
@@ -268,7 +244,7 @@ fn submitted_tasks_always_run_without_waiting() {
     }
     // The picture of the snapshot and the probed pixel must agree with the film of the same moment.
     session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]) });
-    session.set_stop(spp(16));
+    session.set_stop(spp_stop(16));
     let end = resting(&session, generation);
     let (keep, kept) = channel();
     session.submit(move |picture| {
@@ -305,7 +281,7 @@ fn wall(number: u64) -> Scene {
 
 #[test]
 fn snapshot_picture_features_and_generation_match() {
-    let (mut a, mut b) = (session(Stop::default(), true), session(spp(8), true));
+    let (mut a, mut b) = (session(Stop::default(), true), session(spp_stop(8), true));
     let mut seen = 0;
     for number in 1..=20_000u64 {
         // On a busy machine fewer scenes get a picture before the next one replaces them, so that
@@ -339,11 +315,10 @@ fn snapshot_picture_features_and_generation_match() {
     assert!(seen > 20, "{seen} snapshots");
 }
 
-/// Checks that the thread of a finished or paused session sleeps until a command arrives.
 #[cfg(target_os = "linux")]
 #[test]
 fn finished_or_paused_session_stays_asleep() {
-    let mut session = session(spp(8), true);
+    let mut session = session(spp_stop(8), true);
     let generation = session.set_scene(Arc::new(scene()));
     session.set_view(View { raster: Some([8, 8]), probe: None });
     resting(&session, generation);
@@ -385,4 +360,30 @@ fn switches_in(session: &Session) -> u64 {
         count() - before
     };
     (0..5).map(wakes).min().unwrap()
+}
+
+#[test]
+fn interruptions_and_earlier_scenes_do_not_change_the_film() {
+    let mut uninterrupted = session(spp_stop(150), true);
+    assert_eq!(finish(&mut uninterrupted, &scene()).report.bad_samples, 0);
+    let expected = bytes(&uninterrupted);
+    let mut session = session(spp_stop(150), true);
+    let mut other = scene();
+    other.camera.eye[0] += 0.1;
+    for pause_us in [0, 50, 300, 2000] {
+        // The first scene is cancelled during its compilation, its first pass or later. The second
+        // scene reuses the memory of its film.
+        session.set_scene(Arc::new(other.clone()));
+        std::thread::sleep(Duration::from_micros(pause_us));
+        let generation = session.set_scene(Arc::new(scene()));
+        let mut samples = 0;
+        for _ in 0..20 {
+            samples = session.with(|_, report| report.samples).unwrap().max(samples);
+            session.pause();
+            session.resume();
+        }
+        let report = resting(&session, generation).report;
+        assert!(report.samples >= samples);
+        assert!(bytes(&session) == expected, "after {pause_us} us");
+    }
 }

@@ -1,11 +1,7 @@
 //! Accuracy of the noise estimate for changed light weights.
 
-use super::{finish, scene, spp};
-use crate::support;
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_render::session::Session;
-use zerkalo_scene::value::Color;
+use super::{finish, scene};
+use crate::harness::*;
 
 /// Returns the picture of a session in 8-bit levels, not rounded, and the estimated noise of this
 /// picture.
@@ -33,7 +29,7 @@ fn noise_estimate_after_light_change_is_accurate() {
     bright.lights[0].intensity = 2.5;
     bright.lights[1].intensity = 0.05;
     bright.ambient.color = Color([0.2, 0.1, 0.0]);
-    let mut other = support::session(2, 1000, spp(16384), false);
+    let mut other = new_session(2, 1000, spp_stop(16384), false);
     finish(&mut other, &bright);
     let (reference, own) = levels(&other);
     let error = |picture: &[[f64; 3]]| {
@@ -44,13 +40,13 @@ fn noise_estimate_after_light_change_is_accurate() {
     };
     let (mut mixed, mut fresh) = (Vec::new(), Vec::new());
     for seed in 0..8 {
-        let mut session = support::session(2, seed, spp(256), true);
+        let mut session = new_session(2, seed, spp_stop(256), true);
         finish(&mut session, &scene());
         let report = finish(&mut session, &bright).report;
         assert_eq!(report.spp.mean.round(), 256.0);
         let (picture, told) = levels(&session);
         mixed.push(error(&picture) / told);
-        let mut anew = support::session(2, seed, spp(256), true);
+        let mut anew = new_session(2, seed, spp_stop(256), true);
         finish(&mut anew, &bright);
         let (picture, told) = levels(&anew);
         fresh.push(error(&picture) / told);

@@ -1,9 +1,7 @@
 //! Albedo of Cook-Torrance in a white furnace (the tests named `extreme_23_*`).
 
-use crate::common::report::{precision, report};
+use crate::harness::*;
 use crate::lobes::setup::*;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_scene::material::{Lobe, Masking};
 
 const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
 
@@ -20,14 +18,13 @@ const KNOWN: [(Masking, f64, [f64; 5]); 7] = [
     (Masking::Smith, 1.0, [0.462, 0.651, 0.881, 0.959, 0.991]),
 ];
 
-/// Returns the albedo of a lobe, estimated from `count` samples.
 fn albedo<L: SimdFloat>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64, count: u32) -> f64 {
     let n = tilted_normal();
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
     let mut material = reflector(lobe, masking, 0.0);
     material.alpha = Some(alpha);
     let mut sum = 0.0;
-    each_reflection::<L>(&material, (incident, n), true, Numbers::sobol(9), count, |_, w| {
+    each_reflection::<L>(&material, (incident, n), true, Draws::sobol(9), count, |_, w| {
         // With sampling of visible normals, the weight of a sample is at most 1.
         assert!((0.0..=1.0).contains(&w[0]) && w[0] == w[1] && w[1] == w[2], "{w:?}");
         sum += w[0];

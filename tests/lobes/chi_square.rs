@@ -1,12 +1,9 @@
 //! Chi-square tests of sampled directions against the integrated density of their lobe (the tests
 //! named `extreme_22_*`).
 
-use crate::common::report::{precision, report};
+use crate::harness::*;
 use crate::lobes::setup::*;
 use crate::lobes::stats::chi_square_p;
-use std::f64::consts::{PI, TAU};
-use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Single, Vec3};
-use zerkalo_scene::material::{Bsdf, Lobe, Material, ReflectionLobe};
 
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
@@ -167,7 +164,6 @@ impl Chart {
     }
 }
 
-/// Returns a frame: two unit vectors orthogonal to `axis` and to each other, and `axis`.
 fn framed(axis: Vector) -> [Vector; 3] {
     let [t, b] = across(axis);
     [t, b, axis]
@@ -217,9 +213,9 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// Returns the chart (map between directions and coordinates) for a lobe that is seen at the angle
-/// `degrees`, and the expected fraction of directions in each bin. `through` is the interface of
-/// transmitted rays; it is `None` for reflected ones.
+/// Returns the chart for a lobe that is seen at the angle `degrees`, and the expected fraction of
+/// directions in each bin. `through` is the interface of transmitted rays; it is `None` for
+/// reflected ones.
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
@@ -248,7 +244,7 @@ fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), 
             _ => *counts.last_mut().unwrap() += 1,
         }
     };
-    let (at, numbers) = ((incident, n), Numbers::random(seed));
+    let (at, numbers) = ((incident, n), Draws::random(seed));
     match chart.through {
         None => each_reflection::<L>(drawn, at, false, numbers, COUNT, |d, _| take(Some(d))),
         Some(sides) => each_crossing::<L>(drawn, at, (sides, false), numbers, COUNT, |crossing| {

@@ -1,12 +1,10 @@
-//! Fractions of lobes inside of a half-space: closed forms against sampled directions.
+//! Fractions of lobes inside a half-space: closed forms against sampled directions.
 
-use crate::common::report::{precision, report};
+use crate::harness::*;
 use crate::lobes::setup::*;
 use crate::lobes::stats::slope;
-use std::f64::consts::{FRAC_PI_2, PI};
-use zerkalo_kernel::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
+use std::f64::consts::FRAC_PI_2;
 use zerkalo_kernel::sampling::warp;
-use zerkalo_scene::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 
 /// Returns the fraction of a uniform cone of half-angle `theta` in a half-space whose boundary
 /// contains the apex. `delta` is the angle of the axis to the boundary; if it is positive, the axis
@@ -28,16 +26,16 @@ pub fn cone_share(theta: f64, delta: f64) -> f64 {
     (PI - a - theta.cos() * b) / (PI * 2.0 * (0.5 * theta).sin().powi(2))
 }
 
-/// Returns the fraction of a disc of radius `r` that is inside of a straight edge at distance `d`
-/// from the disc's centre: 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2). If `d` is
-/// positive, the centre is inside.
+/// Returns the fraction of a disc of radius `r` that is inside a straight edge at distance `d` from
+/// the disc's centre: 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2). If `d` is positive,
+/// the centre is inside.
 fn disc_share(r: f64, d: f64) -> f64 {
     let d = (d / r).clamp(-1.0, 1.0);
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Returns the fraction of a square that is inside of a straight edge in the square's plane. `side`
-/// is the length of the square's sides, `d` the distance of the edge from the square's centre, and
+/// Returns the fraction of a square that is inside a straight edge in the square's plane. `side` is
+/// the length of the square's sides, `d` the distance of the edge from the square's centre, and
 /// `phi` the angle between the edge's normal and a side. If `d` is positive, the centre is inside.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
@@ -55,7 +53,7 @@ pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
 }
 
 /// Half-space that cuts a lobe whose axis is the surface normal: the inward normal of the
-/// half-space, and the fraction of the lobe inside of it.
+/// half-space, and the fraction of the lobe inside it.
 struct Edge {
     inward: Vector,
     share: f64,
@@ -85,20 +83,15 @@ fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count:
         .collect()
 }
 
-/// Returns the half-angles of the tested cones in radians.
-fn half_angles() -> [f64; 7] {
-    [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
-}
-
-/// Counts the sampled directions of a lobe that are inside of each half-space of `edges`. Returns
-/// the largest deviation of the counted fraction from the closed form, in standard deviations of
-/// the count.
+/// Counts the sampled directions of a lobe that are inside each half-space of `edges`. Returns the
+/// largest deviation of the counted fraction from the closed form, in standard deviations of the
+/// count.
 fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
     let mut inside = vec![0u32; edges.len()];
     let incident = combine(&[(-1.0, n)]);
-    each_reflection::<L>(&material, (incident, n), true, Numbers::random(11), count, |d, _| {
+    each_reflection::<L>(&material, (incident, n), true, Draws::random(11), count, |d, _| {
         for (edge, inside) in edges.iter().zip(&mut inside) {
             *inside += u32::from(dot(d, edge.inward) > 0.0);
         }
@@ -111,8 +104,8 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Estimates the fraction of a lobe that is inside of each half-space of `edges`. Each estimate
-/// uses its own set of `count` Sobol points. Returns the root mean square error against the closed
+/// Estimates the fraction of a lobe that is inside each half-space of `edges`. Each estimate uses
+/// its own set of `count` Sobol points. Returns the root mean square error against the closed
 /// forms.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
@@ -120,7 +113,7 @@ fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f6
     let mut sum = 0.0;
     for (i, edge) in edges.iter().enumerate() {
         let mut inside = 0u32;
-        let numbers = Numbers { pixel: (i as u32, 7), ..Numbers::sobol(5) };
+        let numbers = Draws { pixel: (i as u32, 7), ..Draws::sobol(5) };
         each_reflection::<Double>(&material, (incident, n), true, numbers, count, |d, _| {
             inside += u32::from(dot(d, edge.inward) > 0.0);
         });
@@ -143,87 +136,45 @@ fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
     Bsdf::new(&material, true).lobe
 }
 
-/// Checks the fraction of a cone lobe in a half-space for all half-angles and in both precisions.
-/// In single precision, rounding rotates a direction by up to 6e-8. This changes the fraction by a
-/// few millionths at the half-angle 0.01. For narrower cones the rounding of the rotated axis
-/// limits the precision. They are tested with a normal along z only, which is exact.
-#[test]
-fn extreme_19_cone_in_a_half_space() {
-    let mut worst = [0f64; 2];
-    for theta in half_angles() {
-        let roughness = theta.tan().min(1e6);
-        let spread = spread_of(Lobe::Cone, roughness);
+/// Checks the fraction of a lobe in half-spaces in both precisions, and that its error falls faster
+/// than that of random numbers. Each of `cases` is the roughness of the lobe and the largest angle
+/// between its axis and its directions. In single precision, rounding rotates a direction by up to
+/// 6e-8. This changes the fraction by a few millionths at the half-angle 0.01. For narrower lobes
+/// the rounding of the rotated axis limits the precision. They are tested with a normal along z
+/// only, which is exact.
+fn check_half_spaces(number: usize, lobe: Lobe, cases: impl IntoIterator<Item = (f64, f64)>) {
+    let (mut worst, mut flattest) = ([0f64; 2], f64::NEG_INFINITY);
+    for (roughness, reach) in cases {
+        let spread = spread_of(lobe, roughness);
         let n = tilted_normal();
-        let all = edges(&spread, n, theta, theta, 60);
-        let z = worst_z::<f64>(Lobe::Cone, roughness, n, &all);
-        assert!(z < 4.0, "double, {theta}: {z} sigma");
-        let z = worst_z::<Double>(Lobe::Cone, roughness, n, &all);
-        assert!(z < 4.0, "double lanes, {theta}: {z} sigma");
-        worst[0] = worst[0].max(z);
-        let n = if theta < 1e-2 { [0.0, 0.0, 1.0] } else { n };
-        let all = edges(&spread, n, theta, theta, 60);
-        let z = worst_z::<Single>(Lobe::Cone, roughness, n, &all);
-        assert!(z < 4.0, "single lanes, {theta}: {z} sigma");
-        worst[1] = worst[1].max(z);
-    }
-    report(19, "double", &format!("{:.1} sigma at most", worst[0]));
-    report(19, "single", &format!("{:.1} sigma at most", worst[1]));
-}
-
-#[test]
-fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
-    let mut flattest = f64::NEG_INFINITY;
-    for theta in half_angles() {
-        let roughness = theta.tan().min(1e6);
-        let spread = spread_of(Lobe::Cone, roughness);
-        let all = edges(&spread, tilted_normal(), theta, theta, 300);
-        let slope = rmse_slope(Lobe::Cone, roughness, &all);
-        assert!(slope <= -0.7, "{theta}: {slope}");
+        let all = edges(&spread, n, reach, reach, 60);
+        worst[0] = worst[0].max(worst_z::<f64>(lobe, roughness, n, &all));
+        worst[0] = worst[0].max(worst_z::<Double>(lobe, roughness, n, &all));
+        let z_axis = if roughness < 1e-2 { [0.0, 0.0, 1.0] } else { n };
+        let all = edges(&spread, z_axis, reach, reach, 60);
+        worst[1] = worst[1].max(worst_z::<Single>(lobe, roughness, z_axis, &all));
+        assert!(worst.iter().all(|z| *z < 4.0), "{lobe:?} {roughness}: {worst:?} sigma");
+        let slope = rmse_slope(lobe, roughness, &edges(&spread, n, reach, reach, 300));
+        assert!(slope <= -0.7, "{lobe:?} {roughness}: {slope}");
         flattest = flattest.max(slope);
     }
-    report(19, "double", &format!("slope {flattest:.2} or steeper"));
+    report(number, "double", &format!("{:.1} sigma at most", worst[0]));
+    report(number, "single", &format!("{:.1} sigma at most", worst[1]));
+    report(number, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
-/// Checks that the fraction of a narrow cone in a half-space differs from that of a flat disc by at
-/// most theta^2 / 18.
 #[test]
-fn closed_form_04_the_narrow_cone_is_a_disc() {
-    for theta in [2e-3, 1e-2, 0.1] {
-        for i in -20..=20 {
-            let delta = theta * f64::from(i) / 20.5;
-            let difference = cone_share(theta, delta) - disc_share(theta.tan(), delta.tan());
-            assert!(difference.abs() < theta * theta / 18.0, "{theta} {delta}: {difference}");
-        }
-    }
-}
-
-/// Returns half the diagonal of the square lobe as an angle in radians.
-fn square_reach(roughness: f64) -> f64 {
-    (roughness * (0.5 * PI).sqrt()).atan()
+fn extreme_19_cone_in_a_half_space() {
+    let half_angles = [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6];
+    check_half_spaces(19, Lobe::Cone, half_angles.map(|theta| (theta.tan().min(1e6), theta)));
 }
 
 #[test]
 fn extreme_20_square_in_a_half_space() {
-    let mut worst = [0f64; 2];
-    for roughness in [1e-6, 1e-3, 0.05, 0.3, 2.0, 100.0] {
-        let spread = spread_of(Lobe::Square, roughness);
-        let reach = square_reach(roughness);
-        let n = tilted_normal();
-        let all = edges(&spread, n, reach, reach, 60);
-        let z = worst_z::<Double>(Lobe::Square, roughness, n, &all);
-        assert!(z < 4.0, "double, {roughness}: {z} sigma");
-        worst[0] = worst[0].max(z);
-        let n = if roughness < 1e-2 { [0.0, 0.0, 1.0] } else { n };
-        let all = edges(&spread, n, reach, reach, 60);
-        let z = worst_z::<Single>(Lobe::Square, roughness, n, &all);
-        assert!(z < 4.0, "single, {roughness}: {z} sigma");
-        worst[1] = worst[1].max(z);
-        let all = edges(&spread, tilted_normal(), reach, reach, 300);
-        let slope = rmse_slope(Lobe::Square, roughness, &all);
-        assert!(slope <= -0.7, "{roughness}: {slope}");
-    }
-    report(20, "double", &format!("{:.1} sigma at most", worst[0]));
-    report(20, "single", &format!("{:.1} sigma at most", worst[1]));
+    // The reach is half the diagonal of the square.
+    let reach = |roughness: f64| (roughness * (0.5 * PI).sqrt()).atan();
+    let cases = [1e-6, 1e-3, 0.05, 0.3, 2.0, 100.0].map(|roughness| (roughness, reach(roughness)));
+    check_half_spaces(20, Lobe::Square, cases);
 }
 
 /// Checks the density 1 / (side^2 cos^3) of directions to a uniform point of the square at unit
@@ -251,9 +202,9 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Compares two lobes by the fraction of each that is inside of a straight edge. Returns the
-/// largest difference of the two fractions over many edges. The lobes are a square of the side
-/// `side` and a cone with tan theta = 0.2.
+/// Compares two lobes by the fraction of each that is inside a straight edge. Returns the largest
+/// difference of the two fractions over many edges. The lobes are a square of the side `side` and a
+/// cone with tan theta = 0.2.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
     let mut largest: f64 = 0.0;
@@ -268,7 +219,7 @@ fn largest_difference(side: f64) -> f64 {
 }
 
 /// Compares square lobes of four sizes with the cone lobe of radius 0.2, by the largest difference
-/// between the fractions inside of a straight edge. The square with the area of the cone differs
+/// between the fractions inside a straight edge. The square with the area of the cone differs
 /// least. The expected differences are computed for a flat disc instead of the cone, and rounded.
 /// With the cone, the differences change by at most 0.0025.
 #[test]
@@ -285,43 +236,6 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     }
     let ReflectionLobe::Square { side } = spread_of(Lobe::Square, r) else { panic!() };
     assert!((side - PI.sqrt() * r).abs() < 1e-15);
-}
-
-/// Compares the square lobe and the cone lobe by sampled directions. The fraction of each lobe that
-/// is inside of a straight edge is estimated with 65,536 Sobol points.
-#[test]
-fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
-    let (r, n) = (0.2f64, tilted_normal());
-    let square = spread_of(Lobe::Square, r);
-    let mut largest: f64 = 0.0;
-    for phi in [0.0, 0.2, 0.5, PI / 4.0] {
-        for i in -12..=12 {
-            let delta = (f64::from(i) * 0.02).atan();
-            let at = edge(&square, n, 0.0, delta, phi);
-            let response = |lobe| {
-                let (mut inside, count) = (0u32, 1 << 16);
-                let material = reflector(lobe, Masking::VCavity, r);
-                let (numbers, incident) = (Numbers::sobol(2), combine(&[(-1.0, n)]));
-                each_reflection::<Double>(
-                    &material,
-                    (incident, n),
-                    true,
-                    numbers,
-                    count,
-                    |d, _| {
-                        inside += u32::from(dot(d, at.inward) > 0.0);
-                    },
-                );
-                f64::from(inside) / f64::from(count)
-            };
-            let (cone, square) = (response(Lobe::Cone), response(Lobe::Square));
-            let name = format!("edge {phi} {delta}");
-            assert!((cone - cone_share(r.atan(), delta)).abs() < 1e-3, "{name}: cone {cone}");
-            assert!((square - at.share).abs() < 1e-3, "{name}: {square} for {}", at.share);
-            largest = largest.max((cone - square).abs());
-        }
-    }
-    assert!((0.020..0.025).contains(&largest), "{largest}");
 }
 
 /// Checks a lobe about half of which is below the surface, because it is seen at 89.999 degrees. If
@@ -362,7 +276,7 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             let count = 1 << 16;
             for fold in [true, false] {
                 let (mut sum, mut under) = (0.0, 0);
-                let numbers = Numbers::random(21);
+                let numbers = Draws::random(21);
                 each_reflection::<L>(&material, (incident, n), fold, numbers, count, |d, w| {
                     sum += w[0];
                     under += u32::from(w[0] > 0.0 && dot(d, n) < -2.0 * L::EPSILON);

@@ -1,8 +1,7 @@
 //! Phong highlights, from wide ones to those as small as a pixel.
 
+use crate::harness::*;
 use crate::lobes::setup::{across, combine, dot, tilted_normal, unit};
-use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo_scene::material::{Bsdf, BsdfQuery, Material};
 
 /// Returns a material that has only a Phong highlight.
 fn shiny(exponent: f64) -> Material {

@@ -1,8 +1,7 @@
 //! SIMD types: guarantees beyond the operations of IEEE 754.
 
-use zerkalo_kernel::lanes::{
-    Double, Float, Frame, MAX_WIDTH, Mask, SimdFloat, SimdU32, Single, Vec3,
-};
+use crate::harness::*;
+use zerkalo_kernel::lanes::{MAX_WIDTH, SimdU32};
 
 /// Returns pseudo-random 32-bit number `i`.
 fn noise(i: u32) -> u32 {

@@ -3,7 +3,7 @@
 
 mod albedo;
 mod chi_square;
-mod closed_forms;
+pub(crate) mod closed_forms;
 mod conservation;
 mod highlights;
 mod lanes;

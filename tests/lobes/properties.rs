@@ -1,6 +1,6 @@
 //! Physical properties that the tests demand of each reflection model.
 
-use zerkalo_scene::material::{Fresnel, Highlight, Lobe};
+use crate::harness::*;
 
 /// Energy balance of a reflection model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,13 +22,6 @@ pub struct BsdfProperties {
     pub energy: Energy,
 }
 
-impl BsdfProperties {
-    /// Properties of the diffuse model, Lambert's law f = albedo / pi. It is the only model that
-    /// has no name in scene files.
-    pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
-}
-
-/// Reflection model with known physical properties.
 pub trait ReflectionModel {
     /// Returns the properties of reflection by this model.
     fn properties(self) -> BsdfProperties;

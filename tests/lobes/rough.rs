@@ -1,46 +1,15 @@
 //! Rough interfaces: energy, Walter's formula for their BTDF, extreme inputs, and scenes with rough
 //! and absorbing glass.
 
+use crate::harness::*;
 use crate::lobes::setup::*;
-use std::f64::consts::{PI, TAU};
-use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo_scene::material::{Bsdf, BsdfValue, Lobe, Masking};
+use crate::reference::{facet_density, lambda, reflectance};
 
 fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
     every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror)
 }
 
-/// Returns the Fresnel reflectance of unpolarised light. `c` is the cosine of the angle of
-/// incidence.
-fn fresnel(c: f64, n_i: f64, n_t: f64) -> f64 {
-    let sin_t = n_i / n_t * (1.0 - c * c).max(0.0).sqrt();
-    if sin_t >= 1.0 {
-        return 1.0;
-    }
-    let t = (1.0 - sin_t * sin_t).sqrt();
-    let s = (n_i * c - n_t * t) / (n_i * c + n_t * t);
-    let p = (n_t * c - n_i * t) / (n_t * c + n_i * t);
-    0.5 * (s * s + p * p)
-}
-
-/// Returns the error function of `x`, by Simpson's rule.
-fn erf(x: f64) -> f64 {
-    let steps = 60;
-    let h = x.min(6.0) / f64::from(steps);
-    let term = |i: i32| {
-        let k = if i == 0 || i == steps {
-            1.0
-        } else if i % 2 == 1 {
-            4.0
-        } else {
-            2.0
-        };
-        k * (-(h * f64::from(i)).powi(2)).exp()
-    };
-    (0..=steps).map(term).sum::<f64>() * h / 3.0 * 2.0 / PI.sqrt()
-}
-
-/// Microfacet distribution. It is implemented from the papers, independently of the program.
+/// Microfacet distribution by the formulas of the reference tracer.
 struct Facets {
     ggx: bool,
     masking: Masking,
@@ -48,37 +17,19 @@ struct Facets {
 }
 
 impl Facets {
-    fn d(&self, nh: f64) -> f64 {
-        let (a2, c2) = (self.alpha * self.alpha, nh * nh);
-        let tan2 = (1.0 - c2) / c2;
-        let shape = if self.ggx { (1.0 + tan2 / a2).powi(-2) } else { (-tan2 / a2).exp() };
-        shape / (PI * a2 * c2 * c2)
-    }
-
-    fn lambda(&self, c: f64) -> f64 {
-        let tan = (1.0 - c * c).max(0.0).sqrt() / c;
-        if tan == 0.0 {
-            return 0.0;
-        }
-        let a = 1.0 / (self.alpha * tan);
-        if self.ggx {
-            0.5 * ((1.0 + 1.0 / (a * a)).sqrt() - 1.0)
-        } else {
-            0.5 * (erf(a) - 1.0) + (-a * a).exp() / (2.0 * a * PI.sqrt())
-        }
-    }
-
     fn g1(&self, nh: f64, nx: f64, xh: f64) -> f64 {
         match self.masking {
             Masking::VCavity => (2.0 * nh * nx / xh).min(1.0),
-            Masking::Smith => 1.0 / (1.0 + self.lambda(nx)),
+            Masking::Smith => 1.0 / (1.0 + lambda(self.ggx, self.alpha, nx)),
         }
     }
 
     fn g2_reflected(&self, nh: f64, nv: f64, nl: f64, vh: f64) -> f64 {
         match self.masking {
             Masking::VCavity => self.g1(nh, nv, vh).min(self.g1(nh, nl, vh)),
-            Masking::Smith => 1.0 / (1.0 + self.lambda(nv) + self.lambda(nl)),
+            Masking::Smith => {
+                1.0 / (1.0 + lambda(self.ggx, self.alpha, nv) + lambda(self.ggx, self.alpha, nl))
+            }
         }
     }
 
@@ -114,8 +65,8 @@ impl Facets {
                 if vh <= 0.0 {
                     continue;
                 }
-                let visible = self.d(nh) * vh / nv * solid_angle;
-                let f = fresnel(vh, n_i, n_t);
+                let visible = facet_density(self.ggx, self.alpha, nh) * vh / nv * solid_angle;
+                let f = reflectance(vh, n_i, n_t);
                 let nl = 2.0 * vh * nh - nv;
                 if nl > 0.0 {
                     sums[0] += visible * f * self.g2_reflected(nh, nv, nl, vh);
@@ -148,7 +99,7 @@ fn sampled_albedo<L: SimdFloat>(
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
     let material = rough_glass(lobe, masking, alpha, 1.5);
     let mut sums = [0.0; 2];
-    let numbers = Numbers::sobol(5);
+    let numbers = Draws::sobol(5);
     each_crossing::<L>(&material, (incident, n), (sides, true), numbers, count, |crossing| {
         let (r, t) = (crossing.reflected.1[0], crossing.transmitted.1);
         assert!(r >= 0.0 && t >= 0.0 && r + t <= 1.0 + 16.0 * L::EPSILON, "{lobe:?}: {r} {t}");
@@ -158,8 +109,6 @@ fn sampled_albedo<L: SimdFloat>(
     sums
 }
 
-/// Checks that sampled albedos of rough glass equal the albedos of single scattering, which are
-/// computed by quadrature. The sampled ones have an error of a thousandth (16,384 Sobol points).
 #[test]
 fn rough_glass_has_the_albedo_of_single_scattering() {
     let mut worst = 0f64;
@@ -247,11 +196,16 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
                         let (vh, lh) = (dot(v, h), -dot(l, h));
                         let g = facets.g2_transmitted(nh, (nv, vh), (nl, lh));
                         let below = n_v * vh - n_l * lh;
-                        let transmitted = 1.0 - fresnel(vh, n_v, n_l);
-                        vh * lh / (nv * nl) * transmitted * g * facets.d(nh) * n_l * n_l
+                        let transmitted = 1.0 - reflectance(vh, n_v, n_l);
+                        vh * lh / (nv * nl)
+                            * transmitted
+                            * g
+                            * facet_density(facets.ggx, facets.alpha, nh)
+                            * n_l
+                            * n_l
                             / (below * below)
                     };
-                    let numbers = Numbers::sobol(3);
+                    let numbers = Draws::sobol(3);
                     let at = (incident, n);
                     each_crossing::<f64>(&material, at, (sides, true), numbers, 200, |crossing| {
                         let (l, weight) = crossing.transmitted;
@@ -279,7 +233,6 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
     assert!(compared > 20_000, "{compared}");
 }
 
-/// Checks that glass with an alpha of 1e-8 is clear.
 #[test]
 fn smooth_glass_is_clear() {
     for (lobe, masking) in every_lobe() {

@@ -2,10 +2,10 @@
 //! point in each elementary interval), pixels are independent, and the moments and the order of
 //! convergence are correct.
 
+use crate::harness::*;
 use crate::lobes::stats::slope;
-use std::f64::consts::PI;
-use zerkalo_kernel::lanes::{Double, Float, SimdFloat, SimdU32, Single};
-use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
+use zerkalo_kernel::lanes::SimdU32;
+use zerkalo_kernel::sampling::CameraDimensions;
 
 fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
     let camera = CameraDimensions { pixel: jitter, lens: false };
@@ -136,7 +136,6 @@ fn packet_sampler_equals_scalar_sampler() {
     packets_equal_singles::<f64, Double>();
 }
 
-/// Returns all numbers that sample `index` of a pixel uses in ten bounces.
 fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u32) -> Vec<f64> {
     let points = sampler.block(index, 1);
     let draws = points.for_pixel(sampler.key(pixel, replicate));
@@ -145,10 +144,10 @@ fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u
     [place.0, place.1].into_iter().chain(lobes).collect()
 }
 
-/// Checks the independence of pixels and replicates (halves of the samples). Over all pixels, each
-/// dimension of a sample is uniform in mean and variance. It is uncorrelated with the next
-/// dimension, the other replicate, the neighbouring pixel and another seed. The limit is 4.8 sigma.
-/// With 792 comparisons this gives about one false alarm in 800 seeds.
+/// Checks the independence of pixels and replicates. Over all pixels, each dimension of a sample is
+/// uniform in mean and variance. It is uncorrelated with the next dimension, the other replicate,
+/// the neighbouring pixel and another seed. The limit is 4.8 sigma. With 792 comparisons this gives
+/// about one false alarm in 800 seeds.
 #[test]
 fn pixels_and_replicates_are_independent() {
     const SIGMAS: f64 = 4.8;
@@ -199,7 +198,6 @@ struct Integrand {
     exact: fn(f64) -> f64,
 }
 
-/// Integrand that is the product of four smooth bumps.
 const SMOOTH: Integrand = Integrand {
     value: |x, k| x.iter().map(|x| 1.0 + 0.5 * (PI * x * (1.0 + k)).sin()).product(),
     exact: |k| {
@@ -215,7 +213,7 @@ const EDGE: Integrand = Integrand {
 };
 
 /// Returns the errors of the estimated integrals in 400 pixels, from the first `count` samples of
-/// one replicate (half of the samples).
+/// one replicate.
 fn errors(kind: SamplerKind, f: &Integrand, replicate: usize, count: u32) -> Vec<f64> {
     let sampler = sampler::<Double>(kind, 4, true);
     (0..400)
@@ -257,8 +255,6 @@ fn errors_fall_at_the_known_rates() {
     }
 }
 
-/// Checks that the errors of the two replicates (halves of the samples) are uncorrelated, as the
-/// noise estimate assumes.
 #[test]
 fn errors_of_the_replicates_are_uncorrelated() {
     for integrand in [SMOOTH, EDGE] {

@@ -1,12 +1,8 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
-use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
-use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
-use zerkalo_scene::Scene;
-use zerkalo_scene::material::{
-    Bsdf, BsdfQuery, InterfaceQuery, Lobe, Masking, Material, ReflectionLobe,
-};
-use zerkalo_world::{Path, Radiance, World};
+use crate::harness::*;
+use zerkalo_kernel::sampling::CameraDimensions;
+use zerkalo_scene::material::InterfaceMedia;
 
 pub type Vector = [f64; 3];
 
@@ -73,7 +69,6 @@ pub fn has_facets(lobe: Lobe) -> bool {
     matches!(finish.lobe, ReflectionLobe::MicrofacetDistribution(_))
 }
 
-/// Returns every lobe with every masking that affects it.
 pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     let maskings = |lobe| if has_facets(lobe) { &Masking::ALL[..] } else { &Masking::ALL[..1] };
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
@@ -86,13 +81,13 @@ pub fn query<L: SimdFloat>((incident, n): (Vector, Vector), fold: bool) -> BsdfQ
 
 /// Source of the random numbers for sampled reflections: kind, seed and pixel.
 #[derive(Clone, Copy)]
-pub struct Numbers {
+pub struct Draws {
     pub kind: SamplerKind,
     pub seed: u64,
     pub pixel: (u32, u32),
 }
 
-impl Numbers {
+impl Draws {
     pub fn random(seed: u64) -> Self {
         Self { kind: SamplerKind::Random, seed, pixel: (3, 5) }
     }
@@ -109,7 +104,7 @@ pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     fold: bool,
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     mut take: impl FnMut(Vector, Vector),
 ) {
@@ -121,7 +116,7 @@ fn reflect<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     fold: bool,
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     take: &mut dyn FnMut(Vector, Vector),
 ) {
@@ -165,10 +160,12 @@ impl Sides {
     pub fn query<L: SimdFloat>(self, at: (Vector, Vector), fold: bool) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: query(at, fold),
-            n_i: L::from_f64(self.n_i),
-            n_t: L::from_f64(self.n_t),
-            outer: L::mask(self.n_i <= self.n_t),
-            thin: L::mask(self.thin),
+            media: InterfaceMedia {
+                n_i: L::from_f64(self.n_i),
+                n_t: L::from_f64(self.n_t),
+                outer: L::mask(self.n_i <= self.n_t),
+                thin: L::mask(self.thin),
+            },
             reflecting: L::mask(true),
         }
     }
@@ -189,7 +186,7 @@ pub fn each_crossing<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     (sides, fold): (Sides, bool),
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     mut take: impl FnMut(Crossing),
 ) {
@@ -201,7 +198,7 @@ fn cross<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
     (sides, fold): (Sides, bool),
-    numbers: Numbers,
+    numbers: Draws,
     count: u32,
     take: &mut dyn FnMut(Crossing),
 ) {
@@ -221,75 +218,4 @@ fn cross<L: SimdFloat>(
             });
         }
     }
-}
-
-/// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
-/// `first` on. The values of lanes outside of `active` have no meaning. The order of values is
-/// `[sample][group][channel]`.
-pub fn trace<L: SimdFloat>(
-    world: &World<L>,
-    sampler: &Sampler<L>,
-    pixel: (u32, u32),
-    first: u32,
-    active: L::Mask,
-) -> Vec<Vec<Vector>> {
-    let points = sampler.block(first, L::WIDTH);
-    let draws = points.for_pixel(sampler.key(pixel, 0));
-    let half = L::from_f64(0.5);
-    let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let mut path = Path::new(world.camera().rays(corner, jitter));
-    let mut radiance = Radiance::black();
-    world.trace(&mut path, None, &draws, active, &mut radiance);
-    let groups = &radiance.groups[..world.groups()];
-    let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
-    (0..L::WIDTH).map(of_lane).collect()
-}
-
-pub fn scene(text: &str) -> Scene {
-    Scene::parse(text, "test").unwrap()
-}
-
-const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
-
-/// Returns the samples `0..count` of every pixel, traced in full packets. Each is the sum over the
-/// light groups, with the weight 1 for all lights.
-pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
-    samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        trace(world, sampler, pixel, first, L::mask(true))
-    })
-}
-
-/// Returns the same values as [`samples`]. Each sample is traced alone: it is the only active lane
-/// of its packet.
-pub fn lone_samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
-    let only = |lane: usize| {
-        L::from_fn(|i| L::Scalar::from_f64(f64::from(u8::from(i == lane)))).gt(L::zero())
-    };
-    samples_by::<L>(scene, count, |world, sampler, pixel, first| {
-        let alone = |lane| trace(world, sampler, pixel, first, only(lane)).swap_remove(lane);
-        (0..L::WIDTH).map(alone).collect()
-    })
-}
-
-/// Returns the samples `0..count` of every pixel. `packet` returns the radiance of the samples of a
-/// pixel from an index on, as [`trace`] does.
-fn samples_by<L: SimdFloat>(
-    scene: &Scene,
-    count: u32,
-    packet: impl Fn(&World<L>, &Sampler<L>, (u32, u32), u32) -> Vec<Vec<Vector>>,
-) -> Vec<Vector> {
-    let world = World::<L>::new(scene);
-    let sampler = Sampler::<L>::new(SETTINGS, world.camera_dimensions());
-    let [width, height] = scene.film.size;
-    let mut out = Vec::new();
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        for first in (0..count).step_by(L::WIDTH) {
-            for groups in packet(&world, &sampler, (x, y), first) {
-                let all: Vec<_> = groups.into_iter().map(|g| (1.0, g)).collect();
-                out.push(combine(&all));
-            }
-        }
-    }
-    out
 }

@@ -1,6 +1,6 @@
 //! Statistical functions: p-values of chi-square, moments, slopes.
 
-use std::f64::consts::PI;
+use crate::harness::*;
 
 /// Returns the logarithm of Gamma(a) for a > 0 (Lanczos 1964 with g = 7 and nine terms), with a
 /// relative error below 1e-13.

@@ -1,51 +1,11 @@
 //! Whole paths: white furnaces, parallel mirrors, samples traced alone and in packets.
 
-use crate::common::report::report;
-use crate::lobes::properties::{Energy, ReflectionModel};
+use crate::harness::*;
 use crate::lobes::setup::*;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
-use zerkalo_scene::Scene;
-use zerkalo_scene::material::{Lobe, Masking};
-use zerkalo_world::{AnyWorld, Options, Precision};
 
-/// Checks that every sample of a ball in a white furnace is exactly rho, for every
-/// energy-conserving lobe. At the silhouette, lobe directions are partly below the surface and
-/// mirrored up.
-fn furnace<L: SimdFloat>() {
-    let rho = 0.75;
-    let text = "film = { size = [24, 24] }
-        camera = { eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }
-        background.color = [1.0, 1.0, 1.0]
-        [[object]]
-        material = \"m\"
-        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
-        [materials.m]";
-    let mut scene = scene(text);
-    for lobe in Lobe::ALL.into_iter().filter(|l| l.properties().energy == Energy::Conserving) {
-        for roughness in [0.0, 1e-3, 0.3, 3.0, 1e4] {
-            let mut material = reflector(lobe, Masking::VCavity, roughness);
-            material.reflection = rho;
-            scene.materials.insert("m".to_string(), material);
-            let samples = samples::<L>(&scene, 16);
-            let on_ball = samples.iter().filter(|s| **s == [rho; 3]).count();
-            let beside = samples.iter().filter(|s| **s == [1.0; 3]).count();
-            assert_eq!(on_ball + beside, samples.len(), "{} {lobe:?} {roughness}", L::NAME);
-            assert!(on_ball > samples.len() / 3 && beside > samples.len() / 10);
-        }
-    }
-}
-
-#[test]
-fn closed_form_7_a_white_furnace_is_exact() {
-    furnace::<Single>();
-    furnace::<Double>();
-}
-
-/// Checks that at roughness 0 every lobe equals the mirror in every bit. Also checks that the
-/// square lobe is close to the mirror at a roughness of 1e-9.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
-    let mut scene = scene(
+    let mut scene = parsed(
         &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/lobe-square.toml")).unwrap(),
     );
     scene.film.size = [40, 30];
@@ -71,7 +31,7 @@ fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
 }
 
 fn parallel_mirrors(depth: u32) -> Scene {
-    scene(&format!(
+    parsed(&format!(
         "film = {{ size = [4, 4] }}
         trace.max_depth = {depth}
         camera = {{ eye = [0.0, 0.0, 0.0], target = [0.3, 0.2, -1.0] }}
@@ -128,16 +88,9 @@ fn extreme_26_parallel_mirrors() {
 }
 
 fn physical() -> Scene {
-    let text =
-        std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room-physical.toml"))
-            .unwrap();
-    let mut scene = scene(&text);
-    scene.film.size = [48, 36];
-    scene
+    sized(shipped("mirror-room-physical.toml"), [48, 36])
 }
 
-/// Checks that every bit of a sample is the same if it is traced alone and in a full packet. The
-/// mirror has a lobe, no reflection, or an ideal one.
 #[test]
 fn packets_equal_samples_traced_alone() {
     let (lobe, mut lambert, mut mirror) = (physical(), physical(), physical());
@@ -149,8 +102,11 @@ fn packets_equal_samples_traced_alone() {
             (material.reflection, material.lobe) = (0.9, Lobe::Mirror);
         }
     }
-    for (name, scene) in [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)] {
-        assert!(samples::<Single>(&scene, 16) == lone_samples::<Single>(&scene, 16), "{name}");
-        assert!(samples::<Double>(&scene, 16) == lone_samples::<Double>(&scene, 16), "{name}");
+    let glass = ["glass.toml", "transmission.toml", "water-glass.toml"]
+        .map(|file| (file, sized(shipped(file), [24, 20])));
+    let others = [("lobe", lobe), ("no reflection", lambert), ("ideal mirror", mirror)];
+    for (name, scene) in others.into_iter().chain(glass) {
+        assert!(samples::<Single>(&scene, 8) == lone_samples::<Single>(&scene, 8), "{name}");
+        assert!(samples::<Double>(&scene, 8) == lone_samples::<Double>(&scene, 8), "{name}");
     }
 }

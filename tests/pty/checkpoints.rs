@@ -1,10 +1,7 @@
 //! Checkpoints of the dashboard, which are written on request and continued after a kill.
 
 use super::*;
-use std::time::{Duration, Instant};
-use zerkalo_render::film::Film;
-use zerkalo_render::film::file::FilmReader;
-use zerkalo_render::film::testing::TestFilm;
+use crate::harness::*;
 
 fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1
@@ -108,22 +105,10 @@ fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: u
 
 #[test]
 fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
-    let text = crate::common::MIRROR_ROOM.replace("size = [640, 480]", "size = [320, 240]");
+    let text = MIRROR_ROOM.replace("size = [640, 480]", "size = [320, 240]");
     kill_at_random_moments(4, &text, 1);
 }
 
-/// Checks twenty kills at random moments, the long form of the test: `cargo test --test program
-/// killed_at_twenty -- --ignored --nocapture`.
-#[test]
-#[ignore = "long"]
-fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery-glass.toml");
-    let text = fs::read_to_string(path).unwrap().replace("size = [960, 540]", "size = [400, 300]");
-    kill_at_random_moments(20, &text, 2);
-}
-
-/// Kills a dashboard after it has written a checkpoint, and continues the render in a second
-/// dashboard. The film of the second one must equal that of `zerkalo render`.
 #[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();
@@ -161,8 +146,6 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     checkpoints.for_each(|name| assert_eq!(film(fixture.0.path().join(name)).width(), 320));
 }
 
-/// Checks that a checkpoint can be opened without its scene file, because it contains the scene.
-/// Also checks that an incomplete checkpoint is refused.
 #[test]
 fn checkpoint_contains_its_scene() {
     let fixture = Fixture::with_room();

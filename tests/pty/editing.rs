@@ -1,7 +1,7 @@
 //! Editing, saving, and quitting with unsaved edits.
 
 use super::*;
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 
 #[test]
 fn edits_change_the_picture_and_undo_reverts_them() {

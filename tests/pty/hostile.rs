@@ -1,7 +1,7 @@
 //! Hostile scene, whose names contain control sequences.
 
 use super::*;
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 
 /// Text with sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse the
 /// text direction.
@@ -20,8 +20,8 @@ fn names_with_control_sequences_are_escaped() {
     let mut terminal = fixture.open(&[&name], [140, 40]);
     wait_for_picture(&terminal);
     terminal.wait_for_text("u{1b}]52");
-    // The keys visit the outline (list of all parts of the scene), the inspector, renaming and
-    // viewpoints. Then a picture is exported, and copying its path is refused.
+    // The keys visit the outline, the inspector, renaming and viewpoints. Then a picture is
+    // exported, and copying its path is refused.
     for keys in [
         "\t", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\t", "\x1b", "e", "\x1b", "1",
         "l", "x", "u",

@@ -1,14 +1,10 @@
 //! Start and end of the program: the state of the terminal is changed and restored.
 
 use super::*;
+use crate::command_line::signals::signal;
 use std::io::Write;
 use std::process::{Command, Stdio};
 use zerkalo_terminal::{ENTER, LEAVE, Screen};
-
-pub fn signal(name: &str, id: u32) {
-    let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
-    assert!(sent.unwrap().success());
-}
 
 #[test]
 fn built_in_scene_opens_and_quits() {
@@ -37,7 +33,6 @@ fn signals_restore_the_terminal() {
     }
 }
 
-/// Program that panics; the next test runs it.
 #[test]
 #[ignore = "runs in the terminal of another test"]
 fn program_that_panics() {
@@ -150,11 +145,8 @@ fn pasted_text_is_not_keys() {
     open_help_and_quit(terminal);
 }
 
-/// Environment variables of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
-/// Opens the dashboard with the environment variables of an SSH connection. The terminal replies to
-/// requests if `replies` is `true`.
 fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
     let (folder, size) = (fixture.0.path(), [120, 36]);
     let command = &[PROGRAM, "--threads", "1"];

@@ -1,7 +1,7 @@
 //! Limits of the dashboard's memory and number of threads.
 
 use super::*;
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 
 /// Checks the refusal of a film of 4.4 GB under a limit of 1.5 GB of address space.
 #[test]
@@ -25,7 +25,7 @@ fn film_that_does_not_fit_is_refused_in_the_dashboard() {
         assert!(text.contains(part), "no {part:?} in\n{text}");
     }
     assert_eq!(terminal.screen(picture_cells), 0);
-    // The scene can still be edited. The outline (list of all parts) has the focus.
+    // The scene can still be edited. The outline has the focus.
     terminal.send("]");
     terminal.wait_for_text("large.toml ●");
     terminal.send("u");

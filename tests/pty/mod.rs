@@ -9,11 +9,10 @@ mod limits;
 mod picture;
 mod stills;
 mod stopping;
-mod terminal;
+pub mod terminal;
 mod watch;
 
-use std::fs;
-use std::path::PathBuf;
+use crate::harness::*;
 use std::process::Command;
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
@@ -31,7 +30,7 @@ impl Fixture {
     /// Creates a folder with the built-in scene as `room.toml`.
     fn with_room() -> Self {
         let fixture = Self::new();
-        fs::write(fixture.path("room.toml"), crate::common::MIRROR_ROOM).unwrap();
+        fs::write(fixture.path("room.toml"), MIRROR_ROOM).unwrap();
         fixture
     }
 
@@ -51,7 +50,6 @@ impl Fixture {
         })
     }
 
-    /// Runs the program with `args`, which must succeed.
     fn run(&self, args: &[&str]) {
         let run = Command::new(PROGRAM).args(args).current_dir(self.0.path()).output().unwrap();
         assert!(run.status.success(), "{args:?}: {}", String::from_utf8_lossy(&run.stderr));

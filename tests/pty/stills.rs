@@ -1,13 +1,13 @@
 //! Viewer of exported images. The terminal emulator ignores graphics protocols, so that tests
 //! decode the images from the program's output.
 
-use super::life::signal;
 use super::picture::Picture;
 use super::*;
+use crate::command_line::signals::signal;
+use crate::harness::*;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use icy_sixel::SixelImage;
-use std::time::Duration;
 use terminal::RequestReply;
 use zerkalo_terminal::LEAVE;
 
@@ -19,8 +19,6 @@ const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
 /// Bytes that remove an image from the screen in kitty's graphics protocol.
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
-/// Starts the dashboard and exports a picture. `replies` are additional replies of the terminal to
-/// requests. Returns the terminal and the picture.
 fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
     let command = [&[PROGRAM, "room.toml"], args].concat();
     let start =
@@ -115,8 +113,6 @@ fn signal_removes_the_image() {
     );
 }
 
-/// Checks that a key ends the transfer of an image at once. At 30 KB/s the transfer would take
-/// seconds.
 #[test]
 fn key_ends_the_transfer() {
     let fixture = Fixture::with_room();

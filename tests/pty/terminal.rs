@@ -7,6 +7,7 @@ use std::num::NonZeroU16;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Longest time that a test waits. Only a failing test reaches it.
@@ -27,27 +28,30 @@ static TURN: Mutex<()> = Mutex::new(());
 /// Writer of keys and replies to the program.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 
-/// Request to the terminal, and the terminal's reply.
 pub type RequestReply = (&'static [u8], &'static str);
 
 /// Requests, each with the reply of a terminal that supports synchronised updates. The empty reply
 /// stands for the cursor position, which is computed.
-const REPLIES: [RequestReply; 3] =
+pub const REPLIES: [RequestReply; 3] =
     [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
 
 /// Program that runs in a test terminal.
 pub struct Terminal {
-    master: Box<dyn MasterPty + Send>,
+    /// Master end, until the terminal hangs up.
+    master: Option<Box<dyn MasterPty + Send>>,
     /// Slave end of the pseudo-terminal, kept open so that its modes can be read after the
     /// program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
-    keyboard: Keyboard,
+    keyboard: Option<Keyboard>,
     /// `true` if the terminal replies to requests.
     is_replying: Arc<AtomicBool>,
+    /// `true` if the terminal is being closed.
+    closing: Arc<AtomicBool>,
+    reader: Option<JoinHandle<()>>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<(Mutex<Output>, Condvar)>,
     before: String,
-    _turn: MutexGuard<'static, ()>,
+    _turn: Option<MutexGuard<'static, ()>>,
 }
 
 /// Parameters with which a program is started in a test terminal.
@@ -77,6 +81,16 @@ impl Terminal {
             .filter(|(request, _)| additional.iter().all(|other| other.0 != *request));
         let table: Vec<RequestReply> = defaults.chain(additional).copied().collect();
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        Self::open(start, table, Some(turn))
+    }
+
+    /// Starts a program in a terminal that has only the replies in `table`. Without `turn`, other
+    /// programs may run at the same time.
+    pub fn open(
+        start: &Start,
+        table: Vec<RequestReply>,
+        turn: Option<MutexGuard<'static, ()>>,
+    ) -> Self {
         let pair = native_pty_system().openpty(pty_size(start.size)).expect("a pseudo-terminal");
         let mut command = CommandBuilder::new(start.command[0]);
         command.args(&start.command[1..]);
@@ -100,8 +114,10 @@ impl Terminal {
         let shared = Arc::clone(&output);
         let keyboard: Keyboard = Arc::new(Mutex::new(pair.master.take_writer().unwrap()));
         let is_replying = Arc::new(AtomicBool::new(start.replies));
+        let closing = Arc::new(AtomicBool::new(false));
         let (replies, enabled) = (Arc::clone(&keyboard), Arc::clone(&is_replying));
-        std::thread::spawn(move || {
+        let is_closing = Arc::clone(&closing);
+        let reader = std::thread::spawn(move || {
             let mut buffer = vec![0; 1 << 16];
             let mut unread = Vec::new();
             loop {
@@ -122,15 +138,17 @@ impl Terminal {
                     // The program may have ended meanwhile.
                     let _ = replies.lock().unwrap().write_all(all.as_bytes());
                 }
-                if read == 0 {
+                if read == 0 || is_closing.load(Ordering::Acquire) {
                     break;
                 }
             }
         });
         Self {
-            keyboard,
+            keyboard: Some(keyboard),
             is_replying,
-            master: pair.master,
+            closing,
+            reader: Some(reader),
+            master: Some(pair.master),
             slave: Some(pair.slave),
             child,
             output,
@@ -141,9 +159,18 @@ impl Terminal {
 
     /// Sends input to the program, as the keyboard, the mouse or the clipboard do.
     pub fn send(&mut self, keys: &str) {
-        let mut keyboard = self.keyboard.lock().unwrap();
-        keyboard.write_all(keys.as_bytes()).unwrap();
-        keyboard.flush().unwrap();
+        let mut keyboard = self.keyboard.as_ref().expect("a keyboard").lock().unwrap();
+        // The program may have ended.
+        let _ = keyboard.write_all(keys.as_bytes()).and_then(|()| keyboard.flush());
+    }
+
+    /// Closes the master end, as a lost connection does.
+    pub fn hang_up(&mut self) {
+        self.closing.store(true, Ordering::Release);
+        // The key `?` opens the help. Its output wakes the reader thread, which then ends.
+        self.send("?");
+        self.reader.take().expect("a reader").join().expect("the reader ends");
+        (self.slave, self.keyboard, self.master) = (None, None, None);
     }
 
     /// Enables or disables the terminal's replies to requests.
@@ -154,11 +181,20 @@ impl Terminal {
     /// Waits until `condition` returns a value for the screen. On failure, panics with `what` and
     /// the screen.
     pub fn wait_for<R>(&self, what: &str, condition: impl Fn(&vt100::Screen) -> Option<R>) -> R {
+        self.wait(what, |output| condition(output.parser.screen()))
+    }
+
+    /// Waits until the program has sent more than `count` bytes.
+    pub fn wait_for_bytes(&self, count: usize) {
+        self.wait("output", |output| (output.bytes.len() > count).then_some(()));
+    }
+
+    fn wait<R>(&self, what: &str, condition: impl Fn(&Output) -> Option<R>) -> R {
         let end = Instant::now() + PATIENCE;
         let (output, changed) = &*self.output;
         let mut output = output.lock().unwrap();
         loop {
-            if let Some(value) = condition(output.parser.screen()) {
+            if let Some(value) = condition(&output) {
                 return value;
             }
             let time_left = end.saturating_duration_since(Instant::now());
@@ -186,7 +222,6 @@ impl Terminal {
         });
     }
 
-    /// Returns the result of `look` for the current screen of the terminal.
     pub fn screen<R>(&self, look: impl FnOnce(&vt100::Screen) -> R) -> R {
         look(self.output.0.lock().unwrap().parser.screen())
     }
@@ -196,11 +231,10 @@ impl Terminal {
         self.output.0.lock().unwrap().bytes.clone()
     }
 
-    /// Resizes the terminal to `size` columns and rows.
     pub fn resize(&self, size: [u16; 2]) {
         let [columns, rows] = size.map(|n| NonZeroU16::new(n).unwrap());
         self.output.0.lock().unwrap().parser.screen_mut().set_size(rows, columns);
-        self.master.resize(pty_size(size)).unwrap();
+        self.master.as_ref().expect("a master end").resize(pty_size(size)).unwrap();
     }
 
     /// Returns the process number of the program.
@@ -208,14 +242,13 @@ impl Terminal {
         self.child.process_id().expect("a process")
     }
 
-    /// Waits for the end of the program and checks that the terminal is restored. Returns the exit
-    /// status and all output.
-    pub fn end(mut self) -> (u32, String) {
+    /// Waits for the end of the program. Returns its exit status.
+    pub fn status(&mut self) -> u32 {
         let child = &mut self.child;
         let end = Instant::now() + PATIENCE;
-        let status = loop {
+        loop {
             match child.try_wait().unwrap() {
-                Some(status) => break status.exit_code(),
+                Some(status) => return status.exit_code(),
                 None if Instant::now() > end => {
                     child.kill().unwrap();
                     let screen = self.screen(vt100::Screen::contents);
@@ -223,8 +256,15 @@ impl Terminal {
                 }
                 None => std::thread::sleep(Duration::from_millis(5)),
             }
-        };
-        assert_eq!(state(&*self.master), self.before, "the modes of the terminal");
+        }
+    }
+
+    /// Waits for the end of the program and checks that the terminal is restored. Returns the exit
+    /// status and all output.
+    pub fn end(mut self) -> (u32, String) {
+        let status = self.status();
+        let master = self.master.as_deref().expect("a master end");
+        assert_eq!(state(master), self.before, "the modes of the terminal");
         // Closing the last slave end closes the terminal and the output.
         let Self { slave, output, .. } = &mut self;
         drop(slave.take());

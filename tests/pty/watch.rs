@@ -2,23 +2,13 @@
 
 use super::*;
 
-/// Plans a render of `room.toml` in 160x120 pixels by three shards (parts, each for one process),
-/// as `job.plan`.
+/// Plans a render of `room.toml` in 160x120 pixels by three shards, as `job.plan`.
 fn planned(fixture: &Fixture) {
-    fixture.run(&[
-        "plan",
-        "room.toml",
-        "--size",
-        "160x120",
-        "--noise",
-        "0.5",
-        "--pilot",
-        "3",
-        "--shards",
-        "3",
-        "-o",
-        "job.plan",
-    ]);
+    fixture.run(
+        &"plan room.toml --size 160x120 --noise 0.5 --pilot 3 --shards 3 -o job.plan"
+            .split(' ')
+            .collect::<Vec<_>>(),
+    );
 }
 
 fn trace(fixture: &Fixture, shard: usize) {

@@ -1,15 +1,10 @@
 //! Acceleration structures on random scenes. The films of a scene with all structures must be
 //! identical byte for byte.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::{accelerated, picture};
-use zerkalo_render::film::Replicates;
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_scene::{Acceleration, Scene};
-use zerkalo_world::Precision;
 
-/// Number of samples per pixel in each of the two replicates (halves of the samples). It is not a
-/// multiple of the packet width.
+/// Number of samples per pixel in each replicate. It is not a multiple of the packet width.
 const SAMPLES: u32 = 3;
 
 fn same_bytes(scene: &Scene) -> Verdict {
@@ -40,7 +35,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
 
 #[test]
 fn accelerations() {
-    compare("accelerations", 0..40, same_bytes);
+    compare("accelerations", 0..80, same_bytes);
 }
 
 #[test]

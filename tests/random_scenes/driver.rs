@@ -1,15 +1,10 @@
 //! Driver of tests on random scenes: compares pictures of each scene, and reduces and writes scenes
 //! that fail.
 
+use crate::harness::*;
 use crate::random_scenes::scene::{Random, scene};
 use crate::random_scenes::shrink::shrunk;
-use crate::support::parsed;
-use std::collections::BTreeMap;
-use std::fs;
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
-use zerkalo_scene::Scene;
 
 /// Result of the comparison of a scene's pictures.
 pub enum Verdict {
@@ -94,7 +89,6 @@ pub fn compare_many(name: &str, check: Check) {
     compare(name, many(), check);
 }
 
-/// Writes the random scenes to files for inspection.
 #[test]
 #[ignore = "writes the scenes of the requested seeds to target/tmp/random_scenes"]
 fn write_scenes() {

@@ -1,14 +1,11 @@
 //! Objects in exact contact, against the same objects with a gap that is too narrow to be visible.
 
-use crate::common::Numbers;
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::precisions::{levels, paired};
 use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::words::log;
-use glam::DVec3;
-use zerkalo_scene::{Filter, Object, RayTypes, Scale, Scene, TransformOp};
-use zerkalo_world::Precision;
 
 /// Typical relative change of an object's size. The change of each object is 0.2 to 5 times this
 /// value.
@@ -174,7 +171,7 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
     }
     let touching = against_gap(&scene);
     // Rounding decides which of two coincident opaque surfaces a ray hits. Where opaque solids
-    // touch, both surfaces are visible only if the eye is inside of one of the solids.
+    // touch, both surfaces are visible only if the eye is inside one of the solids.
     if matches!(touching, Verdict::Different(_)) && shows_coincident_opaque(&scene) {
         return Verdict::Skipped("two coincident opaque surfaces are visible");
     }

@@ -1,11 +1,8 @@
 //! Arrangement of the objects of a random scene.
 
-use crate::common::Numbers;
+use crate::harness::*;
 use crate::random_scenes::objects::{Finish, Stock, combined, named, object, resolved};
 use crate::random_scenes::words::{chance, log, pick};
-use glam::DVec3;
-use zerkalo_scene::shape::Shape;
-use zerkalo_scene::{Object, Scale, TransformOp};
 
 /// Kind of arrangement of the objects of a random scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,13 +13,11 @@ pub enum Layout {
     Crowd,
     /// Nested compounds whose parts have different materials.
     Compounds,
-    /// Glass in glass, panes and bubbles.
     Glass,
     /// Facing mirrors with objects between them.
     Mirrors,
     /// Mostly empty picture: stars, hairlines, a distant crowd, a distant chessboard.
     Sparse,
-    /// Flat objects and flat faces in one plane.
     Flat,
     /// Positions and sizes from 1e-6 to 1e6.
     Wild,

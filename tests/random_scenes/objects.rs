@@ -1,17 +1,11 @@
 //! Random materials, shapes of every registered kind, and objects.
 
-use crate::common::NAME;
-use crate::common::Numbers;
+use crate::harness::*;
 use crate::random_scenes::words::{chance, direction, list, log, pick, table};
-use glam::DVec3;
-use std::path::Path;
-use std::sync::{Arc, OnceLock};
-use toml::{Table, Value};
-use zerkalo_scene::asset::Assets;
-use zerkalo_scene::material::{self, Material};
-use zerkalo_scene::shape::{CsgOperand, KINDS, Shape};
-use zerkalo_scene::value::{Color, Field, TomlValue, ValueType};
-use zerkalo_scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
+use std::sync::OnceLock;
+use zerkalo_scene::material;
+use zerkalo_scene::shape::KINDS;
+use zerkalo_scene::{AssetResolver, Rotate};
 
 /// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[

@@ -1,17 +1,14 @@
 //! Single against double precision, in random scenes for which the precision `auto` selects single.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::gaps::shows_coincident_opaque;
 use crate::random_scenes::statistics::{Worst, blocks, mean_and_error, mean_of};
-use crate::support::{picture, rendered};
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_scene::{Filter, Scene};
-use zerkalo_world::{AnyWorld, Options, Precision};
 
 const SEEDS: u64 = 8;
-/// Number of samples per pixel in each of the two replicates (halves of the samples).
+/// Number of samples per pixel in each replicate.
 const SAMPLES: u32 = 4;
-/// Allowed error of single precision in the mean of a block of pixels, in 8-bit levels. At the most
+/// Allowed error of single precision on average of a block of pixels, in 8-bit levels. At the most
 /// unfavourable ratio of sizes for which `auto` still selects single precision, the error over a
 /// whole picture is 0.12 (docs/accuracy.md).
 const FLOOR: f64 = 0.5;

@@ -2,24 +2,16 @@
 //! samples. The means must be equal, and the true errors must equal the reported ones. For the same
 //! error, adaptive pictures must take at most 1.5 times the rays of uniform ones.
 
-use crate::common::normal::z_of_t;
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many, many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
-use crate::support::{begin, picture, pool, rendered, settings, trace};
-use std::ops::Range;
-use zerkalo_render::RenderState;
-use zerkalo_render::film::{Display, Replicates, TILE};
-use zerkalo_render::schedule::{Step, Stop};
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
 
 /// Number of seeds of the first comparison of a scene, which a second one may follow.
 const SEEDS: u64 = 8;
-/// Samples per pixel of the uniform pictures, in both replicates (halves of the samples) together.
+/// Samples per pixel of the uniform pictures, in both replicates together.
 const SAMPLES: u32 = 32;
-/// Number of pictures whose mean is the reference.
 const REFERENCE_PICTURES: u64 = 8;
 /// Samples per pixel of each picture of the reference, in the first comparison of a scene.
 const REFERENCE: u32 = 128;
@@ -321,7 +313,7 @@ fn differences(
     let all = |adaptive, stop, max_rays| -> Vec<Shot> {
         seeds.clone().map(|seed| shot(scene, seed, adaptive, stop, max_rays)).collect()
     };
-    let stop = Stop { spp: Some(SAMPLES), ..Stop::default() };
+    let stop = spp_stop(SAMPLES);
     let [uniform, adaptive] = [false, true].map(|adaptive| all(adaptive, stop, u64::MAX));
     if !reference.is_sufficient(&uniform) {
         return Err("the reference is too noisy");
@@ -347,7 +339,7 @@ fn differences(
     let reported = uniform.iter().map(|s| s.reported).sum::<f64>() / count;
     for factor in [1.0, 2.0].into_iter().filter(|_| reported > 0.0) {
         let noise = factor * reported.sqrt();
-        let stop = Stop { noise_levels: Some(noise), ..Stop::default() };
+        let stop = noise_stop(noise);
         let [uniform, adaptive] =
             [false, true].map(|adaptive| all(adaptive, stop, STOP_FACTOR * rays as u64));
         wrong.extend(unfinished(noise, &adaptive, &uniform, max_deviation));

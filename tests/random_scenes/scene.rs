@@ -1,22 +1,12 @@
 //! Random scenes: objects, camera, lights and settings.
 
-use crate::common::Numbers;
+use crate::harness::*;
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::objects::{Stock, emission, library, material, resolved};
 use crate::random_scenes::words::{KeyValue, chance, direction, log, pick, table};
-use glam::DVec3;
-use std::collections::BTreeMap;
-use std::ops::Range;
-use toml::{Table, Value};
-use zerkalo_kernel::primitive::{
-    ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm,
-};
-use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo_scene::light::{Directional, Falloff, Light, LightKind, Point, Spot};
-use zerkalo_scene::value::{Color, Description, Field, TomlValue};
-use zerkalo_scene::{
-    Acceleration, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
-};
+use zerkalo_kernel::primitive::ParallelogramForm;
+use zerkalo_scene::value::Description;
+use zerkalo_scene::{FilmSettings, IntegratorSettings};
 
 /// Random scene, with its text.
 pub struct Random {
@@ -191,7 +181,7 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
             around(numbers, distance)
         }
     };
-    // A camera on a surface or inside of an object looks in any direction in half of the cases.
+    // A camera on a surface or inside an object looks in any direction in half of the cases.
     let look = if way < 2 && chance(numbers, 1, 2) { direction(numbers) } else { target - eye };
     let look = if look == DVec3::ZERO { DVec3::NEG_Z } else { look };
     let ups = [DVec3::Y, DVec3::Y, DVec3::Z, DVec3::new(0.3, 0.9, 0.2)];
@@ -281,7 +271,6 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
     (0..count).map(light).collect()
 }
 
-/// Returns a spot light at `position`, with its axis roughly towards `target`.
 fn spot(numbers: &mut Numbers, position: DVec3, target: DVec3) -> Spot {
     let outer_angle = pick(numbers, &[0.5, 10.0, 30.0, 60.0, 120.0, 180.0]);
     let inner_angle = outer_angle * pick(numbers, &[0.0, 0.5, 1.0]);
@@ -322,14 +311,11 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     }
 }
 
-/// Returns seeds of scenes with the layout `layout`. `numbers` are the numbers of these scenes
-/// among all scenes with this layout.
 pub fn seeds_of(layout: Layout, numbers: Range<u64>) -> impl Iterator<Item = u64> {
     let index = Layout::ALL.iter().position(|l| *l == layout).expect("a layout");
     numbers.map(move |i| i * Layout::ALL.len() as u64 + index as u64)
 }
 
-/// Returns the random scene of a seed. Consecutive seeds have successive layouts.
 pub fn scene(seed: u64) -> Random {
     let layout = Layout::ALL[seed as usize % Layout::ALL.len()];
     let mut numbers = Numbers::new(seed ^ 0x5ce4_e000_0000_0000);

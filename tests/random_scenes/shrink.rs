@@ -1,10 +1,7 @@
 //! Reduction of scenes that fail: keys and list entries are removed and numbers are rounded in the
 //! text, as long as it remains a valid scene that fails.
 
-use crate::common::NAME;
-use std::time::{Duration, Instant};
-use toml::{Table, Value};
-use zerkalo_scene::Scene;
+use crate::harness::*;
 
 /// Step of a path in a TOML document: a key, or an index in a list.
 #[derive(Clone)]

@@ -1,13 +1,10 @@
 //! Soundness of random scenes: no panic, no invalid sample, finite noise. In scenes without random
-//! choices both replicates (halves of the samples) must be equal.
+//! choices both replicates must be equal.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::scene::seeds_of;
-use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
-use zerkalo_render::film::{Display, Replicates};
-use zerkalo_scene::Scene;
-use zerkalo_world::{self as world, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
@@ -99,8 +96,6 @@ fn many_replicates() {
     compare_many("replicates", replicates_are_equal);
 }
 
-/// Checks that samples are valid on a floor, 10 wide, under a light at the height 1e-5. These
-/// samples are very bright.
 #[test]
 fn light_close_to_floor_has_no_bad_sample() {
     let scene = parsed(

@@ -2,7 +2,7 @@
 //! different seeds are independent. For every sampler, the spread of a block's means over the seeds
 //! therefore estimates the error of the mean over all seeds.
 
-use crate::common::normal::{two_sided_z, z_of_t};
+use crate::harness::*;
 
 /// Probability of a false alarm in the comparison of one scene.
 const LEVEL: f64 = 1e-6;
@@ -30,7 +30,6 @@ pub fn mean_of(picture: &[[f64; 3]], pixels: &[usize]) -> [f64; 3] {
     [0, 1, 2].map(|c| pixels.iter().map(|p| picture[*p][c]).sum::<f64>() / n)
 }
 
-/// Returns the mean of `values` and the standard error of the mean.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

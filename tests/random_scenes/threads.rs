@@ -1,13 +1,9 @@
 //! Adaptive renders of random scenes with different numbers of threads, whose films and sample
 //! counts must be equal.
 
+use crate::harness::*;
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
-use crate::support::{begin, pool, settings, trace};
 use zerkalo_render::film::Noise;
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::schedule::{Step, Stop, StoppedBy};
-use zerkalo_scene::Scene;
-use zerkalo_world::Precision;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;

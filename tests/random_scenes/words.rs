@@ -1,10 +1,8 @@
 //! Random values of scene keys. They are drawn from the tables that define the format, so that new
 //! keys are included.
 
-use crate::common::Numbers;
-use glam::DVec3;
-use toml::{Table, Value};
-use zerkalo_scene::value::{DefaultValue, Field, NumberRange, ValueType};
+use crate::harness::*;
+use zerkalo_scene::value::{DefaultValue, NumberRange};
 
 /// Function that returns the value of a key. If it returns `None`, the key gets a random value that
 /// the format table allows.
@@ -15,12 +13,10 @@ pub fn pick<T: Copy>(numbers: &mut Numbers, from: &[T]) -> T {
     from[numbers.below(from.len())]
 }
 
-/// Returns `true` with the probability `times` / `of`.
 pub fn chance(numbers: &mut Numbers, times: usize, of: usize) -> bool {
     numbers.below(of) < times
 }
 
-/// Returns a log-uniform number between two positive numbers.
 pub fn log(numbers: &mut Numbers, low: f64, high: f64) -> f64 {
     10f64.powf(numbers.between(low.log10(), high.log10()))
 }
@@ -33,7 +29,6 @@ pub fn direction(numbers: &mut Numbers) -> DVec3 {
     }
 }
 
-/// Returns the TOML list of `numbers`.
 pub fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
     Value::Array(numbers.into_iter().map(Value::Float).collect())
 }
@@ -51,7 +46,6 @@ fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     if range.holds(x) { x } else { x.clamp(range.low.max(-1e3), range.high.min(1e3)) }
 }
 
-/// Returns a random value of the type `takes`.
 fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, key_value: KeyValue) -> Value {
     match takes {
         ValueType::Text => Value::String(String::new()),

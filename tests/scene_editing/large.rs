@@ -2,9 +2,8 @@
 //! from the same run.
 
 use super::*;
-use std::fmt::Write;
+use crate::harness::*;
 
-/// Returns the text of a scene of `count` spheres, each with a comment.
 fn spheres(count: usize, has_names: bool) -> String {
     let mut text = "# Spheres.\nambient.color = [1, 1, 1]\n".to_string();
     for i in 0..count {
@@ -46,7 +45,6 @@ fn move_object(object: &mut Object) {
     }
 }
 
-/// Name of an edit, and the function that applies it.
 type NamedEdit = (&'static str, fn(&mut Scene));
 
 /// Checks that the time of updating the text after an edit grows at most by the factor `limit` if
@@ -80,13 +78,4 @@ fn check_growth(fewest: usize, limit: f64) {
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {
     check_growth(1_000, 8_f64.sqrt());
-}
-
-/// Checks that the time of an edit is proportional to the number of objects, up to 100,000. Run
-/// with `cargo test --test program scene_editing::large -- --ignored --nocapture`.
-#[test]
-#[ignore = "takes a minute, and needs an idle machine"]
-#[cfg(target_os = "linux")]
-fn edits_of_100_000_objects_are_written_in_linear_time() {
-    check_growth(25_000, 2.3);
 }

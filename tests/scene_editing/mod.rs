@@ -7,20 +7,16 @@ mod navigation;
 mod operations;
 mod random;
 
+use crate::harness::*;
 use layouts::LAYOUTS;
 use proptest::prelude::*;
-use zerkalo_scene::camera::ViewAngle;
-use zerkalo_scene::edit::{Target, rename, store_view};
-use zerkalo_scene::shape::{Plane, Shape, Sphere};
-use zerkalo_scene::value::Color;
-use zerkalo_scene::{Document, Object, Scale, Scene, TransformOp};
+use zerkalo_scene::edit::{rename, store_view};
+use zerkalo_scene::shape::{Plane, Sphere};
 
 fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Applies `edit` to the scene in `text`. Returns the new text, and checks that it reads back as
-/// the edited scene.
 fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     let mut document = document(text);
     let mut scene = document.scene().clone();

@@ -1,8 +1,7 @@
 //! Camera movements: invariants of each, and valid cameras after all of them.
 
-use glam::DVec3;
+use crate::harness::*;
 use proptest::prelude::*;
-use zerkalo_scene::camera::{Camera, ViewAngle};
 
 /// Returns the camera of the mirror room.
 fn aimed() -> Camera {

@@ -1,13 +1,11 @@
 //! Random sequences of all operations that edit a scene.
 
 use super::LAYOUTS;
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 use proptest::prelude::*;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use zerkalo_scene::edit::{self, Edit, EditError, Target, Widget};
-use zerkalo_scene::{Document, History, Scene};
+use zerkalo_scene::History;
+use zerkalo_scene::edit::{Edit, EditError, Widget};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 
@@ -27,7 +25,6 @@ fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
     list.get(at.checked_rem(list.len())?).cloned()
 }
 
-/// Performs one edit operation. Returns its name for the tally, and its result.
 fn perform(
     scene: &Scene,
     (what, at, other, amount): Act,
@@ -134,27 +131,11 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
     let tally = tally.into_inner();
     println!("done and refused: {tally:?}");
     // An operation missing in the tally would go untested.
-    for name in [
-        "step",
-        "fine step",
-        "set",
-        "set number",
-        "toggle",
-        "add object",
-        "add light",
-        "move",
-        "rotate",
-        "drop",
-        "duplicate",
-        "delete",
-        "rename",
-        "own material",
-        "store camera",
-        "recall camera",
-        "roughen",
-        "reflect",
-        "next lobe",
-    ] {
+    for name in
+        "step|fine step|set|set number|toggle|add object|add light|move|rotate|drop|duplicate|\
+         delete|rename|own material|store camera|recall camera|roughen|reflect|next lobe"
+            .split('|')
+    {
         assert!(tally.get(name).is_some_and(|[done, _]| *done > 0), "{name}: {tally:?}");
     }
 }

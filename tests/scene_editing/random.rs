@@ -1,15 +1,13 @@
 //! Random valid scenes and random edits.
 
+use crate::harness::*;
 use proptest::prelude::*;
-use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo_scene::light::{Directional, Falloff, Light, LightKind, Point};
-use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Material, Metal};
+use zerkalo_scene::Rotate;
+use zerkalo_scene::material::Metal;
 use zerkalo_scene::shape::{
-    Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, Plane,
-    Prism, Pyramid, Rectangle, Shape, Sphere, TaperedCylinder, Union, UnitFrustum,
+    Cone, Cube, Difference, HorizontalRectangle, Intersection, Plane, Prism, Pyramid, Rectangle,
+    Sphere, TaperedCylinder, Union, UnitFrustum,
 };
-use zerkalo_scene::value::Color;
-use zerkalo_scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
 
 fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![

@@ -1,10 +1,8 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
-use std::fmt::Write as _;
-use zerkalo_scene::FIELDS;
-use zerkalo_scene::shape::EXAMPLES;
+use crate::harness::*;
 use zerkalo_scene::shape::{KINDS, TransformOp};
-use zerkalo_scene::value::{DefaultValue, Field, ValueType};
+use zerkalo_scene::value::DefaultValue;
 
 const INTRODUCTION: &str = "\
 # Scene files
@@ -123,7 +121,6 @@ and every key with a default may be left out. Unknown keys are errors.
 `zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
 
-/// Returns the manual of the scene format, as Markdown.
 pub fn format_manual() -> String {
     let mut out = INTRODUCTION.to_string();
     for field in FIELDS {

@@ -1,12 +1,10 @@
-//! Stories (user input and expected state) of typing, forms, drags and refusals.
+//! Stories of typing, forms, drags and refusals.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, ROOM};
-use std::time::Duration;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo_scene::edit::Target;
-use zerkalo_scene::shape::Shape;
 
 const BALL: Target = Target::Object(1);
 

@@ -1,17 +1,12 @@
-//! Stories (user input and expected state) of files: saving, changes by other programs, errors in
-//! the file, quitting.
+//! Stories of files: saving, changes by other programs, errors in the file, quitting.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::update;
-use zerkalo_render::schedule::Stop;
-use zerkalo_scene::edit::Target;
-use zerkalo_scene::{SaveError, Scene};
+use zerkalo_scene::SaveError;
 
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);
@@ -168,7 +163,7 @@ fn error_in_changed_file_keeps_scene() {
 
 #[test]
 fn built_in_scene_opens_without_file() {
-    let text = crate::common::MIRROR_ROOM;
+    let text = MIRROR_ROOM;
     let mut model = start(None, text);
     assert_eq!(**model.scene(), Scene::parse(text, "mirror-room.toml").unwrap());
     let raster = model.layout().unwrap().raster;
@@ -219,8 +214,6 @@ fn export_path_with_control_characters_is_not_copied() {
     assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }
 
-/// Checks the viewer of exported images. An image covers the whole screen, and the next key closes
-/// it without any other effect.
 #[test]
 fn image_viewer_closes_on_any_key() {
     let mut desk = Desk::new(ROOM);

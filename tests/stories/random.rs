@@ -1,10 +1,8 @@
 //! Ten thousand random key and mouse events on three scenes. The model must stay valid, and it must
 //! be possible to undo every edit.
 
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, ROOM};
-use std::collections::HashSet;
-use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};

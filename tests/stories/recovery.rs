@@ -1,12 +1,9 @@
-//! Stories (user input and expected state) of unsaved edits: autosave, and recovery at the next
-//! start.
+//! Stories of unsaved edits: autosave, and recovery at the next start.
 
+use crate::harness::*;
 use crate::stories::simulated_dashboard::{Desk, ROOM};
-use std::sync::Arc;
-use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo_scene::Scene;
 
 /// Returns the autosave requests since the last call. Each is a scene to be saved, or `None` if the
 /// recovery file is to be removed.

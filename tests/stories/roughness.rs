@@ -1,14 +1,9 @@
 //! Keys that change the roughness of a mirror: they must change the pixels that show the mirror and
 //! leave all others equal in every bit.
 
-use crate::common::MIRROR_ROOM;
+use crate::harness::*;
 use crate::stories::simulated_dashboard::Desk;
-use crate::support::{pool, rendered, sized};
-use zerkalo_render::film::testing::TestFilm;
-use zerkalo_render::{FirstHitBuffer, RenderState};
-use zerkalo_scene::Scene;
-use zerkalo_scene::value::Color;
-use zerkalo_world::{FirstHit, Precision};
+use zerkalo_render::FirstHitBuffer;
 
 const SIZE: [u32; 2] = [96, 72];
 const SAMPLES: u32 = 16;

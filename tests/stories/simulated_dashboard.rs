@@ -1,20 +1,15 @@
 //! Simulated environment of a dashboard for story tests, without terminal, renderer or disk. Keys
 //! are given by name, and effects are answered at once.
 
-use std::collections::{BTreeMap, HashSet};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
+use crate::harness::*;
 use zerkalo::dashboard::editor::Editor;
 use zerkalo::dashboard::message::{Effect, Exported, Message};
 use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo::dashboard::update::update;
-use zerkalo_render::film::{Film, Header, LightWeights, LinearImage};
-use zerkalo_render::schedule::Stop;
-use zerkalo_scene::edit::Target;
-use zerkalo_scene::{Document, SaveError, Scene};
+use zerkalo_render::film::LinearImage;
+use zerkalo_scene::SaveError;
 use zerkalo_terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
 /// Path of the scene file.
@@ -88,7 +83,7 @@ impl Desk {
     pub fn new(text: &str) -> Self {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
-        let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
+        let stop = noise_stop(0.5);
         let mut model = Model::new(Some(FILE.into()), FILE, Ok(scene), stop, 2);
         model.max_threads = 4;
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
@@ -270,7 +265,6 @@ impl Desk {
         self.mouse(MouseKind::Release(button), column, row)
     }
 
-    /// Undoes all edits.
     pub fn undo_all(&mut self) {
         while self.model.history.undo().is_some() {}
     }

@@ -1,8 +1,7 @@
 //! Consistency of the command table.
 
+use crate::harness::*;
 use crate::stories::watch;
-use std::collections::{HashMap, HashSet};
-use std::path::Path;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
 use zerkalo_terminal::event::Key;
 

@@ -1,12 +1,7 @@
 //! Images and mesh of the shipped scenes with textures. These functions generate them.
 
-use crate::support::png_file::{PngImage, RgbImage};
-use glam::DVec3;
+use crate::harness::*;
 use png::{BitDepth, ColorType};
-use std::f64::consts::TAU;
-use std::fs;
-use std::path::{Path, PathBuf};
-use zerkalo_scene::asset::Assets;
 
 /// Returns a pseudo-random number from 0 to 1 for a pair of integers.
 fn hashed(x: i64, y: i64) -> f64 {

@@ -1,25 +1,16 @@
 //! Limits of bumps and textures, textures without effect, rejected files.
 
-use crate::support::png_file::{PngImage, RgbImage};
-use crate::support::{picture, rendered, shipped, sized};
-use glam::DVec3;
+use crate::harness::*;
 use png::{BitDepth, ColorType};
-use std::fs;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::asset::{Assets, LoadProgress};
-use zerkalo_scene::edit::{Target, Widget, rows, set, step, toggle};
-use zerkalo_scene::material::Fresnel;
-use zerkalo_scene::{Document, Scene, SceneFile};
-use zerkalo_world::{AnyWorld, Options, Precision};
+use std::sync::atomic::AtomicUsize;
+use zerkalo_scene::SceneFile;
+use zerkalo_scene::asset::LoadProgress;
+use zerkalo_scene::edit::{Widget, rows, set, step, toggle};
 
 fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
 }
 
-/// Checks that a bump map of height 0 changes no bit of the picture, and that the same map with its
-/// own height does.
 #[test]
 fn bump_without_height_changes_no_bit() {
     let bumpy = sized(shipped("bump.toml"), [64, 48]);
@@ -40,8 +31,6 @@ fn bump_without_height_changes_no_bit() {
     }
 }
 
-/// Checks that a linear ramp of heights tilts all normals by the angle of its slope. Light from
-/// behind the surface has no effect, even if it is in front of the tilted normals.
 #[test]
 fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();
@@ -277,37 +266,6 @@ fn faces_in_edges_of_a_texture_have_one_color() {
             }
             let difference = (DVec3::from(single[0]) - DVec3::from(double[0])).abs().max_element();
             assert!(difference < 1e-6, "single {:?}, double {:?} in\n{text}", single[0], double[0]);
-        }
-    }
-}
-
-/// Checks that pictures with textures do not depend on whether a packet holds one pixel's samples
-/// or those of neighbouring pixels.
-#[test]
-fn textures_do_not_depend_on_packets() {
-    let mut glass = shipped("bump.toml");
-    let plaster = glass.materials.get_mut("plaster").unwrap();
-    (plaster.diffuse, plaster.reflection, plaster.transmission) = (0.0, 1.0, 1.0);
-    plaster.fresnel = Some(Fresnel::Dielectric);
-    let mut smooth = glass.clone();
-    smooth.materials.get_mut("plaster").unwrap().bump = None;
-    let whole = |scene: &Scene| shown(&sized(scene.clone(), [40, 30]), Precision::Single);
-    assert!(whole(&glass) != whole(&smooth), "bumps bend what is seen through glass");
-    let shipped = ["bump.toml", "texture-uv.toml"].map(|name| (name, shipped(name)));
-    for (name, scene) in shipped.into_iter().chain([("bumped glass", glass)]) {
-        let scene = sized(scene, [40, 30]);
-        for precision in [Precision::Single, Precision::Double] {
-            let whole = rendered(&scene, 1, precision, 16);
-            let mut single = crate::support::begin(&scene, 1, precision);
-            let pool = crate::support::pool(1);
-            for first in 0..16 {
-                crate::support::uniform(&mut single, first, 1, &pool);
-            }
-            assert!(
-                picture(&whole, Replicates::Both) == picture(&single, Replicates::Both),
-                "{name}"
-            );
-            assert_eq!(whole.film.bad_samples().count, 0, "{name}");
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct};
 use zerkalo_scene::light::LightSample;
 use zerkalo_scene::material::{BsdfQuery, BsdfValue};
 
@@ -117,9 +117,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
     #[inline(never)]
     pub fn surface_emission(&mut self, hit: &Hit<L>) {
         let path = &*self.path;
-        let mut remaining = self.interaction.has_bsdf;
-        while let Some((primitive, lanes)) = next_distinct(self.interaction.primitive, remaining) {
-            remaining = remaining.and_not(lanes);
+        let interaction = self.interaction;
+        for (primitive, lanes) in distinct(interaction.primitive, interaction.has_bsdf) {
             let Some(source) = self.world.emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light

@@ -386,7 +386,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             throughput: Vec3::zero(),
             lobe_density: L::from_f64(L::MAX),
         };
-        let straight = hit.thin | hit.suppressed;
+        let straight = hit.media.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
         let mut split = Self {
             rough,

@@ -2,15 +2,12 @@
 //! finds the media on both sides of a surface by testing two points, one just in front of the
 //! surface and one just behind it.
 
-use crate::agreement::compounds::Body;
-use crate::agreement::reflection::{
+use crate::harness::*;
+use crate::reference::compounds::Body;
+use crate::reference::reflection::{
     Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread,
 };
-use crate::agreement::tracer::{Hit, Mutation, Tracer};
-use crate::common::Numbers;
-use glam::DVec3;
-use zerkalo_scene::material::{Fresnel, Material};
-use zerkalo_scene::{BelowHorizon, RayTypes, Scene};
+use crate::reference::tracer::{Hit, Mutation, Tracer};
 
 /// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;
@@ -37,6 +34,14 @@ fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     [((i - t).sin() / (i + t).sin()).powi(2), ((i - t).tan() / (i + t).tan()).powi(2)]
 }
 
+/// Returns the reflectance of unpolarised light. `c` is the cosine of the angle of incidence.
+pub fn reflectance(c: f64, n_i: f64, n_t: f64) -> f64 {
+    let i = c.clamp(0.0, 1.0).acos();
+    let sin_t = n_i / n_t * i.sin();
+    let t = (sin_t < 1.0).then(|| sin_t.asin());
+    polarised(i, t, n_i, n_t).iter().sum::<f64>() / 2.0
+}
+
 /// Returns the transmitting material that fills `body`. Returns `None` for an opaque body and for a
 /// surface without a volume.
 pub fn medium<'a>(scene: &'a Scene, body: &Body) -> Option<&'a Material> {
@@ -51,7 +56,6 @@ impl Tracer<'_> {
         self.filling(point).map_or((None, 1.0), |(i, material)| (Some(i), material.ior))
     }
 
-    /// Returns the index and the material of the solid that fills the space at `point`.
     fn filling(&self, point: DVec3) -> Option<(usize, &Material)> {
         let bodies = self.bodies.iter().zip(&self.media).enumerate().rev();
         bodies

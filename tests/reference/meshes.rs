@@ -1,10 +1,8 @@
 //! Meshes of the reference tracer. Boxes around consecutive triangles are their only acceleration
 //! structure.
 
-use glam::{DVec2, DVec3};
-use std::collections::HashMap;
-use zerkalo_kernel::primitive::{Form, MeshForm};
-use zerkalo_scene::shape::{MeshDesc, ShapeDesc};
+use crate::harness::*;
+use zerkalo_scene::shape::MeshDesc;
 
 /// Smallest cosine between the shading normal and the direction to the viewer. Normals at a smaller
 /// cosine are bent towards the viewer.
@@ -57,7 +55,6 @@ fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 }
 
 impl Triangles {
-    /// Loads the triangles of a mesh file.
     pub fn new(file: &MeshDesc) -> Self {
         let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
             unreachable!("a mesh description has a mesh form")
@@ -114,7 +111,6 @@ impl Triangles {
         }
     }
 
-    /// Returns the normal of triangle `i`.
     pub fn normal(&self, i: usize) -> DVec3 {
         let [p, q, r] = self.corners[i];
         (q - p).cross(r - p).normalize()

@@ -1,23 +1,18 @@
 //! Statistical comparison of two pictures of a scene: one by the program, one by the reference
 //! tracer.
 
-use crate::agreement::tracer::{Estimate, Mutation, Tracer};
-use crate::common::Numbers;
-use crate::common::normal::two_sided_z;
-use crate::support::{begin_with, picture, pool, sized, uniform};
-use glam::DVec3;
+use crate::harness::*;
+use crate::reference::tracer::{Estimate, Mutation, Tracer};
 use rayon::prelude::*;
 use std::fmt;
-use std::path::PathBuf;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::Replicates;
-use zerkalo_scene::Scene;
-use zerkalo_scene::camera::ViewAngle;
-use zerkalo_world::Precision;
+use std::sync::{OnceLock, PoisonError};
 
 /// Width and height of the compared pictures.
 pub const SIZE: [u32; 2] = [32, 24];
+/// Samples per pixel of the reference tracer.
+pub const REFERENCE_SAMPLES: u32 = 96;
+/// Samples per pixel and replicate of the program.
+pub const SAMPLES: u32 = 128;
 /// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 4;
 /// Probability that any of the comparisons of one scene gives a false alarm. With a hundred scenes,
@@ -26,7 +21,7 @@ const LEVEL: f64 = 1e-3 / 100.0;
 
 /// Difference between two pictures of a scene, and the largest difference that chance explains.
 #[derive(Debug)]
-pub struct Verdict {
+pub struct Difference {
     /// Largest difference between the means of a block in both pictures, in standard errors.
     pub worst_z: f64,
     pub allowed_z: f64,
@@ -38,13 +33,13 @@ pub struct Verdict {
     pub reference: Vec<DVec3>,
 }
 
-impl Verdict {
+impl Difference {
     pub fn agree(&self) -> bool {
         self.worst_z <= self.allowed_z && self.chi2 <= self.allowed_chi2
     }
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Self { worst_z, allowed_z, chi2, allowed_chi2, .. } = self;
         write!(f, "z {worst_z:.2} of {allowed_z:.2}, chi2 {chi2:.0} of {allowed_chi2:.0}")
@@ -62,8 +57,6 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
         Self(Mutex::new(Vec::new()))
     }
 
-    /// Returns the result of `compute` for `key`; `compute` runs only once for each key. The result
-    /// must depend on the key alone.
     pub fn get(&self, key: K, compute: impl FnOnce() -> V) -> V {
         let slot = {
             // A test that fails while it holds the lock leaves the table valid.
@@ -84,8 +77,7 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
 pub struct Picture {
     size: [u32; 2],
     mean: Vec<DVec3>,
-    /// Estimate of the noise of `mean`: half the difference of the two replicates (halves of the
-    /// samples) of each pixel.
+    /// Estimate of the noise of `mean`: half the difference of the two replicates of each pixel.
     half: Vec<DVec3>,
     /// Estimate of the noise of a second picture, which is rendered with independent random
     /// numbers: half the difference of its two replicates at each pixel.
@@ -94,12 +86,11 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Renders `scene` with `samples` samples per pixel in each replicate (half of the samples).
     pub fn new(scene: &Scene, samples: u32) -> Arc<Self> {
         static PICTURES: Memo<(Scene, u32), Arc<Picture>> = Memo::new();
         PICTURES.get((scene.clone(), samples), || {
-            let (mean, half) = rendered(scene, samples, SamplerKind::Sobol);
-            let (_, random) = rendered(scene, samples, SamplerKind::Random);
+            let (mean, half) = replicates(scene, samples, SamplerKind::Sobol);
+            let (_, random) = replicates(scene, samples, SamplerKind::Random);
             Arc::new(Self { size: scene.film.size, mean, half, random, samples })
         })
     }
@@ -109,7 +100,7 @@ impl Picture {
     /// estimated twice: from the reference, and from the program's picture with independent random
     /// numbers. The larger estimate is used, because few samples underestimate the variance of rare
     /// events.
-    pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
+    pub fn beside(&self, reference: &[Estimate], samples: u32) -> Difference {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
         let blocks = blocks(self.size);
@@ -135,7 +126,7 @@ impl Picture {
             count += 1.0;
         }
         let allowed_z = two_sided_z(1.0 - (1.0 - LEVEL).powf(1.0 / (3.0 * count)));
-        Verdict {
+        Difference {
             worst_z,
             allowed_z,
             chi2,
@@ -150,6 +141,17 @@ impl Picture {
 /// quantile of the same probability (Wilson and Hilferty 1931).
 fn chi2_quantile(n: f64, z: f64) -> f64 {
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
+}
+
+/// Compares the program's picture of `tested` statistically with the reference tracer's picture of
+/// `original`, which has `samples` samples per pixel. A scene other than the original deviates by
+/// many standard errors; half of the samples show it.
+pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
+    let reference = reference(&small(original.clone()), samples, Mutation::None);
+    let reference = reference.expect("the plain tracer supports the scene");
+    let of_picture = if tested == original { SAMPLES } else { SAMPLES / 2 };
+    let verdict = Picture::new(&small(tested.clone()), of_picture).beside(&reference, samples);
+    ensure(verdict.agree(), || verdict.to_string())
 }
 
 /// Returns `scene` with the picture size of the comparison, [`SIZE`].
@@ -191,9 +193,9 @@ fn traced(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimat
     Ok(rows.concat())
 }
 
-/// Renders `scene` with the program, with `samples` samples per pixel in each of the two replicates
-/// (halves of the samples). Returns the picture, and half the difference of the replicates.
-pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
+/// Renders `scene` with the program, with `samples` samples per pixel in each replicate. Returns
+/// the picture, and half the difference of the replicates.
+pub fn replicates(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
     let part = |part| picture(&rendering, part).into_iter().map(DVec3::from).collect::<Vec<_>>();
@@ -215,9 +217,9 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
 
 /// Compares the variance of single samples in two pictures of a scene. The picture `reference` by
 /// the reference tracer has `reference_samples` samples per pixel. This program's picture is given
-/// by `half`, half the difference of its two replicates (halves of the samples), which have
-/// `samples` samples per pixel each. Returns the magnitude of the difference of the variances,
-/// averaged over blocks, in standard errors.
+/// by `half`, half the difference of its two replicates, which have `samples` samples per pixel
+/// each. Returns the magnitude of the difference of the variances, averaged over blocks, in
+/// standard errors.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,
@@ -244,7 +246,7 @@ pub fn variances_differ_by(
 
 /// Writes the program's picture, the picture of the reference tracer, and their difference to
 /// files. Returns the folder of the files.
-pub fn keep(name: &str, verdict: &Verdict) -> PathBuf {
+pub fn keep(name: &str, verdict: &Difference) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("agreement");
     std::fs::create_dir_all(&folder).unwrap();
     let difference: Vec<DVec3> = verdict

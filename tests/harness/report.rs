@@ -1,9 +1,7 @@
-//! Output for the table of extremes (scenes that renderers often render wrongly) in
-//! docs/accuracy.md. A test prints its result once it has passed, and `benches/accuracy.sh
-//! extremes` collects the output.
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
+//! Output for the table of extremes in docs/accuracy.md. A test prints its result once it has
+//! passed, and `benches/accuracy.sh extremes` collects the output.
 
-use zerkalo_kernel::lanes::SimdFloat;
+use super::*;
 
 /// Prints `text` for a cell of the table of extremes: row `number`, and the column `single`,
 /// `double`, `both`, `auto`, `about` or `criterion`.

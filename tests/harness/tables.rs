@@ -1,10 +1,7 @@
 //! The keys and values of a scene, enumerated from the field tables, so that tests need no lists of
 //! their own.
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
-use toml::{Table, Value};
-use zerkalo_scene::value::{Field, TomlValue, ValueType};
-use zerkalo_scene::{AssetResolver, FIELDS, Scene};
+use super::*;
 
 /// Key that a scene file may have.
 #[derive(Clone, Debug)]
@@ -12,27 +9,18 @@ pub struct Key {
     /// Path from the root to the key: names of tables and lists. An index in a list is written as a
     /// number.
     pub path: Vec<String>,
-    /// Type of the key's value.
     pub takes: ValueType,
-}
-
-/// Returns `scene` as a TOML table.
-pub fn table(scene: &Scene) -> Table {
-    scene.to_table()
 }
 
 /// Returns the scene in `table`, whose asset files `resolver` finds. Returns `None` if it has
 /// errors.
-pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
+pub fn scene_of_table(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     let mut scene = Scene::from_text(&table.to_string()).ok()?;
     scene.resolver = resolver.clone();
     scene.resolve();
     scene.faults().is_empty().then_some(scene)
 }
 
-/// Returns every key that the field tables define for `scene`, whether the scene sets the key or
-/// not. Keys within a table or list element are returned only if `scene` contains that table or
-/// element. A table or list is itself returned as a key.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);
@@ -82,7 +70,6 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
     }
 }
 
-/// Returns the value at `path` in `table`.
 pub fn value_at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
     let (first, deeper_keys) = path.split_first()?;
     let mut value = table.get_mut(first)?;

@@ -1,73 +1,62 @@
 //! Reference path tracer in double precision. It traces one sample at a time and is optimised for
 //! readability.
 
-use crate::agreement::compounds::{Body, Leaf, Meeting};
-use crate::agreement::emission::Shine;
-use crate::agreement::lamps::Lamp;
-use crate::agreement::meshes;
-use crate::agreement::paint::Pixels;
-use crate::agreement::reflection::{highlight, reflect, wide_lobe};
-use crate::agreement::transmission::{Way, medium};
-use crate::common::Numbers;
-use glam::DVec3;
-use std::collections::HashMap;
-use std::f64::consts::PI;
+use crate::harness::*;
+use crate::reference::compounds::{Body, Leaf, Meeting};
+use crate::reference::emission::Shine;
+use crate::reference::lamps::Lamp;
+use crate::reference::meshes;
+use crate::reference::paint::Pixels;
+use crate::reference::reflection::{highlight, reflect, wide_lobe};
+use crate::reference::transmission::{Way, medium};
 use std::sync::LazyLock;
-use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
-use zerkalo_scene::light::{Falloff, Light, LightKind, Spot};
-use zerkalo_scene::material::Material;
-use zerkalo_scene::value::{Color, TomlValue};
-use zerkalo_scene::{Filter, RayTypes, Scene};
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
     /// No deliberate error.
     None,
-    /// Deliberate error: lobes are 5 % wider.
     WiderLobe,
-    /// Deliberate error: the densities of lobes are overestimated by 5 %.
+    /// The densities of lobes are overestimated by 5 %.
     LobeDensity,
-    /// Deliberate error: shadow rays start 1e-3 scene units too far towards the light.
+    /// Shadow rays start 1e-3 scene units too far towards the light.
     ShadowOffset,
-    /// Deliberate error: lobe directions below the horizon are absorbed.
+    /// Lobe directions below the horizon are absorbed.
     Absorb,
-    /// Deliberate error: for the first light, the cosine at the lit surface is omitted.
+    /// For the first light, the cosine at the lit surface is omitted.
     NoCosine,
-    /// Deliberate error: the intensity of a spot light falls linearly, instead of by a smoothstep,
-    /// from the inner to the outer cone.
+    /// The intensity of a spot light falls linearly, instead of by a smoothstep, from the inner to
+    /// the outer cone.
     LinearCone,
-    /// Deliberate error: light that enters a solid is not refracted.
+    /// Light that enters a solid is not refracted.
     NoBending,
-    /// Deliberate error: texture coordinates u and v are exchanged.
+    /// Texture coordinates u and v are exchanged.
     SidewaysTexture,
-    /// Deliberate error: bump heights are negated.
+    /// Bump heights are negated.
     SunkenBumps,
-    /// Deliberate error: diffuse bounces are distributed uniformly over the hemisphere.
+    /// Diffuse bounces are distributed uniformly over the hemisphere.
     UniformBounce,
-    /// Deliberate error: ambient light is also added at diffuse bounces.
+    /// Ambient light is also added at diffuse bounces.
     AmbientTwice,
-    /// Deliberate error: points of the lens are distributed over the square around it.
+    /// Points of the lens are distributed over the square around it.
     SquareLens,
-    /// Deliberate error: rays through the lens keep the direction of the ray through its centre.
+    /// Rays through the lens keep the direction of the ray through its centre.
     UnfocusedLens,
-    /// Deliberate error: refracted rays have the density of the microfacet normals, without
-    /// Jacobian.
+    /// Refracted rays have the density of the microfacet normals, without Jacobian.
     NoJacobian,
-    /// Deliberate error: the Jacobian of the half vector of refraction contains the index of the
-    /// incident side instead of the transmitted side.
+    /// The Jacobian of the half vector of refraction contains the index of the incident side
+    /// instead of the transmitted side.
     OtherIndex,
-    /// Deliberate error: absorption is computed for half of the distance.
+    /// Absorption is computed for half of the distance.
     HalfAbsorption,
-    /// Deliberate error: the cosine at the surface of a lamp is omitted.
+    /// The cosine at the surface of a lamp is omitted.
     NoLampCosine,
-    /// Deliberate error: the cosine at the surface of an emissive object is omitted.
+    /// The cosine at the surface of an emissive object is omitted.
     NoEmissionCosine,
-    /// Deliberate error: rays that miss all surfaces do not see environments.
+    /// Rays that miss all surfaces do not see environments.
     NoSky,
-    /// Deliberate error: reflected rays also see lamps whose reflected light was already found at
-    /// sampled points of the lamp. The results of two sampling techniques are thus added without
-    /// weights.
+    /// Reflected rays also see lamps whose reflected light was already found at sampled points of
+    /// the lamp. The results of two sampling techniques are thus added without weights.
     LampSeenTwice,
 }
 
@@ -273,7 +262,7 @@ impl<'a> Tracer<'a> {
 
     /// Returns the camera ray through a random point of the lens and the point `x`, `y` of the
     /// picture, in pixels from its upper left corner.
-    fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
+    pub fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let eye = DVec3::from(camera.eye);
         let forward = match (camera.target, camera.direction) {
@@ -334,7 +323,7 @@ impl<'a> Tracer<'a> {
         1e-10 * (1.0 + origin.abs().max_element())
     }
 
-    fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
+    pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
         let from = Self::clearance(origin);
         let mut nearest: Option<(Meeting, usize)> = None;
         for (i, body) in self.bodies.iter().enumerate() {
@@ -562,38 +551,16 @@ fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
 }
 
 /// Keys of materials that the reference tracer supports.
-const KNOWN: [&str; 23] = [
-    "color",
-    "ambient",
-    "diffuse",
-    "specular",
-    "exponent",
-    "highlight",
-    "reflection",
-    "transmission",
-    "ior",
-    "attenuation_color",
-    "attenuation_distance",
-    "roughness",
-    "lobe",
-    "alpha",
-    "masking",
-    "fresnel",
-    "f0",
-    "metal",
-    "emission",
-    "emission_color",
-    "two_sided",
-    "texture",
-    "bump",
-];
+const KNOWN: &str = "color ambient diffuse specular exponent highlight reflection transmission ior \
+     attenuation_color attenuation_distance roughness lobe alpha masking fresnel f0 metal \
+     emission emission_color two_sided texture bump";
 
 /// Returns an error if the reference tracer does not support a key that the material sets to a
 /// value other than the default.
 fn unknown_keys(material: &Material) -> Result<(), String> {
     let plain = Material::default().to_table();
     for (key, value) in material.to_table() {
-        if !KNOWN.contains(&key.as_str()) && plain.get(&key) != Some(&value) {
+        if KNOWN.split(' ').all(|known| known != key) && plain.get(&key) != Some(&value) {
             return Err(format!("the material key `{key}`"));
         }
     }

@@ -1,12 +1,5 @@
 //! Random numbers for tests: a fixed seed gives the same numbers everywhere.
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
-
-pub mod normal;
-pub mod rays;
-pub mod report;
-pub mod tables;
-
-use glam::DVec3;
+use super::*;
 
 /// Text of `scenes/mirror-room.toml`.
 pub const MIRROR_ROOM: &str = include_str!("../../scenes/mirror-room.toml");
@@ -18,12 +11,10 @@ pub const NAME: &str = concat!(env!("ZERKALO_ROOT"), "test");
 pub struct Numbers(u64);
 
 impl Numbers {
-    /// Creates the generator with the seed `seed`.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = self.0;
@@ -37,12 +28,10 @@ impl Numbers {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Returns a uniform number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Returns a log-uniform number between `low` and `high`.
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
@@ -52,7 +41,6 @@ impl Numbers {
         (self.bits() % n as u64) as usize
     }
 
-    /// Shuffles `items` (Fisher-Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, self.below(i + 1));
@@ -67,7 +55,6 @@ impl Numbers {
         DVec3::new(r * cos, r * sin, z).normalize()
     }
 
-    /// Returns a random point, uniform in the cube from -`half` to `half`.
     pub fn in_cube(&mut self, half: f64) -> DVec3 {
         DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
     }

@@ -1,12 +1,8 @@
 //! Surface reflection of the reference tracer. It is an independent, slow implementation that
 //! evaluates the formulas literally. The program's reflection is compared with its results.
 
-use crate::agreement::tracer::Mutation;
-use crate::common::Numbers;
-use glam::DVec3;
-use std::f64::consts::{PI, TAU};
-use zerkalo_scene::BelowHorizon;
-use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Masking, Material};
+use crate::harness::*;
+use crate::reference::tracer::Mutation;
 
 /// Roughness alpha of microfacets below which surfaces are treated as mirrors. Highlights are
 /// computed with at least this alpha.
@@ -37,7 +33,7 @@ pub fn fresnel(material: &Material, c: f64) -> DVec3 {
 
 /// Returns the density D of microfacet normals: GGX if `ggx` is `true`, otherwise Beckmann. `c` is
 /// the cosine of the angle between the microfacet normal and the surface normal.
-fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
+pub fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     let tan2 = (1.0 - c * c).max(0.0) / (c * c);
     let shape =
         if ggx { (1.0 + tan2 / (alpha * alpha)).powi(-2) } else { (-tan2 / (alpha * alpha)).exp() };
@@ -58,7 +54,9 @@ fn erf(x: f64) -> f64 {
     2.0 / PI.sqrt() * sum
 }
 
-fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
+/// Returns the auxiliary function Lambda of Smith masking. `c` is the cosine of the angle to the
+/// surface normal.
+pub fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
     let tan = (1.0 - c * c).max(0.0).sqrt() / c;
     if tan == 0.0 {
         return 0.0;

@@ -1,25 +1,10 @@
-//! Renders that tests drive wave by wave (sets of concurrent jobs), without a clock or channels.
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
-
-pub mod png_file;
-
-use crate::common::NAME;
+//! Renders that tests drive wave by wave, without a clock or channels.
+use super::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::fs;
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
-use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::film::{Display, Film, Replicates};
-use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
-use zerkalo_render::session::Session;
+use zerkalo_render as render;
 use zerkalo_render::wave::{Job, Wave, WaveReport};
-use zerkalo_render::{Options, RenderState};
-use zerkalo_scene::{Acceleration, Filter, Scene};
-use zerkalo_world::{self as world, Precision};
 
-/// Returns the scene `name` of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
@@ -45,32 +30,42 @@ pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
 
 /// Returns the scene in `text`. Panics if it has errors.
 pub fn parsed(text: &str) -> Scene {
-    Scene::parse(text, NAME).unwrap_or_else(|e| panic!("{e}"))
+    Scene::parse(text, NAME).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Returns the state of a render that has no samples yet.
+pub fn sobol(seed: u64) -> SampleSettings {
+    SampleSettings { seed, kind: SamplerKind::Sobol }
+}
+
+pub fn render_options(sampling: SampleSettings) -> render::Options {
+    render::Options { world: Options::default(), sampling, display: Display::default() }
+}
+
 pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
-    begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
+    begin_with(scene, sobol(seed), precision)
 }
 
-/// Returns the state of a render that has no samples yet, with the given seed and sample sequence.
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
-    let world = world::Options { precision, ..world::Options::default() };
-    RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
+    let mut options = render_options(sampling);
+    options.world.precision = precision;
+    RenderState::new(scene, &options, None)
 }
 
-/// Creates a session (background renderer) that traces with `threads` threads until `stop`.
-pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session {
-    let options = Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    let settings = Settings { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop };
-    Session::new(threads, options, settings).unwrap()
+pub fn new_session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session {
+    let settings = settings(adaptive, 0, stop);
+    Session::new(threads, render_options(sobol(seed)), settings).unwrap()
 }
 
-/// Thread pools that no test uses at present.
+/// Returns the stop criterion of `spp` samples per pixel.
+pub fn spp_stop(spp: u32) -> Stop {
+    Stop { spp: Some(spp), ..Stop::default() }
+}
+
+/// Returns the stop criterion of a noise of at most `levels` 8-bit levels.
+pub fn noise_stop(levels: f64) -> Stop {
+    Stop { noise_levels: Some(levels), ..Stop::default() }
+}
+
 static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 
 /// Thread pool that other tests reuse after it is dropped. Starting and ending threads takes longer
@@ -78,7 +73,6 @@ static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 /// the process.
 pub struct Pool(Option<ThreadPool>);
 
-/// Returns a pool of `threads` threads. Takes a free pool of this size, or creates one.
 pub fn pool(threads: usize) -> Pool {
     let mut free = FREE_POOLS.lock().unwrap();
     let found = free.iter().position(|pool| pool.current_num_threads() == threads);
@@ -101,20 +95,18 @@ impl Drop for Pool {
     }
 }
 
-/// Returns a wave (set of concurrent jobs) with one job for each tile, in the order of the film.
-/// The jobs trace the samples `first .. first + count` of one replicate (half of the samples).
+/// Returns a wave with one job for each tile, in the order of the film. The jobs trace the samples
+/// `first .. first + count` of one replicate.
 pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
     Wave { replicate, jobs, estimate: false }
 }
 
-/// Traces all jobs of a wave.
 pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &ThreadPool) -> WaveReport {
     rendering.trace_wave(wave, pool, &AtomicBool::new(false))
 }
 
-/// Traces the samples `first .. first + count` of both replicates (halves of the samples) in every
-/// pixel.
+/// Traces the samples `first .. first + count` of both replicates in every pixel.
 pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &ThreadPool) {
     for replicate in [0, 1] {
         let wave = wave(&rendering.film, replicate, first, count);
@@ -122,8 +114,7 @@ pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &Threa
     }
 }
 
-/// Renders `scene` by two threads, with `count` samples per pixel in each of the two replicates
-/// (halves of the samples).
+/// Renders `scene` by two threads, with `count` samples per pixel in each replicate.
 pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
@@ -131,7 +122,7 @@ pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> R
 }
 
 /// Renders `scene` by one thread with the given acceleration structure. Each of the two replicates
-/// (halves of the samples) gets `count` samples per pixel.
+/// gets `count` samples per pixel.
 pub fn accelerated(
     scene: &Scene,
     acceleration: Acceleration,

@@ -1,5 +1,4 @@
 //! Tail probabilities of the normal distribution and of Student's t-distribution.
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 /// Returns the probability that the magnitude of a standard normal number exceeds `z`, by a
 /// continued fraction.

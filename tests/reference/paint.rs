@@ -1,19 +1,15 @@
 //! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their
 //! derivatives from finite differences.
 
-use crate::agreement::compounds::Leaf;
-use crate::agreement::meshes::Triangles;
-use crate::agreement::surfaces::Piece;
-use crate::agreement::tracer::{Mutation, Tracer};
-use crate::support::png_file::PngImage;
-use glam::{DMat3, DVec2, DVec3};
+use crate::harness::*;
+use crate::reference::compounds::Leaf;
+use crate::reference::meshes::Triangles;
+use crate::reference::surfaces::Piece;
+use crate::reference::tracer::{Mutation, Tracer};
 use png::BitDepth;
-use std::f64::consts::{PI, TAU};
-use std::path::Path;
 use zerkalo_scene::material::{
-    Axis, Bump, Mapping, Material, Placement, Texture, TextureFilter as Filter, Wrap,
+    Axis, Bump, Mapping, Placement, Texture, TextureFilter as Filter, Wrap,
 };
-use zerkalo_scene::shape::Shape;
 
 /// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;
@@ -251,7 +247,6 @@ impl Spot<'_> {
 }
 
 impl Tracer<'_> {
-    /// Opens the images that `material` names.
     pub fn open_images(&mut self, material: &Material) -> Result<(), String> {
         for file in material.files() {
             if !self.images.contains_key(file) {

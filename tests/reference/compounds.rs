@@ -1,12 +1,10 @@
 //! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in
 //! front and just behind decide if the ray enters or leaves the compound.
 
-use crate::agreement::meshes::Triangles;
-use crate::agreement::paint::{Canvas, Spot};
-use crate::agreement::surfaces::{Piece, map, pieces};
-use glam::{DAffine3, DMat3, DVec3};
-use zerkalo_scene::Object;
-use zerkalo_scene::shape::{CsgOperand, Shape};
+use crate::harness::*;
+use crate::reference::meshes::Triangles;
+use crate::reference::paint::{Canvas, Spot};
+use crate::reference::surfaces::{Piece, map, pieces};
 
 /// Simple shape: its pieces or triangles, and the transforms between its own coordinates and those
 /// of the scene.
@@ -78,7 +76,6 @@ impl Leaf {
         })
     }
 
-    /// Converts origin and direction of a line to the shape's own coordinates.
     fn own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let own = &self.own_from_scene;
         if self.is_in_place {
@@ -115,7 +112,6 @@ impl Leaf {
         (self.own_from_scene_normals * normal).normalize()
     }
 
-    /// Converts a normal in the shape's own coordinates to those of the scene.
     pub fn scene_normal(&self, own: DVec3) -> DVec3 {
         (self.scene_from_own_normals * own).normalize()
     }
@@ -182,7 +178,7 @@ impl Body {
         nearest
     }
 
-    /// Returns the only simple shape of an object that is no compound. Returns `None` for a
+    /// Returns the only simple shape of an object that is not a compound. Returns `None` for a
     /// compound.
     pub fn simple(&self) -> Option<&Leaf> {
         matches!(self.tree, Tree::Leaf(_)).then(|| &self.leaves[0])
@@ -200,7 +196,7 @@ impl Body {
             && matches!(pieces[..], [Piece::Polygon(..)] | [Piece::Plane(..)])
     }
 
-    /// Returns `true` if `point` is inside of the object.
+    /// Returns `true` if `point` is inside the object.
     pub fn holds(&self, point: DVec3) -> bool {
         self.contains(&self.tree, point)
     }

@@ -1,16 +1,8 @@
 //! Rays in double precision, traced in packets of any lane type.
 
-#![allow(dead_code, reason = "each of the two test programs uses a part")]
-
-use crate::common::Numbers;
-use glam::{DAffine3, DQuat, DVec3};
-use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
-use zerkalo_kernel::primitive::{Aggregate, Form, SurfacePoint};
+use super::*;
 use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo_scene::Scene;
-use zerkalo_scene::shape::EXAMPLES;
-use zerkalo_world::{AnyWorld, Options, Path, Precision, Radiance, World};
+use zerkalo_world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
 /// Single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);
@@ -19,7 +11,7 @@ pub type Line = (DVec3, DVec3);
 #[derive(Clone, Copy, Debug)]
 pub struct LineHit {
     pub t: f64,
-    /// Index of the hit form (geometric shape) in the list from which the aggregate was built.
+    /// Index of the hit form in the list from which the aggregate was built.
     pub form: usize,
     pub point: DVec3,
     pub normal: DVec3,
@@ -94,13 +86,8 @@ pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64
 
 /// Returns one form of every registered kind of shape, taken from the kind's documented example.
 pub fn every_kind() -> Vec<(&'static str, Form)> {
-    let form = |text: &str| scene(&format!("[[object]]\n{text}")).objects[0].shape.form();
+    let form = |text: &str| parsed(&format!("[[object]]\n{text}")).objects[0].shape.form();
     EXAMPLES.iter().map(|(key, example)| (*key, form(example))).collect()
-}
-
-/// Returns the scene in `text`. Panics if it has errors.
-pub fn scene(text: &str) -> Scene {
-    Scene::parse(text, super::NAME).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// Returns centre and radius of the sphere around the bounding box of `form`. Returns `None` for an

@@ -2,9 +2,7 @@
 //! and the sides of cones, in the coordinates of the shapes' descriptions. No code is shared with
 //! the program.
 
-use glam::{DAffine3, DMat3, DVec2, DVec3};
-use zerkalo_scene::TransformOp;
-use zerkalo_scene::shape::Shape;
+use crate::harness::*;
 
 /// Simple surface, in the coordinates of the shape's description, before the object's transform.
 pub enum Piece {
@@ -129,8 +127,8 @@ impl Piece {
     }
 
     /// Returns `true` if a point is on the inner side of this piece of a solid's surface. A point
-    /// that is on the inner side of all pieces is inside of the solid, because every solid is
-    /// convex or a torus, which is a single piece.
+    /// that is on the inner side of all pieces is inside the solid, because every solid is convex
+    /// or a torus, which is a single piece.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
@@ -146,7 +144,7 @@ impl Piece {
 }
 
 /// Returns the distance of the point `p` from the surface of a torus about the origin; it is
-/// negative inside of the torus.
+/// negative inside the torus.
 fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
     let along = p.dot(axis);
     ((p - axis * along).length() - ring).hypot(along) - tube
@@ -227,7 +225,6 @@ fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Option<
     (speed != 0.0).then(|| normal.dot(point - origin) / speed)
 }
 
-/// Returns the affine map of a step of an object's transform.
 pub fn map(step: &TransformOp) -> DAffine3 {
     let rotation = |axis: DVec3, degrees: f64| {
         DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())

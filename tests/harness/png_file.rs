@@ -1,9 +1,8 @@
 //! PNG files that tests write and read.
 
+use super::*;
 use png::{BitDepth, ColorType, Decoder, Encoder, Transformations};
-use std::fs;
 use std::io::Cursor;
-use std::path::Path;
 
 /// Image of red, green and blue levels from 0 to 255.
 #[derive(Clone, Debug)]

@@ -2,11 +2,9 @@
 //! uniformly over the lamp's area. Camera and mirror rays find the lamps that they hit. There is no
 //! importance sampling.
 
-use crate::agreement::tracer::Mutation;
-use crate::common::Numbers;
-use glam::DVec3;
-use std::f64::consts::PI;
-use zerkalo_scene::light::{Light, LightKind, LightUnit};
+use crate::harness::*;
+use crate::reference::tracer::Mutation;
+use zerkalo_scene::light::LightUnit;
 
 /// Lamp: a light with a size.
 pub enum Lamp {

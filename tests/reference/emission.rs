@@ -2,11 +2,9 @@
 //! the area of emissive spheres, polygons and triangles. The emission of other shapes counts when a
 //! ray hits them. There is no importance sampling.
 
-use crate::agreement::compounds::Body;
-use crate::agreement::surfaces::Piece;
-use crate::common::Numbers;
-use glam::{DAffine3, DVec3};
-use std::f64::consts::PI;
+use crate::harness::*;
+use crate::reference::compounds::Body;
+use crate::reference::surfaces::Piece;
 
 /// Surface of an emissive object from which points are sampled.
 pub enum Shine {
