@@ -4,9 +4,7 @@ use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, follow, pool, settings, shipped, sized};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
-use zerkalo_render::export::Provenance;
 use zerkalo_render::film::{Display, Film, Replicates};
-use zerkalo_render::image_file::Bands;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::{Options, RegionRender};
 use zerkalo_scene::{Filter, Scene};
@@ -25,19 +23,13 @@ fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
         display: Display::default(),
     };
     let stop = Stop { spp: Some(8), ..Stop::default() };
-    let provenance = Provenance {
-        source: String::new(),
-        scene_hash: String::new(),
-        sampler: SamplerKind::Sobol,
-        adaptive: false,
-    };
     let mut observe = |_: &_| Ok(());
     let how = settings(false, 0, stop);
-    let mut render = RegionRender::new(&scene, &options, how, (rows, 2), provenance, &mut observe)?;
+    let mut render = RegionRender::new(&scene, &options, how, rows, 2)?;
     let mix = begin(&scene, SEED, Precision::Auto).mix;
     let mut films = 0;
     for y in 0..SIZE[1] as usize {
-        let film = render.film_with_row(y).map_err(|e| e.to_string())?;
+        let film = render.film_with_row(y, &mut observe).map_err(|e| e.to_string())?;
         films += u32::from(y == film.first_row());
         let [mut region, mut expected] = [Vec::new(), Vec::new()];
         for replicates in [Replicates::A, Replicates::B] {
