@@ -101,7 +101,7 @@ fn many_lights() -> Scene {
     for i in 0..12 {
         let mut light = light.clone();
         let angle = f64::from(i);
-        light.point.as_mut().unwrap().position = [3.0 * angle.sin(), 3.0, 3.0 * angle.cos()];
+        *light.position_mut().unwrap() = [3.0 * angle.sin(), 3.0, 3.0 * angle.cos()];
         light.color = Color([1.0, 0.1 * f64::from(i % 7), 0.5]);
         light.intensity = 0.05 + 0.01 * f64::from(i);
         scene.lights.push(light);
@@ -145,14 +145,7 @@ fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
         object.transform.push(TransformOp::Translate(by));
     }
     for light in &mut scene.lights {
-        let positions = [
-            light.point.as_mut().map(|point| &mut point.position),
-            light.spot.as_mut().map(|spot| &mut spot.position),
-            light.sphere.as_mut().map(|sphere| &mut sphere.center),
-            light.rectangle.as_mut().map(|rectangle| &mut rectangle.center),
-            light.disk.as_mut().map(|disk| &mut disk.center),
-        ];
-        positions.into_iter().flatten().for_each(&shift);
+        light.position_mut().into_iter().for_each(&shift);
     }
     if let Some(Focus::Point(point)) = &mut scene.camera.focus {
         shift(point);
@@ -224,9 +217,7 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
             let edges = if name == "gallery-glass.toml" { apart.len() / 500 } else { 0 };
             let (most, flipped) = apart.split_at(apart.len() - edges);
             let sum = here.iter().sum::<f64>();
-            let has_lamp = scene.lights.iter().any(|light| {
-                light.sphere.is_some() || light.rectangle.is_some() || light.disk.is_some()
-            });
+            let has_lamp = scene.lights.iter().any(|light| light.surface().is_some());
             let limit = match (precision, has_lamp) {
                 (Precision::Single, true) => f64::from(f32::EPSILON),
                 (Precision::Single, false) => 0.5 * f64::from(f32::EPSILON),

@@ -186,7 +186,7 @@ fn reflecting_tracks_follow_their_formula() {
         }
         assert_eq!(scene.film.size, [640, 480]);
         assert_eq!((scene.camera.eye, scene.camera.target), ([5.0, 0.0, 40.0], Some([0.0; 3])));
-        assert_eq!(scene.lights.iter().filter(|l| l.point.is_some()).count(), 2);
+        assert_eq!(scene.lights.iter().filter(|l| l.kind.key() == "point").count(), 2);
     }
 }
 

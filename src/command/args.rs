@@ -22,10 +22,8 @@ use zerkalo_world::{self as world, Precision};
                         by a signal (`render` then writes the picture so far)."
 )]
 pub struct Cli {
-    /// Subcommand; `None` for the dashboard.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Arguments of the dashboard, which runs without a subcommand.
     #[command(flatten)]
     pub edit: EditArgs,
 }
@@ -316,18 +314,16 @@ pub struct InfoArgs {
     pub scene: Option<PathBuf>,
 }
 
-/// Values of `--precision`, each with its help.
 const PRECISIONS: [Choice<Precision>; 3] = [
     ("single", Some("32-bit floats"), Precision::Single),
     ("double", Some("64-bit floats"), Precision::Double),
     ("auto", Some("32-bit or 64-bit floats, chosen by the scene's proportions"), Precision::Auto),
 ];
 
-/// Value of `--color`; `None` for `auto`. The alias hides the `Option` from clap, which gives a
-/// field of the type `Option` another meaning: an argument that may be absent.
+/// The alias hides the `Option` from clap, for which it means an argument that may be absent.
+/// `None` is `auto`.
 type ColorChoice = Option<Colors>;
 
-/// Values of `--color`, each with its help.
 const COLORS: [Choice<ColorChoice>; 5] = [
     ("auto", Some("Chosen by the environment and the terminal's replies"), None),
     ("true", Some("24-bit colours"), Some(Colors::True)),
@@ -336,35 +332,28 @@ const COLORS: [Choice<ColorChoice>; 5] = [
     ("none", Some("No colours"), Some(Colors::Mono)),
 ];
 
-/// Values of `--sampler`, each with its help.
 const SAMPLERS: [Choice<SamplerKind>; 2] = [
     ("sobol", Some("Owen-scrambled Sobol points"), SamplerKind::Sobol),
     ("random", Some("Independent random numbers"), SamplerKind::Random),
 ];
 
-/// Largest number of tracing threads per processor. More threads slow a render down, because they
-/// wait for each other: with 4,096 threads on two processors, a render of 64 x 48 pixels takes half
-/// a minute.
+/// Largest number of threads per processor. More wait for each other: with 4,096 threads on two
+/// processors, a render of 64 x 48 pixels takes half a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
-/// Number of tracing threads up to which `--threads` is accepted on every machine, even one with
-/// few processors.
+/// Number of threads that every machine accepts.
 const THREADS_ANYWHERE: usize = 16;
 
-/// Returns the number of processors that this process may use, at least 1.
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Returns the largest number of tracing threads on this machine. A larger value of `--threads` is
-/// reduced to this number.
+/// Returns the number to which `--threads` is limited.
 fn max_threads() -> usize {
     THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
 }
 
 impl TerminalArgs {
-    /// Returns the settings of the terminal for these options and the environment variables
-    /// `environment`.
     pub fn setup(&self, environment: Environment) -> TerminalSetup {
         let bandwidth = self.bandwidth.map(|kilobytes| 1e3 * kilobytes);
         TerminalSetup { colors: self.color, environment, bandwidth }
@@ -372,13 +361,12 @@ impl TerminalArgs {
 }
 
 impl ComputeArgs {
-    /// Returns the number of threads that trace rays: the value of `--threads`, but at most
-    /// [`max_threads`]. Without this option, it is the number of processors.
+    /// Returns the number of threads that trace rays.
     pub fn threads(&self) -> usize {
         self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
     }
 
-    /// Returns a warning if `--threads` requests more threads than are used, otherwise `None`.
+    /// Returns a warning if `--threads` requests more threads than are used.
     fn warning(&self) -> Option<String> {
         let given = self.threads.map(usize::from).filter(|given| *given > self.threads())?;
         let number = match processors() {
@@ -394,8 +382,7 @@ impl ComputeArgs {
 }
 
 impl Cli {
-    /// Returns a warning if `--threads` requests more threads than are used, otherwise `None`. The
-    /// option may belong to a subcommand or to the dashboard.
+    /// Returns a warning about `--threads`, of a subcommand or the dashboard.
     pub fn warning(&self) -> Option<String> {
         let compute = match &self.command {
             Some(Command::Render(args)) => &args.compute,
@@ -409,22 +396,19 @@ impl Cli {
 }
 
 impl PrecisionArgs {
-    /// Returns the options of scene compilation with the value of `--precision`.
     pub fn world_options(&self) -> world::Options {
         world::Options { precision: self.precision, ..world::Options::default() }
     }
 }
 
 impl PictureArgs {
-    /// Returns the exposure and tone curve of the displayed picture.
     pub fn display(&self) -> Display {
         Display { exposure_ev: self.exposure, tone: self.tone }
     }
 
-    /// Sets the picture size of `scene` to that of `--size`, if this option is given.
+    /// Sets the size of `scene` to `--size`.
     ///
-    /// # Errors
-    /// Returns the first validation error of the scene with the new size.
+    /// # Errors Returns the first validation error of the scene with the new size.
     pub fn resize(&self, scene: &mut Scene) -> Result<(), String> {
         let Some(size) = self.size else { return Ok(()) };
         scene.film.size = size;
@@ -435,10 +419,9 @@ impl PictureArgs {
     }
 }
 
-/// Possible value of an option: its name, its help, and the value that it stands for.
+/// Name, help and value of an option.
 type Choice<T> = (&'static str, Option<&'static str>, T);
 
-/// Creates the parser for an option with the values `choices`.
 fn choice<T, const N: usize>(choices: [Choice<T>; N]) -> impl TypedValueParser<Value = T>
 where
     T: Clone + Send + Sync + 'static,
@@ -450,14 +433,12 @@ where
     })
 }
 
-/// Creates the parser for the name of an acceleration structure.
 fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
     PossibleValuesParser::new(Acceleration::ALL.map(Acceleration::name))
         .map(|given| Acceleration::from_name(&given).unwrap_or(Acceleration::Auto))
 }
 
-/// Parses a picture size such as `640x480` into width and height. Their range is checked later, by
-/// the validation of the scene.
+/// Parses a size such as `640x480`. The validation of the scene checks its range.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
@@ -478,7 +459,7 @@ fn exposure(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number from -64 to 64".to_string())
 }
 
-/// Units of memory sizes on the command line, each with its number of bytes.
+/// Units of memory sizes in bytes.
 const MEMORY_UNITS: [(&str, f64); 6] = [
     ("KB", 1e3),
     ("MB", 1e6),

@@ -11,14 +11,14 @@ use zerkalo_render::film::file::is_film_file;
 use zerkalo_render::session::Session;
 use zerkalo_scene::disk::{Existing, WriteError, check_writable};
 
-/// Writer of checkpoints. A thread of its own writes the files; rendering pauses only while a
-/// checkpoint is encoded.
+/// Writer of checkpoints in a thread of its own. Rendering pauses only while a checkpoint is
+/// encoded.
 pub struct CheckpointWriter {
     path: PathBuf,
     interval: Duration,
     provenance: Provenance,
     due: Instant,
-    /// `true` while a checkpoint is being encoded or written.
+    /// `true` while a checkpoint is encoded or written.
     busy: bool,
     encoded: Sender<Option<EncodedCheckpoint>>,
     results: Receiver<Result<(), WriteError>>,
@@ -26,7 +26,7 @@ pub struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// Starts the thread that writes checkpoints to `path`. The first one is due after `interval`.
+    /// Starts the thread. The first checkpoint is due after `interval`.
     pub fn new(path: &Path, interval: Duration, provenance: Provenance) -> Self {
         let (encoded, inbox) = channel::<Option<EncodedCheckpoint>>();
         let (outbox, results) = channel();
@@ -34,8 +34,7 @@ impl CheckpointWriter {
         let thread = std::thread::spawn(move || {
             for checkpoint in inbox {
                 let written = checkpoint.map_or(Ok(()), |it| it.write(&target, Existing::Replace));
-                // Sending fails only if the channel is closed. The render has then ended with an
-                // error and does not need the result.
+                // After an error of the render, the channel is closed.
                 let _ = outbox.send(written);
             }
         });
@@ -44,11 +43,9 @@ impl CheckpointWriter {
         Self { path, interval, provenance, due, busy: false, encoded, results, thread }
     }
 
-    /// Checks that a render may write checkpoints to `path`. `resume` is the checkpoint that the
-    /// render continues, if there is one.
+    /// Checks that a render may write checkpoints to `path`, or continue the checkpoint `resume`.
     ///
-    /// # Errors
-    /// Fails if `path` cannot be written, or if it is an existing file other than `resume`.
+    /// # Errors Fails if `path` cannot be written, or is an existing file other than `resume`.
     pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
         check_writable(path)?;
         if resume == Some(path) || !path.exists() {
@@ -65,14 +62,12 @@ impl CheckpointWriter {
         }))
     }
 
-    /// Requests a checkpoint if the interval since the last one has passed. The call does not
-    /// block.
+    /// Requests a checkpoint if one is due. Does not block.
     pub fn poll(&mut self, session: &Session) {
         if let Ok(written) = self.results.try_recv() {
             self.busy = false;
             self.due = Instant::now() + self.interval;
-            // An error is only a warning, because the next checkpoint may succeed, for example
-            // after space on the disk was freed.
+            // The next checkpoint may succeed.
             written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
         }
         if !self.busy && Instant::now() >= self.due {
@@ -84,18 +79,15 @@ impl CheckpointWriter {
     fn request(&self, session: &Session) {
         let encoded = self.encoded.clone();
         session.checkpoint(self.provenance.clone(), move |checkpoint| {
-            // `send` fails only if the receiving thread has panicked, because this thread runs
-            // until all senders are dropped.
+            // The thread runs until all senders are dropped, unless it panics.
             let _ = encoded.send(checkpoint);
         });
     }
 
-    /// Writes the last checkpoint, waits until it is complete, and returns the path of its file.
+    /// Writes the last checkpoint and returns its path.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
         self.request(session);
-        // Waits until the render thread of `session` has run the checkpoint task and has dropped it
-        // with its sender. Otherwise the thread that writes checkpoints would not end, because it
-        // runs until all senders are dropped.
+        // The task must have run and dropped its sender, or the writing thread would not end.
         session.with(|_, _| ());
         let Self { path, encoded, results, thread, .. } = self;
         drop(encoded);

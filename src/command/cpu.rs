@@ -11,8 +11,8 @@
 //! processor, including code that runs before `main`. This code may already contain an illegal
 //! instruction.
 
-/// Ends the program if the processor lacks a feature for which the program was compiled. Each group
-/// of arguments has the name of a feature, and the CPUID register and bit that report it.
+/// Ends the program if the processor lacks a feature of the build. Each group of arguments is a
+/// feature with its CPUID register and bit.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -22,17 +22,16 @@ macro_rules! need {
     };
 }
 
-/// Ends the program with exit status 1 and a message on stderr if this processor lacks a feature
-/// for which the program was compiled. `main` calls this function first.
+/// Ends the program with a message if the processor lacks a feature of the build. `main` calls this
+/// first.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 pub fn require() {
     use std::arch::x86_64::{__cpuid, __cpuid_count, CpuidResult};
-    // Sources of the bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A,
-    // CPUID; for leaf 8000_0001, AMD64 Architecture Programmer's Manual, volume 3, appendix E.
+    // Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID; for leaf
+    // 8000_0001, AMD64 Architecture Programmer's Manual, volume 3, appendix E.
     let none = CpuidResult { eax: 0, ebx: 0, ecx: 0, edx: 0 };
-    // Bit 27 (OSXSAVE) is set if the operating system saves the extended registers, which AVX (bit
-    // 28) requires.
+    // AVX (bit 28) requires that the system saves the extended registers (bit 27, OSXSAVE).
     let leaf1_ecx = __cpuid(1).ecx;
     let leaf1_ecx = if leaf1_ecx >> 27 & 1 == 1 { leaf1_ecx } else { leaf1_ecx & !(1 << 28) };
     let leaf7 = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
@@ -55,7 +54,7 @@ pub fn require() {
     }
 }
 
-/// Does nothing. On processors other than x86-64 the program needs no optional features.
+/// Does nothing: other processors need no optional features.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn require() {}
 
@@ -65,7 +64,7 @@ pub fn require() {}
 fn refuse(lacking: &str) -> ! {
     use std::io::Write;
     let mut err = std::io::stderr();
-    // Errors are ignored: if stderr is closed, the exit status is the only message.
+    // If stderr is closed, the exit status is the only message.
     let _ = err.write_all(b"zerkalo was built for a processor with ");
     let _ = err.write_all(lacking.as_bytes());
     let _ = err.write_all(

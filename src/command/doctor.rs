@@ -1,5 +1,5 @@
-//! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the
-//! dashboard uses them, and how to improve them.
+//! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, and how to
+//! improve them.
 
 use crate::command::{Failure, print_line};
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
@@ -14,9 +14,9 @@ use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
 use zerkalo_terminal::image::Protocol;
 use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
 
-/// Width of the printed report, in columns of the terminal.
+/// Width of the report in columns.
 const COLUMNS: usize = 80;
-/// Width of the names at the start of the report's lines, in columns of the terminal.
+/// Width of the names at the start of lines.
 const NAME: usize = 17;
 
 pub fn run(rate_requested: bool) -> Result<(), Failure> {
@@ -48,17 +48,15 @@ pub fn run(rate_requested: bool) -> Result<(), Failure> {
     print_line(&report.report())
 }
 
-/// Results of all tests of `zerkalo doctor`, from which the report is formatted.
+/// Results of all tests, from which the report is formatted.
 struct DoctorReport {
     environment: Environment,
-    /// Capabilities that the terminal reports, or the reason why the terminal was not queried.
+    /// Reply of the terminal, or the reason why it was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
     rate_requested: bool,
-    /// Name and value of the environment variable that sets the character encoding. `None` if no
-    /// variable sets it.
+    /// Environment variable that sets the character encoding, and its value.
     locale: Option<(&'static str, String)>,
     state: Option<PathBuf>,
-    /// Paths of files with unsaved edits in the state folder.
     unsaved_files: Vec<PathBuf>,
 }
 
@@ -93,13 +91,10 @@ impl DoctorReport {
         lines.join("\n")
     }
 
-    /// Returns the capabilities of the terminal, as it has reported them. Returns `None` if the
-    /// terminal was not queried.
     fn capabilities(&self) -> Option<&Capabilities> {
         self.diagnosis.as_ref().ok().map(|diagnosis| &diagnosis.terminal)
     }
 
-    /// Returns the set of colours that the dashboard uses on this terminal.
     fn level(&self) -> Colors {
         self.capabilities().map_or(self.environment.colors(), |terminal| terminal.colors)
     }
@@ -140,8 +135,7 @@ impl DoctorReport {
         }
     }
 
-    /// Describes the set of colours that the dashboard uses, and the reason for this set: NO_COLOR,
-    /// COLORTERM, TERM or the terminal's reply.
+    /// Describes the set of colours that the dashboard uses, and the reason for it.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
@@ -237,8 +231,7 @@ impl DoctorReport {
     }
 }
 
-/// Returns an entry of the report: `name`, followed by `value`. `value` is wrapped with a hanging
-/// indent, so that no line is longer than [`COLUMNS`].
+/// Returns `name` followed by `value`, wrapped with a hanging indent.
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))
@@ -248,7 +241,7 @@ fn background(terminal: &Capabilities) -> String {
     match terminal.background {
         None => "unknown".to_string(),
         Some([r, g, b]) => {
-            // Rec. 601 luma of the sRGB levels suffices to distinguish dark from light.
+            // Rec. 601 luma suffices to distinguish dark from light.
             let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
             let shade = if luma < 128.0 { "dark" } else { "light" };
             format!("#{r:02x}{g:02x}{b:02x}, {shade}")

@@ -38,7 +38,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reporter.mute();
-    // If a checkpoint is opened, the render continues its samples with the same seed and sampler.
+    // A continued render keeps its seed and sampler.
     let sampling = match &checkpoint {
         Some(checkpoint) => checkpoint.sampling(),
         None => SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
@@ -70,9 +70,8 @@ const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
 /// File name under which [`OPENING`] is saved.
 const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
-/// Prints the results of a dashboard that has ended: names of written files on `out`, everything
-/// else on stderr. If a signal ended the dashboard, the error holds the exit status of that signal,
-/// even if `out` cannot be written because the terminal is lost.
+/// Prints the results of a dashboard: names of written files on `out`, everything else on stderr.
+/// After a signal, the error has its exit status, even if the terminal is lost.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
@@ -103,8 +102,7 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     }
 }
 
-/// Returns the environment variables that describe the terminal. The error is the reason why stdin
-/// and stdout cannot show the dashboard.
+/// Returns the environment of the terminal, or the reason why it cannot show the dashboard.
 pub fn terminal_environment() -> Result<Environment, &'static str> {
     let environment = Environment::of(|name| env::var(name).ok());
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
@@ -116,12 +114,10 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
     }
 }
 
-/// Opens the scene of a checkpoint. This is the scene file from which the checkpoint was rendered,
-/// if the checkpoint's samples are still valid for the present content of this file. Otherwise it
-/// is the scene that is stored in the checkpoint, as a scene without a file.
+/// Opens the scene of a checkpoint: its scene file, if the samples are still valid for that,
+/// otherwise the scene stored in the checkpoint.
 ///
-/// # Errors
-/// Fails if the scene in the checkpoint is not valid.
+/// # Errors Fails if the stored scene is not valid.
 fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
     let source = checkpoint.header.source().unwrap_or_default();
     if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
@@ -132,12 +128,10 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
     Ok(SceneFile::untitled(checkpoint.inputs.scene.clone(), source)?)
 }
 
-/// Opens the scene file at `path`. If the file can be read but is not a valid scene, returns an
-/// inner error: the path of the file and the errors of the scene. The dashboard shows these errors
-/// until the user has corrected the file.
+/// Opens the scene file at `path`. The inner error is for the dashboard, which shows it until the
+/// user has corrected the file.
 ///
-/// # Errors
-/// Fails if the file cannot be read.
+/// # Errors Fails if the file cannot be read.
 fn open(
     path: &Path,
     assets: Arc<Assets>,
@@ -152,9 +146,8 @@ fn open(
     }
 }
 
-/// Returns a note about unsaved edits of the scene file `path`, which cannot be read. The note has
-/// the path of the recovery file with these edits: a file of this user if there is one, otherwise a
-/// file of another user. Returns an empty string if there are no unsaved edits.
+/// Returns a note about unsaved edits of the unreadable scene file `path`, preferably of this user.
+/// Empty if there are none.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path, of: String| {
@@ -168,8 +161,8 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     }
 }
 
-/// Formats the line that is printed about an exported picture, such as `mirror-room-1.png 640x480
-/// 212 spp noise 0.50 8-bit levels`.
+/// Formats an exported picture, such as `mirror-room-1.png 640x480 212 spp noise 0.50 8-bit
+/// levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
     let noise = match exported.noise_levels {

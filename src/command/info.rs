@@ -26,24 +26,19 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Origin of a picture, film or plan file: metadata about the scene, the samples and the noise.
+/// Metadata on the origin of a picture, film or plan file.
 struct Origin {
-    /// Format of the file: `PNG`, `OpenEXR`, `film` or `plan`.
+    /// `PNG`, `OpenEXR`, `film` or `plan`.
     format: &'static str,
-    /// Width and height of the picture in pixels.
     size: [usize; 2],
-    /// Metadata keys and values of the file.
     entries: Vec<(String, String)>,
-    /// Hash of the scene from which the file was rendered. `None` if another program wrote the
-    /// file.
+    /// Hash of the rendered scene. `None` if another program wrote the file.
     scene_hash: Option<String>,
-    /// Inputs that determine the samples: scene, sampler and program version. `None` unless the
-    /// file is a checkpoint.
+    /// Inputs that determine the samples of a checkpoint.
     inputs: Option<SampleInputs>,
 }
 
 impl Origin {
-    /// Reads the origin of a PNG, OpenEXR or film file from its metadata.
     fn of_picture(path: &Path) -> Result<Self, Failure> {
         let metadata = FileMetadata::read(path)?;
         let scene_hash = metadata.get("Scene hash").map(str::to_string);
@@ -90,8 +85,7 @@ impl Origin {
     }
 }
 
-/// Formats four values of a plan: the number of shards (parts of the render), the samples per
-/// pixel, the noise target and the expected noise.
+/// Formats shards, samples per pixel, noise target and expected noise of a plan.
 fn target(plan: &Plan) -> String {
     let settings = &plan.settings;
     format!(
@@ -103,10 +97,9 @@ fn target(plan: &Plan) -> String {
     )
 }
 
-/// Compares `origin` with the scene file at `path`, and prints the result.
+/// Compares `origin` with the scene file at `path`.
 ///
-/// # Errors
-/// Fails if the file of `origin` shows another scene, or has no scene hash.
+/// # Errors Fails if the file of `origin` shows another scene, or has no scene hash.
 fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
     let document = read_scene(path)?;
     let scene = document.scene();
@@ -120,8 +113,7 @@ fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure>
             "scene: {shown} and the files that it names are those of {file}"
         ));
     }
-    // The picture size may differ from the size in the scene file, because the option `--size` of
-    // `render` overrides the latter.
+    // `render --size` overrides the size in the scene file.
     let mut sized = scene.clone();
     sized.film.size = origin.size.map(|n| n as u32);
     match origin.inputs.as_ref().map(|inputs| inputs.fit(&sized)) {

@@ -1,5 +1,4 @@
-//! `zerkalo merge`: adds the films that the shards of a plan have rendered. A plan divides the
-//! render of a picture among processes, the shards.
+//! `zerkalo merge`: adds the films of the shards of a plan.
 
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
@@ -36,9 +35,8 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats two values of noise in 8-bit levels. The first is the noise of the merged picture, which
-/// lacks the samples of some shards (parts of the render). The second is `predicted_levels`, the
-/// noise predicted for the picture with all shards.
+/// Formats the noise of the merged picture, which lacks shards, and the noise predicted for all
+/// shards.
 fn cost(report: &Report, predicted_levels: f64) -> String {
     match report.noise {
         Some(noise) => format!(

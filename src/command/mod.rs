@@ -1,4 +1,4 @@
-//! Command line of the program: parses arguments and runs subcommands.
+//! Command line of the program.
 
 mod args;
 mod check;
@@ -37,29 +37,27 @@ use zerkalo_scene::{Document, Scene};
 use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision, requires_double};
 
-/// Exit status for an invalid command line. clap uses the same status.
+/// Exit status for an invalid command line, also that of clap.
 const WRONG_USAGE: u8 = 2;
 
-/// Reason why a command did not succeed: a failure, an invalid command line, or a signal.
+/// Reason why a command did not succeed.
 enum Failure {
-    /// The command failed (exit status 1). The value is the message.
+    /// Failure with this message (exit status 1).
     Failed(String),
-    /// The command line is not valid (exit status 2). The value is the message.
+    /// Invalid command line with this message (exit status 2).
     Usage(String),
-    /// The command was ended by a signal, after it saved the picture or the edits so far. The value
-    /// is the exit status: 129, 130, 131 or 143.
+    /// Signal, after the picture or the edits were saved; the value is the exit status: 129, 130,
+    /// 131 or 143.
     Signalled(u8),
 }
 
-/// Converts an error to a failure of the command. The message of the error becomes the message of
-/// the failure.
 impl<E: Display> From<E> for Failure {
     fn from(error: E) -> Self {
         Self::Failed(error.to_string())
     }
 }
 
-/// Runs the command line of the process. Returns its exit status.
+/// Runs the command line of the process.
 #[inline(never)]
 pub fn main() -> ExitCode {
     let started = Instant::now();
@@ -89,11 +87,11 @@ pub fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Parses the command line. Ends the program with exit status 2 if the command line is not valid.
+/// Parses the command line. Ends the program if it is not valid.
 fn parse_command_line() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
-        // In `zerkalo rendr a.toml` clap takes `rendr` for a scene file and reports an error about
-        // `a.toml`. This function reports the unknown command `rendr` instead.
+        // In `zerkalo rendr a.toml`, clap takes `rendr` for a scene file and reports an error about
+        // `a.toml`.
         let first = std::env::args_os().nth(1).unwrap_or_default();
         let first = first.to_string_lossy();
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
@@ -107,10 +105,9 @@ fn parse_command_line() -> Cli {
     })
 }
 
-/// Prints the text of `error` (a usage error, the help or the version), and ends the program.
+/// Prints a usage error, the help or the version, and ends the program.
 fn end(error: &clap::Error) -> ! {
-    // Control characters in arguments, such as file names matched by a shell pattern, must not
-    // reach the terminal.
+    // Control characters in arguments must not reach the terminal.
     let has_control_characters = |argument: OsString| {
         let argument = argument.to_string_lossy();
         sanitized(&argument) != argument
@@ -124,7 +121,7 @@ fn end(error: &clap::Error) -> ! {
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
-/// Handles SIGINT and SIGTERM: the first one saves the picture so far, a second one ends the program.
+/// Handles SIGINT and SIGTERM as [`Signals::catch_end`] does.
 fn handle_signals() -> Result<Signals, Failure> {
     Signals::catch_end().map_err(|error| Failure::Failed(format!("no signals: {error}")))
 }
@@ -134,12 +131,11 @@ fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// Prints `message` and a line break on stdout.
 fn print_line(message: &str) -> Result<(), Failure> {
     write_line(std::io::stdout().lock(), message)
 }
 
-/// Writes `message` and a line break to `out`. A closed pipe, as after `| head`, is not an error.
+/// Writes a line to `out`. A closed pipe, as after `| head`, is not an error.
 fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
     match printed {
@@ -150,13 +146,12 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Reads the scene file at `path`. Messages on stderr report the loading of large meshes and
-/// images.
+/// Reads a scene file. Messages on stderr report the loading of large files.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
     Ok(Document::read(path, LoadReporter::new().assets)?)
 }
 
-/// Reads the scene file at `path` as [`read_scene`] does, and prints its warnings.
+/// Reads a scene file and prints its warnings.
 fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
     let document = read_scene(path)?;
     for warning in document.warnings() {
@@ -165,7 +160,7 @@ fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
     Ok(document)
 }
 
-/// Warns on stderr if `options` demand single precision and the picture of `scene` requires double.
+/// Warns if `options` demand single precision and `scene` requires double.
 fn warn_of_precision(scene: &Scene, options: &world::Options) {
     if options.precision == Precision::Single && requires_double(scene) {
         warn(
@@ -175,8 +170,7 @@ fn warn_of_precision(scene: &Scene, options: &world::Options) {
     }
 }
 
-/// Escapes control characters in each line of `message`. File names in the message may contain
-/// control characters.
+/// Escapes control characters in each line, such as those of file names.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

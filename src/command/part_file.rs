@@ -1,5 +1,4 @@
-//! Output of films that belong to a plan (a render divided among shards): film files of shards, and
-//! pictures of complete films.
+//! Output of films that belong to a plan.
 
 use crate::command::Failure;
 use crate::command::progress::noise;
@@ -17,15 +16,13 @@ use zerkalo_scene::disk::{Existing, WriteError, check_writable};
 
 /// Output of a film: a film file or a picture file.
 pub enum FilmOutput {
-    /// Path of a film file (`.zk`).
     Film(PathBuf),
-    /// Picture file (PNG or OpenEXR), with the bits per channel of a PNG.
+    /// Picture file with the bits per channel of a PNG.
     Picture(ImageOutput, Depth),
 }
 
 impl FilmOutput {
     /// Chooses the format by the extension of `path`, and checks that the file can be written.
-    /// `depth` is the number of bits per channel of a PNG.
     pub fn new(path: &Path, depth: Depth) -> Result<Self, Failure> {
         if is_film(path) {
             check_writable(path)?;
@@ -37,10 +34,8 @@ impl FilmOutput {
         Ok(Self::Picture(output, depth))
     }
 
-    /// Writes `film` to the output file. `header` is the header of a film file. A picture file uses
-    /// four values of it: the weights and the names of the light groups, the display transform and
-    /// the metadata. A light group is the contribution of some lights to the picture, which the
-    /// film stores separately.
+    /// Writes `film`. A picture uses the light weights, the display transform and the metadata of
+    /// `header`.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
@@ -49,14 +44,11 @@ impl FilmOutput {
     }
 }
 
-/// Returns `true` if `path` has the extension of film files.
 pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Creates the header of a film file. `state` has the film. `part` has the plan and the numbers of
-/// the shards (parts of a divided render) whose samples the film holds. `report` has the sample
-/// counts and the noise of the film.
+/// Creates the header of the film of `state`, which holds the samples of `part`.
 pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
     let settings = &part.plan.settings;
     let provenance = Provenance {
@@ -70,14 +62,12 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
     header
 }
 
-/// Formats sample counts and noise of a film, such as `212 spp (32-900) noise 0.250 8-bit levels`:
-/// the mean, smallest and largest number of samples per pixel, and the RMSE.
+/// Formats sample counts and noise, such as `212 spp (32-900) noise 0.250 8-bit levels`.
 pub fn summary(report: &Report) -> String {
     let spp = &report.spp;
     format!("{:.0} spp ({}-{})  {}", spp.mean, spp.min, spp.max, noise(report))
 }
 
-/// Writes `film` and `header` to the film file at `path`.
 pub fn write_film(path: &Path, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
     let mut pieces = vec![header.encode()];
     pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));

@@ -1,4 +1,4 @@
-//! `zerkalo plan`: divides a render among shards, which other processes or machines trace.
+//! `zerkalo plan`: divides a render among shards.
 
 use crate::command::args::PlanArgs;
 use crate::command::part_file;
@@ -16,10 +16,9 @@ use zerkalo_render::session::Report;
 use zerkalo_render::{Options, SyncRender};
 use zerkalo_scene::disk::{self, check_writable};
 
-/// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
-/// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the
-/// pilot traces a third to a half of the rays of the whole render. The final noise then differs
-/// from the noise target, for which the pilot predicts the counts, by at most 10 %.
+/// Noise at which the pilot ends by default, divided by the noise target. With a ratio of 2, the
+/// pilot traces a third to a half of all rays, and the final noise differs from the target by at
+/// most 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -48,8 +47,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     ))
 }
 
-/// Renders a pilot (an adaptive render to a coarser noise), writes its film, and plans the
-/// remaining samples.
+/// Renders the pilot, an adaptive render to a coarser noise, and plans the remaining samples.
 fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let pilot_noise = args.pilot.unwrap_or(PILOT * args.noise);
     if pilot_noise < args.noise {
@@ -71,14 +69,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     warn_of_precision(&scene, &options.world);
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
-    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
-    while pilot.step().is_none() {
-        if let Some(noise) = pilot.noise_levels() {
-            bar.set_message(format!("pilot: noise {noise:.2} of {pilot_noise} 8-bit levels"));
-        }
-        bar.tick();
-    }
-    bar.finish_and_clear();
+    trace(&mut pilot, pilot_noise);
     let state = &pilot.state;
     let settings = PlanSettings {
         source: path.display().to_string(),
@@ -114,8 +105,19 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     Ok(part.plan)
 }
 
-/// Plans the next round of a divided render: the samples that the merged film at `path` lacks to
-/// reach the noise target of `args`.
+/// Traces the pilot until it ends, and shows its noise.
+fn trace(pilot: &mut SyncRender, target: f64) {
+    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
+    while pilot.step().is_none() {
+        if let Some(noise) = pilot.noise_levels() {
+            bar.set_message(format!("pilot: noise {noise:.2} of {target} 8-bit levels"));
+        }
+        bar.tick();
+    }
+    bar.finish_and_clear();
+}
+
+/// Plans the samples that the merged film at `path` lacks.
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
@@ -148,7 +150,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         .ok_or_else(|| failed("it has no estimate of its noise"))
 }
 
-/// Returns the default path of the pilot render's film: `job-0.zk` for the plan `job.plan`.
+/// Returns the default path of the pilot's film: `job-0.zk` for the plan `job.plan`.
 fn default_base(plan: &Path) -> PathBuf {
     let mut name = plan.file_stem().unwrap_or_default().to_os_string();
     name.push("-0.zk");

@@ -1,32 +1,30 @@
-//! Progress of a render on stderr: a bar if stderr is a terminal, otherwise lines for a log.
+//! Progress of a render on stderr: a bar in a terminal, otherwise lines for a log.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 use zerkalo_render::session::Report;
 
-/// Seconds of rendering before the first output of progress. Shorter renders show no progress.
+/// Seconds of rendering before the first output.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds of rendering before the first line of progress in a log. The interval after each line is
-/// equal to the rendering time so far, but at most [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds of rendering before the first line of a log. Each further interval is equal to the time
+/// so far.
 const FIRST_LINE_SECONDS: f64 = 1.0;
-/// Longest interval between lines of progress in a log, in seconds.
+/// Longest interval between lines of a log.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 
-/// Number of steps into which the progress bar divides a whole render.
+/// Number of steps of the progress bar.
 const STEPS: u64 = 1000;
 
-/// Display of a render's progress: a bar or lines of a log.
+/// Display of a render's progress.
 pub enum Progress {
-    /// Progress bar in a terminal; `None` before the first output.
+    /// Bar; `None` before the first output.
     Bar(Option<ProgressBar>),
-    /// Lines of progress in a log. The value is the rendering time in seconds at which the next
-    /// line is due.
+    /// Lines of a log. The value is the rendering time at which the next one is due.
     Lines(f64),
 }
 
 impl Progress {
-    /// Creates a progress bar if stderr is a terminal, otherwise lines of a log.
     pub fn on_stderr() -> Self {
         if std::io::stderr().is_terminal() {
             Self::Bar(None)
@@ -35,7 +33,7 @@ impl Progress {
         }
     }
 
-    /// Shows the progress of `report` if the next output is due.
+    /// Shows the progress if the next output is due.
     pub fn show(&mut self, report: &Report) {
         if report.seconds < QUIET_SECONDS {
             return;
@@ -58,7 +56,6 @@ impl Progress {
         }
     }
 
-    /// Removes the progress bar from the terminal.
     pub fn finish(self) {
         if let Self::Bar(Some(bar)) = self {
             bar.finish_and_clear();
@@ -67,19 +64,17 @@ impl Progress {
 }
 
 fn new_bar() -> ProgressBar {
-    // The bar has 10 columns, so that the message with the remaining time fits into 80 columns.
+    // The message with the remaining time must fit into 80 columns.
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
     bar.with_style(style("{bar:10} {percent:>3} %  {wide_msg}"))
 }
 
-/// Returns the style of a progress bar with the parts of `template`, which must be well-formed.
+/// Returns the style of a progress bar. `template` must be well-formed.
 pub fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).expect("the template is well-formed")
 }
 
-/// Formats the progress of a render, such as
-/// `33 spp (32-210) 41.2 Msamples/s noise 0.81 3-5 s left`. The first numbers are the mean,
-/// smallest and largest number of samples per pixel. The noise is in 8-bit levels.
+/// Formats the progress, such as `33 spp (32-210) 41.2 Msamples/s noise 0.81 3-5 s left`.
 fn status(report: &Report) -> String {
     let mut text = counts(report);
     text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
@@ -92,7 +87,7 @@ fn status(report: &Report) -> String {
     text
 }
 
-/// Formats the mean, smallest and largest number of samples per pixel, such as `212 spp (32-900)`.
+/// Formats mean, smallest and largest number of samples per pixel, such as `212 spp (32-900)`.
 pub fn counts(report: &Report) -> String {
     let spp = &report.spp;
     if spp.min == spp.max {
@@ -102,7 +97,7 @@ pub fn counts(report: &Report) -> String {
     }
 }
 
-/// Formats the noise of the picture, such as `noise 0.500 8-bit levels`.
+/// Formats the noise, such as `noise 0.500 8-bit levels`.
 pub fn noise(report: &Report) -> String {
     match report.noise {
         Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_levels),
@@ -116,14 +111,13 @@ fn span(low: f64, high: f64) -> String {
     if low_text == high_text {
         return low_text;
     }
-    // If both ends have the same unit, it is written once: `3-5 s`.
     match (low_text.split_once(' '), high_text.split_once(' ')) {
         (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
         _ => format!("{low_text} - {high_text}"),
     }
 }
 
-/// Formats seconds with a suitable unit, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
+/// Formats seconds, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
 fn duration(seconds: f64) -> String {
     const MINUTE: f64 = 60.0;
     const HOUR: f64 = 60.0 * MINUTE;

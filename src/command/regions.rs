@@ -1,5 +1,4 @@
-//! `zerkalo render --memory`: division of a picture that does not fit into the given memory as a
-//! whole.
+//! `zerkalo render --memory`: division of a picture that does not fit into the given memory.
 
 use crate::command::args::RenderArgs;
 use crate::command::{Failure, warn};
@@ -8,38 +7,32 @@ use zerkalo_scene::Scene;
 use zerkalo_scene::process_memory::{available_memory, megabytes, resident_memory};
 use zerkalo_world::AnyWorld;
 
-/// Name of the memory limit in messages if `--memory` allows less memory than is available.
+/// Name of the memory limit in messages, unless the machine has less memory.
 const OPTION: &str = "--memory";
 
-/// Division of a picture into regions (bands of rows) that fit into the given memory.
+/// Division of a picture into regions, bands of rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Division {
-    /// `true` if all lights share one light group, to save memory. A light group is the
-    /// contribution of some lights to the picture, which the film stores separately.
+    /// `true` if all lights share one light group, to save memory.
     pub merge_lights: bool,
-    /// Regions of the picture. A picture that fits as a whole is one region.
+    /// Regions; a picture that fits is one.
     pub regions: Regions,
 }
 
 impl Division {
-    /// Divides the picture of `scene` so that the process uses at most `cap` bytes, and prints the
-    /// expected memory. The first choice is a film that stores the contribution of each light to
-    /// the picture separately. If this film does not fit, all lights share one stored contribution.
-    /// If that film does not fit either, the picture is divided into regions.
+    /// Divides the picture so that the process uses at most `cap` bytes. The first choice is a film
+    /// with all light groups, the second a film with one, the third a division.
     ///
-    /// # Errors
-    /// Fails if the smallest regions do not fit. Also fails if the film with a separate
-    /// contribution of each light does not fit, and a checkpoint is requested or resumed.
+    /// # Errors Fails if the smallest regions do not fit, or if a checkpoint is requested or
+    /// resumed and a film with all light groups does not fit.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
-        // The scene is compiled first, so that the measured memory of the process includes it.
+        // The measured memory of the process then includes the scene.
         let world = AnyWorld::compile(scene, &args.precision.world_options());
         let groups = world.light_groups().members.len();
         let merged = world.light_groups().merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
         let (cap, limit) = usable(cap);
-        // The check at the start of the render of a whole picture demands more memory than `divide`
-        // estimates. If this check would fail, the picture is divided into regions although it fits
-        // by the estimate.
+        // `check` demands more memory than `divide` estimates.
         let refused = |groups| check(size, groups, 0).is_err();
         let divided = |groups| match divide(size, groups, threads, cap) {
             Ok(whole) if whole.count == 1 && refused(groups) => {
@@ -87,9 +80,7 @@ impl Division {
     }
 }
 
-/// Returns two values: the number of bytes that the process may use, and the name of the memory
-/// limit for messages. The number is the smaller of two: `cap`, the value of `--memory`, and the
-/// sum of the available memory and the resident memory of the process.
+/// Returns the number of bytes that the process may use, and the name of this limit.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {
@@ -100,13 +91,11 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns a function that creates the error about too little memory. The argument of the function
-/// is the least number of bytes with which the picture can be rendered. `limit` is the name of the
-/// memory limit, and `cap` the number of bytes that it allows.
+/// Returns the constructor of the error for the least number of bytes with which the picture can be
+/// rendered.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
-        // Adds a megabyte, because the resident memory of the program differs by up to a megabyte
-        // from run to run.
+        // The resident memory differs by up to a megabyte from run to run.
         let least = (least + 1_000_000).div_ceil(1_000_000);
         let expected = match limit {
             OPTION => format!("expected at least {OPTION} {least}MB"),
@@ -119,7 +108,7 @@ fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     }
 }
 
-/// Formats a number of bytes in kilobytes below 1 MB, otherwise as [`megabytes`] does.
+/// Formats bytes in kilobytes below 1 MB, otherwise as [`megabytes`] does.
 fn small(bytes: u64) -> String {
     if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
 }

@@ -23,11 +23,10 @@ use zerkalo_scene::disk::{self, WriteError, check_writable};
 use zerkalo_scene::process_memory::resident_memory;
 use zerkalo_terminal::Signals;
 
-/// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
-/// of an 8-bit file.
-const DEFAULT_NOISE_CODES: f64 = 0.5;
+/// Default noise target: half a quantisation step of an 8-bit file.
+const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 
-/// Interval at which signals and progress are polled during a render.
+/// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
@@ -40,7 +39,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let warnings = document.warnings().to_vec();
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
-    // An output file that cannot be written is reported before the render starts.
+    // Reported before the render starts.
     output.check_writable()?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
@@ -70,52 +69,14 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         Some(division) => in_regions(job, division.regions.rows)?,
         None => as_a_whole(job, checkpoint)?,
     };
-    let Rendered { report, end, precision, biased, set_after, write_seconds, kept } = rendered;
-    let printed = print_line(&summary(output.path(), size, &report, end));
-
+    let end = rendered.end;
+    let printed = print_line(&summary(output.path(), size, &rendered.report, end));
     if let Some(path) = &args.stats {
-        let stats = Stats {
-            scene: args.scene.display().to_string(),
-            scene_hash: hash,
-            output: args.output.display().to_string(),
-            version: env!("CARGO_PKG_VERSION"),
-            size,
-            seed: args.compute.seed,
-            sampler: args.sampler.name(),
-            precision,
-            lanes: report.lanes,
-            threads: args.compute.threads(),
-            adaptive: !args.uniform,
-            samples: report.samples,
-            spp_min: report.spp.min,
-            spp_mean: report.spp.mean,
-            spp_max: report.spp.max,
-            rays: report.rays,
-            seconds: report.seconds,
-            compile_seconds: report.compile_seconds,
-            write_seconds,
-            total_seconds: started.elapsed().as_secs_f64(),
-            samples_per_second: report.samples_per_second(),
-            first_picture_seconds: report
-                .first_picture_seconds
-                .map(|s| s + set_after.as_secs_f64()),
-            noise_levels: report.noise.map(|n| n.rmse_levels),
-            noise_levels_p95: report.noise.map(|n| n.p95_levels),
-            rmse_linear: report.noise.map(|n| n.rmse_linear),
-            bad_samples: report.bad_samples,
-            saturated_samples: report.saturated_samples,
-            saturated_pixels: report.saturated_pixels,
-            biased,
-            peak_rss_bytes: resident_memory().map(|resident| resident.peak),
-            stopped_by: match end {
-                End::Done(reason) => reason.name(),
-                End::Signal(_) => "signal",
-            },
-        };
+        let stats = stats(args, hash, size, &rendered, started.elapsed());
         disk::write(path, stats.json().as_bytes())?;
     }
     printed?;
-    if let Some(Err(error)) = kept {
+    if let Some(Err(error)) = rendered.kept {
         return Err(error.into());
     }
     match end {
@@ -124,7 +85,55 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// Inputs of a render to a picture file: arguments, scene, output, signals.
+fn stats(
+    args: &RenderArgs,
+    scene_hash: String,
+    size: [u32; 2],
+    rendered: &Rendered,
+    total: Duration,
+) -> Stats {
+    let report = &rendered.report;
+    Stats {
+        scene: args.scene.display().to_string(),
+        scene_hash,
+        output: args.output.display().to_string(),
+        version: env!("CARGO_PKG_VERSION"),
+        size,
+        seed: args.compute.seed,
+        sampler: args.sampler.name(),
+        precision: rendered.precision,
+        lanes: report.lanes,
+        threads: args.compute.threads(),
+        adaptive: !args.uniform,
+        samples: report.samples,
+        spp_min: report.spp.min,
+        spp_mean: report.spp.mean,
+        spp_max: report.spp.max,
+        rays: report.rays,
+        seconds: report.seconds,
+        compile_seconds: report.compile_seconds,
+        write_seconds: rendered.write_seconds,
+        total_seconds: total.as_secs_f64(),
+        samples_per_second: report.samples_per_second(),
+        first_picture_seconds: report
+            .first_picture_seconds
+            .map(|s| s + rendered.set_after.as_secs_f64()),
+        noise_levels: report.noise.map(|n| n.rmse_levels),
+        noise_levels_p95: report.noise.map(|n| n.p95_levels),
+        rmse_linear: report.noise.map(|n| n.rmse_linear),
+        bad_samples: report.bad_samples,
+        saturated_samples: report.saturated_samples,
+        saturated_pixels: report.saturated_pixels,
+        biased: rendered.biased.clone(),
+        peak_rss_bytes: resident_memory().map(|resident| resident.peak),
+        stopped_by: match rendered.end {
+            End::Done(reason) => reason.name(),
+            End::Signal(_) => "signal",
+        },
+    }
+}
+
+/// Inputs of a render to a picture file.
 struct Job<'a> {
     args: &'a RenderArgs,
     scene: Scene,
@@ -132,23 +141,20 @@ struct Job<'a> {
     output: &'a ImageOutput,
     provenance: Provenance,
     signals: Signals,
-    /// Time at which the program started.
     started: Instant,
 }
 
-/// Results of a render whose picture has been written, for the printed summary and `--stats`.
+/// Results of a render whose picture has been written.
 struct Rendered {
     report: Report,
     end: End,
     precision: &'static str,
-    /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
-    /// sentence states an upper bound of the light that the picture loses by this limit.
+    /// Upper bounds of the light that the picture loses by each limit of the scene, in sentences.
     biased: Vec<String>,
-    /// Time from the start of the program to the start of compiling the scene. It includes the time
-    /// of reading the scene file.
+    /// Time from the start of the program to the compilation of the scene.
     set_after: Duration,
     write_seconds: f64,
-    /// Path of the last checkpoint, or the error of writing it; `None` without `--checkpoint`.
+    /// Path of the last checkpoint, or the error of writing it.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -167,7 +173,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         CheckpointWriter::new(path, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // An error of writing the checkpoint is kept until the picture has been written.
+    // The picture is written first.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
     let (depth, output) = (args.bits, output.clone());
@@ -181,7 +187,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }
 
-/// Renders a picture in regions of `rows` rows, and writes the rows as they finish.
+/// Renders a picture in regions of `rows` rows, written as they finish.
 fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let set_after = started.elapsed();
@@ -220,17 +226,15 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     }
 }
 
-/// Reason for the end of a render: a stop criterion or a signal.
+/// Reason for the end of a render.
 #[derive(Clone, Copy)]
 enum End {
-    /// A stop criterion of the render, such as a noise target, was reached.
     Done(StoppedBy),
-    /// A signal ended the render early. The value is the exit status of the program.
+    /// Signal with this exit status.
     Signal(u8),
 }
 
-/// Shows the progress of the render until it ends or a signal arrives. Returns the reason for the
-/// end.
+/// Shows the progress of the render until it ends.
 fn watch(
     session: &Session,
     signals: &Signals,
@@ -255,16 +259,15 @@ fn watch(
     end
 }
 
-/// Reads the checkpoint that `--resume` names. Returns `None` without this option, or if
-/// `--checkpoint` names the same file and the file does not exist yet.
+/// Reads the checkpoint of `--resume`. Returns `None` if `--checkpoint` names the same file and it
+/// does not exist yet.
 fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     let is_new = |path: &PathBuf| args.checkpoint.as_ref() == Some(path) && !path.exists();
     let path = args.resume.as_ref().filter(|path| !is_new(path));
     Ok(path.map(|path| Checkpoint::read(path)).transpose()?)
 }
 
-/// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
-/// of the checkpoint.
+/// Continues `checkpoint`. Prints a note if the lights differ.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
@@ -287,8 +290,7 @@ fn check_checkpoint_path(path: &Path, args: &RenderArgs) -> Result<(), Failure> 
     CheckpointWriter::check(path, args.resume.as_deref())
 }
 
-/// Returns `scene` with the acceleration structure and the size from the command line, if they are
-/// given.
+/// Returns `scene` with the settings of the command line.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
@@ -316,7 +318,7 @@ fn options(args: &RenderArgs) -> Options {
 fn schedule_settings(args: &RenderArgs) -> Settings {
     let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
-    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
+    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };

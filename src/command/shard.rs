@@ -1,8 +1,7 @@
 //! `zerkalo render --plan`: traces one shard of a plan into a film file, or the whole plan.
 //!
 //! The film file is also the checkpoint of its shard: the same command continues an unfinished
-//! file, and changes nothing if the file is complete. Workflow engines can therefore repeat any
-//! failed command.
+//! file, and leaves a complete one. Workflow engines can therefore repeat any failed command.
 
 use crate::command::args::RenderArgs;
 use crate::command::part_file::{self, FilmOutput};
@@ -21,17 +20,14 @@ use zerkalo_scene::Document;
 use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision};
 
-/// Time from the start of a shard's render to its first checkpoint. A shard is one process's part
-/// of a divided render. Each later interval is twice the previous one, up to [`LONGEST_INTERVAL`].
+/// Time to the first checkpoint. Each later interval is twice the previous one.
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
-/// Longest interval between two checkpoints of a shard, one process's part of a divided render.
+/// Longest interval between checkpoints.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
-/// Smallest interval between two checkpoints of a shard (one process's part of a render), as a
-/// multiple of the time that writing a checkpoint takes. Writing checkpoints thus takes at most a
-/// fiftieth of the render time.
+/// Smallest interval between checkpoints, as a multiple of the time of writing one.
 const WRITES_PER_INTERVAL: u32 = 50;
 
-/// Renders all shards of the plan in the file `plan_path`, or only the one that `--shard` names.
+/// Renders all shards of a plan, or the one of `--shard`.
 pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let plan = Plan::read(plan_path)?;
     let numbers = match args.shard {
@@ -117,9 +113,8 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Reads the film file of an earlier run of the same shard, one process's part of a divided render.
-/// Returns three values: the film, the number of traced rays, and `true` if the shard is complete.
-/// Returns `None` if there is no such file, or if the file is damaged.
+/// Reads the film file of an earlier run of the same shard. Returns `None` if there is none, or it
+/// is damaged.
 fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
     if !path.exists() {
         return Ok(None);
@@ -145,9 +140,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     Ok(film.ok().map(|(_, film)| (film, found.rays, shard.complete)))
 }
 
-/// Compiles the scene and creates the render of the shards with the given `numbers`; a shard is a
-/// part of the plan. `saved` has the film and the number of rays of an earlier run, which the
-/// render continues.
+/// Creates the render of the shards `numbers`, which continues `saved`.
 fn start(
     args: &RenderArgs,
     document: &Document,
@@ -190,10 +183,8 @@ fn start(
     Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
-/// Traces samples of `render` until its shards are complete or a signal arrives. Returns two
-/// values: the render, and the exit status for the signal (`None` without a signal). Writes
-/// checkpoints to `output` if it is a film file. `part` is the plan with the shards (parts of the
-/// divided render) that the film holds.
+/// Traces samples until the shards of `part` are complete or a signal arrives. Writes checkpoints
+/// to `output` if it is a film file.
 fn trace(
     mut render: ShardRender,
     part: &mut Part,

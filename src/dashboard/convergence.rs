@@ -2,33 +2,31 @@
 
 use zerkalo_render::session::Report;
 
-/// Point of the convergence plot: render time, and noise of the picture at this time.
+/// Point of the convergence plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Seconds that the renderer has spent on tracing rays until this point of the plot.
+    /// Time spent on tracing rays.
     pub seconds: f64,
-    /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
+    /// Estimated RMSE of the displayed picture, greater than 0.
     pub noise_levels: f64,
 }
 
-/// History of the noise of one picture, from the renderer's reports. It keeps at most 400 points:
-/// when there are more, every second point after the first 100 is removed.
+/// History of the noise of one picture, at most 400 points.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
-    /// Points of the convergence plot in order of increasing time.
+    /// Points in order of increasing time.
     pub points: Vec<Point>,
     generation: u64,
     samples: u64,
 }
 
-/// Largest number of stored points of the convergence plot, more than a plot has columns. A further
-/// point causes the removal of some of them.
+/// Largest number of stored points, more than a plot has columns.
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the render time in seconds at which the noise last fell to `levels` 8-bit levels. The
-    /// time is interpolated between two reports by a power law. Returns `None` if the latest noise
-    /// is above `levels`, or if no stored noise is above `levels`.
+    /// Returns the render time in seconds at which the noise last fell to `levels` 8-bit levels,
+    /// interpolated between two reports by a power law. Returns `None` if the latest noise is above
+    /// `levels`, or no stored noise is.
     pub fn seconds_at(&self, levels: f64) -> Option<f64> {
         // Only the last fall to `levels` counts, because switching on a light raises the noise
         // again.
@@ -39,8 +37,8 @@ impl Convergence {
         Some(before.seconds * (after.seconds / before.seconds).powf(part))
     }
 
-    /// Adds the noise in a report of the renderer. The report of a new or restarted picture clears
-    /// the history first.
+    /// Adds the noise in a report. The report of a new or restarted picture clears the history
+    /// first.
     pub fn add(&mut self, report: &Report) {
         if report.generation != self.generation || report.samples < self.samples {
             self.points.clear();
@@ -52,10 +50,9 @@ impl Convergence {
         };
         let point = Point { seconds: report.seconds, noise_levels };
         match self.points.last_mut() {
-            // The error estimate has not been updated since the last report.
+            // The estimate has not been updated since the last report.
             Some(last) if last.noise_levels == point.noise_levels => {}
-            // The report has no new samples. The noise has changed because a light was dimmed or
-            // the render has finished, so the new point replaces the last one.
+            // Without new samples, the noise changes if a light is dimmed or the render finishes.
             Some(last) if last.seconds >= point.seconds => *last = point,
             _ => self.points.push(point),
         }
@@ -64,9 +61,8 @@ impl Convergence {
         }
     }
 
-    /// Removes every second point of the convergence plot, except among the earliest 100 points.
-    /// Late points are removed because they lie closest together on the logarithmic time axis. The
-    /// newest point stays.
+    /// Removes every second point after the earliest 100, because late points lie closest together
+    /// on the logarithmic time axis. The newest point stays.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;

@@ -1,34 +1,29 @@
-//! Text editor for one line, as in fields and prompts of the dashboard.
+//! Text editor for one line.
 
 use tui_input::{Input, InputRequest};
 use zerkalo_terminal::event::{Code, Key};
 
-/// Largest length of the edited text in characters. It suffices for a path and keeps editing fast.
+/// Largest length of the text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;
 
-/// Editor of a line of text, with a cursor. It also holds the reason why the text was refused.
+/// Editor of a line of text. It also holds the reason why the text was refused.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
-    /// Text and cursor.
     pub input: Input,
-    /// Reason why the text was refused, in one or two sentences, shown until the text changes.
-    /// `None` if there is none.
+    /// Reason why the text was refused, shown until the text changes.
     pub problem: Option<String>,
 }
 
 impl Editor {
-    /// Creates an editor with `text` and the cursor at its end.
     pub fn new(text: impl Into<String>) -> Self {
         Self { input: Input::new(text.into()), problem: None }
     }
 
-    /// Returns the text that is being edited.
     pub fn text(&self) -> &str {
         self.input.value()
     }
 
-    /// Applies a key to the text. Returns `true` if it is an editing key. Returns `false` for other
-    /// keys, such as those that end editing: Enter, Esc, Tab, Up and Down.
+    /// Applies a key. Returns `false` if it does not edit, as Enter, Esc, Tab, Up and Down.
     pub fn key(&mut self, key: Key) -> bool {
         let request = match (key.code, key.ctrl, key.alt) {
             (Code::Char(c), false, false) => return self.insert(c),

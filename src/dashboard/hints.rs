@@ -1,21 +1,19 @@
 //! Texts derived from the command table: hint line, help and docs/keys.md.
 
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
+use crate::dashboard::{KeyContext, Model, Overlay};
 
-/// Line of the dashboard's help: a heading, or a command with its keys.
+/// Line of the help.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HelpLine {
-    /// Heading of a chapter of the help.
+    /// Heading of a chapter.
     Heading(&'static str),
-    /// Keys of a command with the contexts in which they work, and the label of the command.
+    /// Keys with the contexts in which they work, and the command's label.
     Keys(String, &'static str),
 }
 
-/// Returns the state of the dashboard that determines the key hints in the hint line. Returns
-/// `None` while an exported image covers the whole screen, because no hint line is visible then.
+/// Returns the state that selects the hints. Returns `None` under an exported image, which leaves
+/// no room for a hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
@@ -37,7 +35,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     })
 }
 
-/// Returns the hints for the state `line`, sorted by their positions in the hint line.
+/// Returns the hints for the state `line`, sorted by position.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     let mut hints: Vec<_> = COMMANDS
         .iter()
@@ -48,7 +46,7 @@ fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     hints
 }
 
-/// Returns the hints for the model's state, sorted by their positions in the hint line.
+/// Returns the hints for the model's state, sorted by position.
 pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }

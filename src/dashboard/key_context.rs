@@ -1,34 +1,31 @@
-//! Contexts (panels and modes) in which keys are looked up in the command table.
+//! Contexts in which keys are looked up in the command table.
 
 use std::iter::successors;
 
-/// Panel or mode of the dashboard in which a key runs a command.
+/// Panel or mode in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum KeyContext {
-    /// Any panel or mode. A key is looked up here if the present panel or mode has no command for
-    /// it. Overlays and text editors do not use this context.
+    /// Any panel or mode that has no command of its own for the key. Overlays and text editors do
+    /// not use this context.
     Anywhere,
-    /// The picture's panel has the focus, in its default mode.
+    /// The picture has the focus, in its default mode.
     Picture,
     /// The arrow keys move the selected object or light.
     Moving,
     /// The arrow keys rotate the selected object or light.
     Rotating,
-    /// The arrow keys turn the camera and letter keys fly it.
+    /// The arrow keys rotate the camera and letter keys fly it.
     Flying,
-    /// The arrow keys move the pixel probe, which shows the samples, radiance and error of one
-    /// pixel.
+    /// The arrow keys move the pixel probe.
     Probing,
-    /// The outline, the list of all parts of the scene, has the focus.
     Outline,
-    /// The inspector, the list of the selection's properties, has the focus.
     Inspector,
-    /// An overlay is open, such as a list, a form, the help or a question.
+    /// An overlay is open.
     Overlay,
 }
 
 impl KeyContext {
-    /// Returns the key context as a phrase, such as `in the outline`. The phrase is empty for
+    /// Returns the context as a phrase, such as `in the outline`; empty for
     /// [`KeyContext::Anywhere`].
     pub fn place(self) -> &'static str {
         match self {
@@ -44,8 +41,8 @@ impl KeyContext {
         }
     }
 
-    /// Returns the contexts in which a key is looked up while this one is active. The first context
-    /// with a command for the key determines the command.
+    /// Returns the contexts in which a key is looked up in this one. The first with a command for
+    /// the key determines the command.
     pub fn chain(self) -> impl Iterator<Item = Self> {
         successors(Some(self), |context| match context {
             Self::Anywhere | Self::Overlay => None,

@@ -2,58 +2,50 @@
 
 use ratatui::layout::{Margin, Rect};
 
-/// Panel of the dashboard that can have the focus.
+/// Panel that can have the focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Focus {
-    /// Panel with the rendered picture.
     #[default]
     Picture,
-    /// Outline: the list of everything in the scene that can be selected and edited.
+    /// List of all parts of the scene.
     Outline,
-    /// Inspector: the list of the selection's properties.
+    /// List of the selection's properties.
     Inspector,
 }
 
 /// Input from which [`layout`] computes the areas of the panels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
-    /// Columns and rows of the terminal.
     pub screen: [u16; 2],
-    /// Width and height of the film in pixels.
     pub film: [u32; 2],
-    /// Panel with the keyboard focus.
     pub focus: Focus,
-    /// `true` in full screen: no panel except the picture's is visible.
+    /// `true` if no panel except the picture's is visible.
     pub fullscreen: bool,
-    /// `true` if the table of watched files takes the place of the outline and the inspector.
+    /// `true` if the table of watched files takes the place of outline and inspector.
     pub watching: bool,
 }
 
-/// Areas of the panels on the screen, borders included. The area of a side panel is `None` if the
-/// panel is hidden, for lack of room or in full screen.
+/// Areas of the panels, borders included. The area of a side panel is `None` if it is hidden, for
+/// lack of room or in full screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    /// Area of the panel with the rendered picture.
     pub picture: Rect,
-    /// Area of the terminal cells that show the picture, centred inside of the panel.
+    /// Area of the cells that show the picture, centred inside the panel.
     pub image: Rect,
     /// Columns and rows of the picture in half cells. A half cell is the upper or lower half of a
-    /// cell, and is treated as square. If the number of rows is odd, the last row consists of upper
-    /// halves.
+    /// terminal cell, and is treated as square. If the number of rows is odd, the last row consists
+    /// of upper halves.
     pub raster: [usize; 2],
-    /// Area of the outline (the list of all parts of the scene), or of the table of watched files.
+    /// Area of the outline, or of the table of watched files.
     pub outline: Option<Rect>,
-    /// Area of the inspector, the panel that lists the selection's properties.
     pub inspector: Option<Rect>,
-    /// Area of the panel with the convergence plot.
+    /// Area of the convergence plot.
     pub plot: Option<Rect>,
-    /// Row of the status line on the screen.
     pub status: Rect,
-    /// Row of key hints and notices on the screen.
+    /// Row of key hints and notices.
     pub hints: Rect,
 }
 
-/// Border of a panel: one cell on each side.
 pub const BORDER: Margin = Margin { horizontal: 1, vertical: 1 };
 
 /// Columns and rows of the smallest supported terminal.
@@ -61,11 +53,11 @@ pub const SMALLEST: [u16; 2] = [40, 12];
 
 /// Smallest height of the convergence plot in rows.
 const PLOT_ROWS: u16 = 8;
-/// Smallest width of the terminal, in columns, at which the side panels stay visible while the
-/// picture has the focus.
+/// Smallest width of the terminal at which the side panels stay visible while the picture has the
+/// focus.
 const SIDE_FROM: u16 = 72;
 
-/// Returns the layout of the screen. Returns `None` if the terminal is smaller than [`SMALLEST`].
+/// Returns the layout of the screen; `None` if the terminal is smaller than [`SMALLEST`].
 pub fn layout(request: &Request) -> Option<Layout> {
     let [width, height] = request.screen;
     if width < SMALLEST[0] || height < SMALLEST[1] {
@@ -94,16 +86,13 @@ pub fn layout(request: &Request) -> Option<Layout> {
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
-/// Divides the side column of the screen into three panels, from top to bottom: the outline (the
-/// list of all parts of the scene), the inspector (properties of the selection) and the convergence
-/// plot. Panels without room are `None`. In `zerkalo watch` the first panel is the table of watched
-/// files, and the second is `None`.
+/// Divides the side column into outline, inspector and plot, from top to bottom. In `zerkalo watch`
+/// the first is the table of watched files, and the second is `None`.
 fn side_panels(side: Rect, request: &Request) -> [Option<Rect>; 3] {
     let rows = side.height;
     let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
     // The outline and the inspector share `left` rows. In less than 16 rows, there is room for one
-    // of them only. The outline gets the larger part if it has the focus and the column has fewer
-    // than 40 rows. Otherwise the inspector gets the larger part.
+    // of them only.
     let left = rows - plot;
     let outline = match request.focus {
         _ if request.watching => left,
@@ -116,9 +105,8 @@ fn side_panels(side: Rect, request: &Request) -> [Option<Rect>; 3] {
     [part(0, outline), part(outline, left - outline), part(left, plot)]
 }
 
-/// Returns two values. The first is the largest area with the film's aspect ratio that fits into
-/// `inside`, centred there. The second is the number of columns and rows of half cells in this
-/// area. A half cell is the upper or lower half of a terminal cell.
+/// Returns the largest area with the film's aspect ratio in `inside`, centred there, and its number
+/// of columns and rows of half cells.
 fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> (Rect, [usize; 2]) {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
@@ -136,8 +124,8 @@ fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> (Rect, [usize; 2
 }
 
 impl Layout {
-    /// Returns the pixel of the film (column, row) that the terminal cell at `column` and `row` of
-    /// the screen shows at its centre. Returns `None` if the cell is outside of the picture.
+    /// Returns the pixel of the film (column, row) that the cell at `column` and `row` of the
+    /// screen shows at its centre. Returns `None` outside the picture.
     pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
         if !self.image.contains((column, row).into()) {
             return None;

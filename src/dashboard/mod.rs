@@ -1,9 +1,11 @@
 //! Dashboard: the user interface in the terminal, for editing a scene while it is rendered.
 //!
 //! `update` handles a [`Message`](message::Message): it changes the [`Model`](model::Model) and
-//! returns a list of [`Effect`](message::Effect)s. It has no access to clock, files or terminal, so
-//! its result depends on its arguments only. `view` draws a model into a buffer of cells. `run` is
-//! the event loop, which executes the effects.
+//! returns [`Effect`](message::Effect)s, without access to clock, files or terminal. `view` draws a
+//! model into a buffer of cells. `run` is the event loop, which executes the effects.
+
+// Public for tests of the program only; many names of fields and variants need no comment.
+#![allow(missing_docs)]
 
 pub mod convergence;
 pub mod editor;
@@ -22,3 +24,14 @@ mod testing;
 pub mod text;
 pub mod update;
 pub mod view;
+
+// Names that most modules of the dashboard use.
+use convergence::Convergence;
+use editor::Editor;
+use key_context::KeyContext;
+use layout::{BORDER, Focus, Layout};
+use message::{DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits};
+use model::{CompareView, Drag, FieldList, Mode, Model, WatchTable, short_name};
+use overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question, ViewedImage};
+use panel_lines::{FieldLine, OutlineEntry, OutlineLine, PanelLine};
+use update::UpdateContext;

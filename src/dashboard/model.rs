@@ -1,12 +1,10 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
-use crate::dashboard::convergence::Convergence;
-use crate::dashboard::editor::Editor;
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::layout::{Focus, Layout, Request, layout};
-use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::layout::{Request, layout};
 use crate::dashboard::text::wrapped;
+use crate::dashboard::{
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, Layout, OrphanedEdits, Overlay,
+};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,217 +18,174 @@ pub use zerkalo_terminal::cells::Colors;
 use zerkalo_terminal::event::Button;
 use zerkalo_terminal::flow::LinkStatus;
 
-/// Mode of the picture's panel, which determines the effect of arrow keys and drags.
+/// Mode of the picture's panel: the effect of arrow keys and drags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// Orbit the camera, the default mode.
+    /// Orbit the camera.
     #[default]
     Orbit,
-    /// Move the selected object or light.
     Move,
-    /// Rotate the selected object or light about the vertical axis.
+    /// Rotate the selection about the vertical axis.
     Rotate,
-    /// Fly the camera: arrow keys and drags turn it, letter keys move it.
+    /// Rotate the camera, and move it by letter keys.
     Fly,
-    /// Move the pixel probe, which shows the samples, radiance and error of one pixel.
+    /// Move the pixel probe, which shows the values of one pixel.
     Probe,
 }
 
 /// State of the edited scene's file.
 #[derive(Clone, Debug, Default)]
 pub struct File {
-    /// Path of the scene file; `None` for a scene that has no file yet.
+    /// Path; `None` for a scene that has no file yet.
     pub path: Option<PathBuf>,
-    /// Last component of the scene file's path, for titles, with control characters escaped.
+    /// Last component of the path, with control characters escaped.
     pub name: String,
-    /// Scene as it was last read from or written to its file. If there is no file, the scene with
-    /// which the program started.
+    /// Scene as last read or written; without a file, that of the start.
     pub saved: Arc<Scene>,
-    /// Errors in the current contents of the scene file; `None` if the contents are valid.
+    /// Errors in the current contents of the file.
     pub broken: Option<SceneErrors>,
-    /// `true` if the scene file has been unreadable since the start. There is no scene then, and
-    /// the dashboard shows only the errors in `broken`.
+    /// `true` if the file has been unreadable since the start. There is no scene then, and the
+    /// dashboard shows only the errors in `broken`.
     pub unreadable: bool,
 }
 
 /// State of a list of properties: the inspector or a form.
 #[derive(Clone, Debug, Default)]
 pub struct FieldList {
-    /// Index of the list's line under the cursor. This line is always a field, not a heading.
+    /// Index of the line under the cursor, which is never a heading.
     pub cursor: usize,
-    /// Index of the first visible line of the list.
+    /// Index of the first visible line.
     pub scroll: usize,
-    /// Text editor of the field under the cursor; `None` unless a value is being typed.
+    /// Editor of the field under the cursor; `None` unless a value is being typed.
     pub editor: Option<Editor>,
 }
 
-/// Comparison of the live picture with a pinned one: an earlier picture that the user has stored.
+/// Comparison of the live picture with a pinned one, which the user has stored earlier.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
-    /// Pinned picture (the one that the user has stored for comparison) and its mean number of
-    /// samples per pixel; `None` if none is pinned.
+    /// Pinned picture and its mean number of samples per pixel.
     pub pinned: Option<(Arc<LinearImage>, f64)>,
-    /// Picture that the dashboard shows during the comparison: the live one, the pinned (stored)
-    /// one, or the difference.
     pub shown: CompareView,
 }
 
-/// Picture that is visible in a comparison: the live one, the stored one or their difference.
+/// Picture that is visible in a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareView {
-    /// Live picture: the one that the renderer refines.
     #[default]
     Live,
-    /// Pinned picture, which the user has stored earlier, in place of the live one.
     Pinned,
-    /// Live picture minus the pinned (stored) one, in false colour.
+    /// Live picture minus the pinned one, in false colour.
     Difference,
 }
 
-/// Kind of a notice: success, information or failure. It determines the notice's mark and colour.
+/// Kind of a notice, which determines its mark and colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Notice of success.
     Good,
-    /// Notice with information.
     Plain,
-    /// Notice of a refusal or failure.
     Bad,
 }
 
-/// Notice: a message that replaces the hint line for a while.
+/// Message that replaces the hint line for a while.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Text of the notice, with control characters escaped.
+    /// Text with control characters escaped.
     pub text: String,
-    /// Kind of the notice: success, information, or refusal.
     pub tone: Tone,
-    /// Time at which the notice disappears, or `None` if it stays until the next key. The time has
-    /// the same origin as the argument `now` of [`update`](crate::dashboard::update::update).
+    /// Time at which the notice disappears, on the clock of
+    /// [`update`](crate::dashboard::update::update); `None` if it stays until the next key.
     pub until: Option<Duration>,
 }
 
-/// Table of the film files that `zerkalo watch` shows.
+/// Table of watched film files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchTable {
-    /// Report on the film files that are watched.
     pub report: WatchReport,
-    /// Index of the table's row under the cursor.
     pub cursor: usize,
-    /// Index of the first visible row of the table.
+    /// Index of the first visible row.
     pub scroll: usize,
 }
 
 /// Export that renders in the background, at a size of the user's choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunningExport {
-    /// Width and height of the exported image in pixels.
+    /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Progress of the export's render, 0..=1.
+    /// Progress of the render, 0..=1.
     pub progress: f64,
 }
 
-/// State of a drag, which lasts from the press of a mouse button to its release.
+/// Drag, which lasts from the press of a mouse button to its release.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// Mouse button that is held down.
     pub button: Button,
     /// `true` if Control or Alt was held when the button was pressed.
     pub modified: bool,
     /// Column and row of the mouse at its last event.
     pub last: [u16; 2],
-    /// `true` if the mouse has moved since the press. Otherwise the release is a click.
+    /// `true` if the mouse has moved since the press; otherwise the release is a click.
     pub moved: bool,
-    /// `true` if the button was pressed inside of the picture.
+    /// `true` if the button was pressed inside the picture.
     pub in_picture: bool,
 }
 
 /// State of the dashboard, from which the screen is drawn.
 #[derive(Debug, Default)]
 pub struct Model {
-    /// Columns and rows of the terminal.
     pub screen: [u16; 2],
-    /// Set of colours that the terminal shows.
     pub colors: Colors,
-    /// State of the scene file.
     pub file: File,
     /// Edited scene with its undo history.
     pub history: History,
-    /// Selected part of the scene, such as the camera or an object. It always exists in the scene.
+    /// Selected part of the scene, which always exists.
     pub selection: Target,
-    /// Panel with the keyboard focus.
     pub focus: Focus,
-    /// Mode of the picture's panel, which determines the effect of arrow keys.
     pub mode: Mode,
-    /// `true` in full screen: no panel except the picture's is visible.
+    /// `true` if no panel except the picture's is visible.
     pub fullscreen: bool,
-    /// Index of the first visible line of the outline, the list of all parts of the scene.
+    /// Index of the first visible line of the outline.
     pub outline_scroll: usize,
-    /// Cursor, scroll position and text editor of the inspector, the list of the selection's
-    /// properties. `panel_lines::inspector` returns its lines.
+    /// State of the inspector, whose lines are those of `panel_lines::inspector`.
     pub inspector: FieldList,
     /// Open overlay, which covers panels and receives the keys.
     pub overlay: Option<Overlay>,
-    /// Exposure and tone curve of the displayed picture.
+    /// Exposure and tone curve.
     pub display: Display,
-    /// Channel of the render that the picture's panel shows, such as the rendered picture or the
-    /// noise.
     pub channel: DisplayChannel,
-    /// Comparison of the live picture with a pinned one: an earlier picture that the user has
-    /// stored.
     pub comparison: Comparison,
-    /// Film pixel (column, row) whose values the pixel probe shows; `None` without a probe.
+    /// Film pixel (column, row) of the pixel probe.
     pub probe: Option<[usize; 2]>,
-    /// Latest snapshot of the renderer: state of the render at one moment, with the picture so far.
-    /// `None` before the first one.
+    /// Latest snapshot of the session.
     pub snapshot: Option<Box<Snapshot>>,
-    /// History of the picture's estimated error, for the convergence plot.
     pub convergence: Convergence,
-    /// Stop criteria of the render.
     pub stop: Stop,
     /// `true` if the user has paused the render.
     pub paused: bool,
-    /// Number of threads that trace rays.
     pub threads: usize,
-    /// Largest number of rendering threads that the user can set.
+    /// Largest number of threads that the user can set.
     pub max_threads: usize,
-    /// `true` if the rendering threads have low priority.
     pub low_priority: bool,
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     pub link: Option<LinkStatus>,
-    /// Notice that replaces the hint line for a while.
     pub notice: Option<Notice>,
-    /// Export that renders in the background, at a size of the user's choice; `None` if there is
-    /// none.
     pub export: Option<RunningExport>,
-    /// Path of the last exported image; `None` before the first export.
     pub last_export: Option<PathBuf>,
-    /// `true` until the first key is pressed. Until then, the hint line shows hints for beginners.
+    /// `true` until the first key; the hint line has hints for beginners then.
     pub first_time: bool,
-    /// Drag in progress; `None` if no mouse button is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit, if the next edit may still be merged with it. The two edits form one
-    /// undo step if they have the same label and little time passes between them. `None` if the
-    /// next edit starts a new undo step.
+    /// Time of the last edit, if the next edit may still be merged with it.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits as soon as the pending save has succeeded.
     pub quit_when_saved: bool,
-    /// Unsaved edits that a crashed run of the program has left, and that the user has neither
-    /// recovered nor discarded.
+    /// Unsaved edits of a crashed run, until they are recovered or discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
-    /// Scene that was last passed to
-    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave). It is passed again only
-    /// after an edit. `None` if there were no unsaved edits.
+    /// Scene that was last autosaved; `None` if there were no unsaved edits.
     pub autosaved: Option<Arc<Scene>>,
-    /// Size of the pictures that were last requested from the renderer, in columns and rows of half
-    /// cells. A half cell is the upper or lower half of a terminal cell. `None` before the first
-    /// request.
+    /// Size of the pictures that were last requested, in half cells.
     pub raster: Option<[usize; 2]>,
-    /// Counter that increases whenever the terminal cells that show the picture may have become
-    /// outdated.
+    /// Counter that increases whenever the picture's cells may have become outdated.
     pub picture_version: u64,
-    /// Table of watched film files; `None` except in `zerkalo watch`. Commands that edit or render
-    /// are refused while files are watched.
+    /// Table of watched film files; `None` except in `zerkalo watch`.
     pub watch: Option<WatchTable>,
 }
 
@@ -247,11 +202,9 @@ pub(super) fn first_line(errors: &SceneErrors) -> String {
 }
 
 impl Model {
-    /// Creates the model of a dashboard that renders `scene` with `threads` threads until the first
-    /// of the criteria `stop` is reached. `scene` is an error if the scene file cannot be read.
-    /// `path` is the path of the scene file; without a path, `name` is shown as the file name. The
-    /// event loop later sets the screen size and the colours, and renders [`Model::scene`] unless
-    /// [`File::unreadable`] is `true`.
+    /// Creates the model of a dashboard that renders `scene`, which is an error if the scene file
+    /// at `path` cannot be read. Without a path, `name` is shown as the file name. The event loop
+    /// later sets the screen size and the colours.
     pub fn new(
         path: Option<PathBuf>,
         name: &str,
@@ -285,12 +238,11 @@ impl Model {
         }
     }
 
-    /// Returns `true` if the scene has edits that are not in its file.
     pub fn is_unsaved(&self) -> bool {
         !self.history.is_saved()
     }
 
-    /// Returns the layout of the screen in panels. Returns `None` if the terminal is too small.
+    /// Returns the layout of the screen; `None` if the terminal is too small.
     pub fn layout(&self) -> Option<Layout> {
         layout(&Request {
             screen: self.screen,
@@ -301,12 +253,11 @@ impl Model {
         })
     }
 
-    /// Returns the context (overlay, panel or mode) that decides which commands the keys run.
+    /// Returns the context that decides which commands the keys run.
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
-            // Watched films have no camera to orbit. The table of files uses the keys of the
-            // outline (the list of all parts of the scene).
+            // Watched films have no camera to orbit. Their table uses the keys of the outline.
             (None, _, Mode::Orbit) if self.watch.is_some() => KeyContext::Outline,
             (None, Focus::Outline, _) => KeyContext::Outline,
             (None, Focus::Inspector, _) => KeyContext::Inspector,
@@ -320,8 +271,7 @@ impl Model {
         }
     }
 
-    /// Returns the cursor, scroll position and text editor of the open form, or of the inspector if
-    /// no form is open.
+    /// Returns the state of the open form, or of the inspector.
     pub fn field_list(&self) -> &FieldList {
         match &self.overlay {
             Some(Overlay::Form(form)) => &form.fields,
@@ -329,21 +279,19 @@ impl Model {
         }
     }
 
-    /// Returns `true` while an overlay or the inspector's text editor is open. A question to the
-    /// user must wait then.
+    /// Returns `true` while an overlay or the inspector's text editor is open: questions must wait.
     pub fn is_busy(&self) -> bool {
         self.overlay.is_some() || self.inspector.editor.is_some()
     }
 
-    /// Returns the samples, the value and the error of the pixel at the pixel probe. Returns `None`
-    /// if there is no probe, or if the renderer has not reported this pixel yet.
+    /// Returns the values of the probed pixel; `None` without a probe, or before the session has
+    /// reported them.
     pub fn probed(&self) -> Option<&PixelProbe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;
         (Some(probe.pixel) == self.probe).then_some(probe)
     }
 
-    /// Returns the inventory, which lists the features of the compiled scene, as lines wrapped to
-    /// `width` columns.
+    /// Returns the features of the compiled scene as lines of `width` columns.
     pub fn inventory(&self, width: u16) -> Vec<String> {
         match &self.snapshot {
             Some(snapshot) if !snapshot.report.inventory.is_empty() => {
@@ -354,7 +302,7 @@ impl Model {
     }
 
     /// Returns the time at which the model needs the next
-    /// [`Tick`](crate::dashboard::message::Message::Tick). Returns `None` if no timeout is pending.
+    /// [`Tick`](crate::dashboard::message::Message::Tick).
     pub fn next_timeout(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }

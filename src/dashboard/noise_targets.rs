@@ -1,10 +1,10 @@
-//! List of noise targets (noise values at which rendering can stop) with the time to reach each of
+//! List of noise targets, noise values at which rendering can stop, with the time to reach each of
 //! them.
 
-use crate::dashboard::convergence::Convergence;
+use crate::dashboard::Convergence;
 use zerkalo_render::session::{QUALITIES, Report};
 
-/// Appearance of the picture at each of the noise targets [`QUALITIES`].
+/// Appearance of the picture at each target in [`QUALITIES`].
 pub const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is visible",
     "grain in dark and even parts",
@@ -14,25 +14,22 @@ pub const LOOKS: [&str; QUALITIES.len()] = [
     "for 16-bit files and measurements",
 ];
 
-/// Note below the list of noise targets.
+/// Note below the list.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
 /// Render time that is needed to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// Case in which the noise target has been reached. The value is the render time in seconds at
-    /// which it was reached. It is `None` if the noise in the first report was not above the
-    /// target.
+    /// The target was reached after this number of seconds; `None` if the noise in the first report
+    /// was not above it.
     Reached(Option<f64>),
-    /// Case in which the noise target has not been reached. The values are a lower and an upper
-    /// estimate of the remaining render time in seconds.
+    /// Lower and upper estimate of the remaining render time in seconds.
     Left(f64, f64),
-    /// The render time is unknown, because there is no noise estimate yet.
+    /// There is no noise estimate yet.
     Unknown,
 }
 
-/// Returns the render time to reach the noise target `QUALITIES[at]`. `report` is the latest report
-/// of the render, and `convergence` the history of the picture's noise.
+/// Returns the render time to reach the noise target `QUALITIES[at]`.
 pub fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
     let reached = report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]);
     match report.quality_seconds[at] {

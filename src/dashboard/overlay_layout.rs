@@ -1,35 +1,31 @@
 //! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
-use crate::dashboard::layout::BORDER;
-use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::text::wrapped_rows;
+use crate::dashboard::{BORDER, Form, Layout, Model, Overlay};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
-/// Areas of an overlay. Areas that an overlay does not use are empty.
+/// Areas of an overlay. Those that it does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayLayout {
-    /// Area of the whole overlay with its border.
+    /// Whole overlay with its border.
     pub frame: Rect,
     /// Row of the text input.
     pub input: Rect,
-    /// Area of the main content: a list, a form's fields or a text.
+    /// Area of a list, a form's fields or a text.
     pub list: Rect,
-    /// Area of a text for the user: help on the overlay, the reason why an input was refused, or
-    /// the text of a question.
+    /// Area of help, of the reason why an input was refused, or of a question.
     pub help: Rect,
 }
 
 impl Model {
-    /// Returns the layout of the open overlay. Returns `None` if no overlay is open or the terminal
-    /// is too small.
+    /// Returns the layout of the open overlay.
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
-            // The last two rows, status line and hint line, stay visible.
+            // Status line and hint line stay visible.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Rect { x, y, width: columns, height: rows }
@@ -64,18 +60,7 @@ impl Model {
             Overlay::Pick(pick) => {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
-            Overlay::Form(form) => {
-                // The form covers the side panels only, because the picture previews the new object
-                // or light.
-                let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
-                let columns = side.min(width);
-                let x = width - columns;
-                let frame = Rect { x, y: 0, width: columns, height: height - 2 };
-                let problem = form.problem.is_some()
-                    || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
-                let (list, help) = split(frame.inner(BORDER), problem);
-                OverlayLayout { frame, input: Rect::default(), list, help }
-            }
+            Overlay::Form(form) => self.form_layout(&layout, form),
             Overlay::Prompt(prompt) => {
                 let columns = 64.min(width - 2);
                 let text = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
@@ -87,7 +72,6 @@ impl Model {
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
                 let answers = question.answers.len() as u16;
-                // The text has a margin of one column on both sides.
                 let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
                 let inner = frame.inner(BORDER);
@@ -98,14 +82,25 @@ impl Model {
         })
     }
 
-    /// Returns the area of the lines of the outline, the list of all parts of the scene. Returns
-    /// `None` if the outline is hidden.
+    fn form_layout(&self, layout: &Layout, form: &Form) -> OverlayLayout {
+        let [width, height] = self.screen;
+        // The form leaves the picture visible, which previews the new object or light.
+        let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
+        let columns = side.min(width);
+        let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
+        let problem = form.problem.is_some()
+            || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
+        let (list, help) = split(frame.inner(BORDER), problem);
+        OverlayLayout { frame, input: Rect::default(), list, help }
+    }
+
+    /// Returns the area of the lines of the outline; `None` if it is hidden.
     pub fn outline_rows(&self) -> Option<Rect> {
         self.layout()?.outline.map(|area| area.inner(BORDER))
     }
 
-    /// Returns two areas of the panel of watched files: one for the rows of its table, one for
-    /// details on the row under the cursor. Returns `None` if the panel is hidden.
+    /// Returns the areas of the rows of watched files and of details on the row under the cursor.
+    /// Returns `None` if the panel is hidden.
     pub fn watch_rows(&self) -> Option<(Rect, Rect)> {
         let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
@@ -114,8 +109,8 @@ impl Model {
         Some(divided(below, below.height.saturating_sub(details)))
     }
 
-    /// Returns two areas of the inspector: one for its lines, one for help on the field under the
-    /// cursor. Returns `None` if the inspector is hidden.
+    /// Returns the areas of the inspector's lines and of help on the field under the cursor.
+    /// Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
@@ -127,9 +122,8 @@ fn whole(frame: Rect) -> OverlayLayout {
     OverlayLayout { frame, list: frame.inner(BORDER), ..OverlayLayout::default() }
 }
 
-/// Splits the inside of a panel into two areas: the upper one for lines, the lower one for help.
-/// The lower one is larger if `problem` is `true`, because the help then includes the reason why an
-/// input was refused.
+/// Splits the inside of a panel into an area for lines and one for help below. `problem` is `true`
+/// if the help includes the reason why an input was refused.
 fn split(inner: Rect, problem: bool) -> (Rect, Rect) {
     let rows = match (inner.height, problem) {
         (0..4, _) => 0,

@@ -1,24 +1,20 @@
-//! Lines of three lists as data: the outline (all parts of the scene), the inspector (properties of
-//! the selection) and the form for a new object or light. `view` draws the lines, and `update`
-//! moves the cursor over them.
+//! Lines of outline, inspector and form as data. `view` draws them, and `update` moves the cursor
+//! over them.
 
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::{Form, Overlay};
+use crate::dashboard::{Form, Model, Overlay};
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use zerkalo_scene::value::truncated;
 
-/// Line of a list in a panel or form: a heading or an entry.
+/// Line of a list.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ListLine<T> {
-    /// Heading of the entries below.
     Heading(String),
     /// Entry, which can be under the cursor.
     Entry(T),
 }
 
 impl<T> ListLine<T> {
-    /// Returns the entry of the line. Returns `None` for a heading.
     pub fn entry(&self) -> Option<&T> {
         match self {
             Self::Entry(entry) => Some(entry),
@@ -27,46 +23,38 @@ impl<T> ListLine<T> {
     }
 }
 
-/// Line of the outline, the list of all parts of the scene.
 pub type OutlineLine = ListLine<OutlineEntry>;
 
 /// Line of the inspector or of a form.
 pub type PanelLine = ListLine<Box<FieldLine>>;
 
-/// Part of the scene that can be selected in the outline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutlineEntry {
-    /// Part of the scene that the entry selects.
     pub subject: Target,
-    /// Name of the part, with control characters escaped.
+    /// Name with control characters escaped.
     pub label: String,
-    /// Note after the name: the material of an object, `off` for a light that is off, or the key
-    /// that recalls a stored camera. Empty for other parts.
+    /// Material of an object, `off` for a light that is off, or the key that recalls a stored
+    /// camera.
     pub note: String,
 }
 
-/// Line of the inspector or of a form: shows the value of a property, or one number of this value.
+/// Line that shows the value of a property, or one number of this value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
-    /// Part of the scene that the property belongs to.
+    /// Part of the scene that has the property.
     pub subject: Target,
-    /// Property that the line shows. The line may show only one number of the value, see
-    /// `component`.
     pub property: Property,
-    /// Index of the number that the line shows, if the property's value is a list of numbers.
-    /// `None` for any other value.
+    /// Index of the number that the line shows; `None` unless the value is a list of numbers.
     pub component: Option<usize>,
-    /// Name of the property or number on the line, left of the value.
+    /// Name on the line, left of the value.
     pub label: String,
     /// Value in the syntax of the text editor, with control characters escaped. Empty if the
-    /// property is not set in the scene.
+    /// property is not set.
     pub value: String,
-    /// Linear colour of the swatch that is drawn beside the value. A colour has one line for each
-    /// of its three components, and the swatch is on the first. `None` for all other lines.
+    /// Linear colour of the swatch beside the value, on the first of a colour's three lines.
     pub swatch: Option<[f64; 3]>,
 }
 
-/// Returns the lines of the outline, the list of all parts of `scene`.
 pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
     let mut last = None;
@@ -91,15 +79,13 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     lines
 }
 
-/// Returns the index of the line that selects `subject` in the outline, the list of all parts of
-/// the scene. Returns `None` if no line selects it.
+/// Returns the index of the line that selects `subject`.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
     let selects = |line: &OutlineLine| line.entry().is_some_and(|entry| entry.subject == *subject);
     lines.iter().position(selects)
 }
 
-/// Returns the lines of the inspector: the properties of `subject`, and those of its material if it
-/// is an object.
+/// Returns the lines of the inspector: the properties of `subject`, and those of its material.
 pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
@@ -112,9 +98,8 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     lines
 }
 
-/// Returns the lines of a form: the properties of the new object or light. If its material is new
-/// as well, the lines include the material's properties. `base` is the scene before the form was
-/// opened.
+/// Returns the lines of a form: the properties of the new object or light, and those of its
+/// material if that is not in `base`, the scene before the form was opened.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
     let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
@@ -127,7 +112,7 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
 }
 
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
-    // A `subject` that no longer exists in the scene has no fields.
+    // A `subject` that no longer exists has no fields.
     let rows = rows(scene, subject).unwrap_or_default();
     rows.into_iter()
         .flat_map(|property| lines_of(subject, property))
@@ -135,8 +120,7 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// Returns the lines of `property`, which belongs to `subject`. A value that is a list of numbers
-/// has one line for each number. Any other value has one line.
+/// Returns the lines of `property` of `subject`: one for each number of a list, otherwise one.
 fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: &str| FieldLine {
         subject: subject.clone(),
@@ -162,7 +146,7 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
 }
 
 impl Model {
-    /// Returns the lines of the form if one is open, otherwise those of the inspector.
+    /// Returns the lines of the open form, or of the inspector.
     pub fn field_lines(&self) -> Vec<PanelLine> {
         match &self.overlay {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
@@ -171,9 +155,8 @@ impl Model {
     }
 }
 
-/// Returns the index of a line near `wanted` that shows a property. This is the first such line at
-/// or after `wanted`, or the last such line before `wanted` if there is none after it. Returns 0 if
-/// no line shows a property.
+/// Returns the index of the first line with a property from `wanted` on, else of the last one
+/// before. Returns 0 if there is none.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].entry().is_some();
     (wanted..lines.len())
@@ -182,9 +165,8 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// Returns the index of the line to which the cursor moves from `cursor` by `steps` lines,
-/// downwards if `steps` is positive. Headings are skipped and not counted. The cursor stops at the
-/// first and at the last line with a property.
+/// Returns the index to which the cursor moves by `steps` lines, downwards if positive. Headings
+/// are not counted.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].entry().is_some()).collect();
     let position =
@@ -193,10 +175,9 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// Returns the new scroll position of a list: the index of its first visible line. The list has
-/// `len` lines, of which `rows` are visible. The new position is the nearest one to the present
-/// position `scroll` at which the line with index `cursor` is visible. If `rows` is greater than 2,
-/// the line above the cursor is visible, too.
+/// Returns the index of the first visible line of `len`, of which `rows` are visible: the nearest
+/// to the present one, `scroll`, at which the line `cursor` is visible, and also the line above it
+/// if `rows` is greater than 2.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

@@ -4,7 +4,6 @@
 use std::borrow::Cow;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Returns the width of `text` in columns.
 pub fn columns(text: &str) -> usize {
     text.width()
 }
@@ -99,8 +98,8 @@ pub fn durations(from: f64, to: f64) -> String {
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Converts `seconds` to a unit (s, min, h or days) that suits a duration of `reference` seconds.
-/// Returns two texts: the converted number and the name of the unit.
+/// Converts `seconds` to a unit that suits a duration of `reference` seconds. Returns number and
+/// unit.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {
         r if r < 99.5 => (seconds, "s"),

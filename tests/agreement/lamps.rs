@@ -6,13 +6,30 @@ use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo_scene::light::{Light, LightUnit};
+use zerkalo_scene::light::{Light, LightKind, LightUnit};
 
 /// Lamp: a light with a size.
 pub enum Lamp {
-    Sphere { center: DVec3, radius: f64 },
-    Rectangle { center: DVec3, across: DVec3, up: DVec3, normal: DVec3 },
-    Disk { center: DVec3, radius: f64, normal: DVec3 },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+    },
+    Rectangle {
+        center: DVec3,
+        across: DVec3,
+        up: DVec3,
+        normal: DVec3,
+    },
+    Disk {
+        center: DVec3,
+        radius: f64,
+        normal: DVec3,
+    },
+    /// Directional light with the angular radius `radius`.
+    Sun {
+        towards: DVec3,
+        radius: f64,
+    },
 }
 
 /// Light that arrives from a point of a lamp: direction to the point, distance, and irradiance on a
@@ -22,26 +39,37 @@ pub type Arrival = (DVec3, f64, f64);
 impl Lamp {
     /// Creates the lamp of a light with a size. Returns `None` for a light without a size.
     pub fn new(light: &Light) -> Option<Self> {
-        if let Some(sphere) = &light.sphere {
-            return Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius });
+        match &light.kind {
+            LightKind::Sphere(sphere) => {
+                Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius })
+            }
+            LightKind::Rectangle(rectangle) => {
+                let normal = DVec3::from(rectangle.normal).normalize();
+                let given = DVec3::from(rectangle.up);
+                let parallel = given.cross(normal).length() < 1e-6;
+                let given = if parallel { DVec3::Z } else { given };
+                let across = given.cross(normal).normalize();
+                let up = normal.cross(across);
+                Some(Self::Rectangle {
+                    center: rectangle.center.into(),
+                    across: across * rectangle.size[0],
+                    up: up * rectangle.size[1],
+                    normal,
+                })
+            }
+            LightKind::Disk(disk) => {
+                let normal = DVec3::from(disk.normal).normalize();
+                Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
+            }
+            LightKind::Directional(sun) if sun.angle > 0.0 => Some(Self::Sun {
+                towards: -DVec3::from(sun.direction).normalize(),
+                radius: 0.5 * sun.angle.to_radians(),
+            }),
+            LightKind::Point(_)
+            | LightKind::Directional(_)
+            | LightKind::Spot(_)
+            | LightKind::Environment(_) => None,
         }
-        if let Some(rectangle) = &light.rectangle {
-            let normal = DVec3::from(rectangle.normal).normalize();
-            let given = DVec3::from(rectangle.up);
-            let parallel = given.cross(normal).length() < 1e-6;
-            let given = if parallel { DVec3::Z } else { given };
-            let across = given.cross(normal).normalize();
-            let up = normal.cross(across);
-            return Some(Self::Rectangle {
-                center: rectangle.center.into(),
-                across: across * rectangle.size[0],
-                up: up * rectangle.size[1],
-                normal,
-            });
-        }
-        let disk = light.disk.as_ref()?;
-        let normal = DVec3::from(disk.normal).normalize();
-        Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
     }
 
     fn area(&self) -> f64 {
@@ -49,11 +77,16 @@ impl Lamp {
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
             Self::Rectangle { across, up, .. } => across.length() * up.length(),
             Self::Disk { radius, .. } => PI * radius * radius,
+            Self::Sun { .. } => f64::INFINITY,
         }
     }
 
     /// Returns the radiance of a white lamp of intensity 1, if intensities are in the unit `unit`.
     pub fn radiance(&self, unit: LightUnit) -> f64 {
+        if let Self::Sun { radius, .. } = self {
+            // The irradiance of a surface that faces the sun is pi.
+            return 1.0 / radius.sin().powi(2);
+        }
         match unit {
             LightUnit::Radiance => 1.0,
             LightUnit::Power => 1.0 / (PI * self.area()),
@@ -83,6 +116,9 @@ impl Lamp {
                 let (t, place) = plane(*center, *normal)?;
                 (place.length() <= *radius).then_some(t)
             }
+            Self::Sun { towards, radius } => {
+                (direction.dot(*towards) >= radius.cos()).then_some(f64::MAX)
+            }
         }
     }
 
@@ -96,6 +132,15 @@ impl Lamp {
         numbers: &mut Numbers,
     ) -> Option<Arrival> {
         let (point, normal) = match self {
+            Self::Sun { towards, radius } => {
+                // The height of a uniform point of a spherical cap is uniform.
+                let z = numbers.between(radius.cos(), 1.0);
+                let (sin, cos) = numbers.between(0.0, 2.0 * PI).sin_cos();
+                let (across, up) = towards.any_orthonormal_pair();
+                let aside = (across * cos + up * sin) * (1.0 - z * z).sqrt();
+                let solid_angle = 2.0 * PI * (1.0 - radius.cos());
+                return Some((*towards * z + aside, f64::INFINITY, solid_angle));
+            }
             Self::Sphere { center, radius } => {
                 let normal = numbers.direction();
                 // A sphere lamp also emits inwards: from inside, every point of it is visible.

@@ -56,7 +56,7 @@ fn samples_of(name: &str) -> u32 {
 }
 
 /// Files of scenes that the reference tracer must support, so that they are compared.
-const GALLERY: [&str; 18] = [
+const GALLERY: [&str; 19] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -72,6 +72,7 @@ const GALLERY: [&str; 18] = [
     "sphere-light.toml",
     "rectangle-light.toml",
     "disk-light.toml",
+    "sun.toml",
     "environment.toml",
     "emissive-objects.toml",
     "many-lights.toml",

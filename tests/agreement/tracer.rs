@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 use zerkalo_scene::camera::{Aperture, Focus, ViewAngle};
-use zerkalo_scene::light::{Falloff, Light, Spot};
+use zerkalo_scene::light::{Falloff, Light, LightKind, Spot};
 use zerkalo_scene::material::Material;
 use zerkalo_scene::value::{Color, TomlValue};
 use zerkalo_scene::{Filter, RayTypes, Scene};
@@ -136,7 +136,7 @@ impl<'a> Tracer<'a> {
         let absorbs = scene.materials.values().any(|m| m.attenuation_color != Color::WHITE);
         let mut tracer =
             Self { scene, bodies, lamps, shines, media, images, materials, absorbs, mutation };
-        if scene.lights.iter().any(|l| l.environment.as_ref().is_some_and(|e| e.file().is_some())) {
+        if scene.lights.iter().any(|l| l.environment().is_some_and(|e| e.file().is_some())) {
             return Err("an image around the scene".to_string());
         }
         for material in scene.materials.values() {
@@ -448,7 +448,7 @@ impl<'a> Tracer<'a> {
         let mut sum = color * ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
             let (towards, distance, irradiance) = match &self.lamps[i] {
-                None if light.environment.is_some() => {
+                None if light.environment().is_some() => {
                     // Uniform directions of the whole sphere.
                     let towards = numbers.direction();
                     (towards, f64::INFINITY, sky(light, towards) * (4.0 * PI))
@@ -516,7 +516,7 @@ impl<'a> Tracer<'a> {
 
 /// Returns the radiance of an environment light in a direction; black for other lights.
 fn sky(light: &Light, direction: DVec3) -> DVec3 {
-    let Some(environment) = &light.environment else { return DVec3::ZERO };
+    let Some(environment) = light.environment() else { return DVec3::ZERO };
     let end = if direction.y > 0.0 { environment.zenith } else { environment.nadir };
     let (horizon, height) = (DVec3::from(environment.horizon.0), direction.y.abs());
     let radiance = horizon * (1.0 - height) + DVec3::from(end.0) * height;
@@ -527,14 +527,14 @@ fn sky(light: &Light, direction: DVec3) -> DVec3 {
 /// a surface that faces the light.
 fn arrival(light: &Light, point: DVec3, mutation: Mutation) -> (DVec3, f64, DVec3) {
     let strength = DVec3::from(light.color.0) * light.intensity;
-    if let Some(directional) = &light.directional {
-        let towards = -DVec3::from(directional.direction).normalize();
-        return (towards, f64::INFINITY, strength * PI);
-    }
-    let (position, cone) = match (light.point, light.spot) {
-        (Some(point), _) => (DVec3::from(point.position), None),
-        (None, Some(spot)) => (DVec3::from(spot.position), Some(spot)),
-        (None, None) => panic!("a light of some kind"),
+    let (position, cone) = match &light.kind {
+        LightKind::Directional(directional) => {
+            let towards = -DVec3::from(directional.direction).normalize();
+            return (towards, f64::INFINITY, strength * PI);
+        }
+        LightKind::Point(point) => (DVec3::from(point.position), None),
+        LightKind::Spot(spot) => (DVec3::from(spot.position), Some(spot)),
+        kind => panic!("a {} light has no single direction", kind.key()),
     };
     let distance = position.distance(point);
     let irradiance = match light.falloff {
@@ -542,7 +542,7 @@ fn arrival(light: &Light, point: DVec3, mutation: Mutation) -> (DVec3, f64, DVec
         Falloff::InverseSquare => strength / (distance * distance),
     };
     let towards = (position - point) / distance;
-    let factor = cone.map_or(1.0, |spot| spot_factor(&spot, -towards, mutation));
+    let factor = cone.map_or(1.0, |spot| spot_factor(spot, -towards, mutation));
     (towards, distance, irradiance * factor)
 }
 

@@ -165,6 +165,56 @@ fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
+/// Returns the description of a sun that shines downwards with an angular diameter in degrees.
+fn sun(angle: f64) -> String {
+    format!("directional = {{ direction = [0.0, -1.0, 0.0], angle = {angle:?} }}")
+}
+
+/// Checks that the irradiance by a sun depends on its angular diameter only where the horizon of the
+/// receiver cuts it. It is then that of a sphere of the same angular diameter and radiance.
+#[test]
+fn irradiance_of_a_sun_is_independent_of_its_angle() {
+    let mut cases = Vec::new();
+    for angle in [0.01, 0.53, 10.0, 90.0, 180.0f64] {
+        let sin = (0.5 * angle).to_radians().sin();
+        for tilt in [0.0, 40.0, 60.0, 88.0, 95.0f64] {
+            let (x, y) = tilt.to_radians().sin_cos();
+            let normal = DVec3::new(x, y, 0.0);
+            let expected = match tilt + 0.5 * angle <= 90.0 {
+                true => PI * y,
+                false => forms::sphere(DVec3::Y, sin.min(1.0 - 1e-12), normal) / (sin * sin),
+            };
+            let name = format!("{angle} degrees at {tilt}");
+            cases.push(case(name, receiver(normal, &sun(angle), ""), expected));
+        }
+    }
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+/// Checks the penumbra of a black half-plane that faces the sun. The receiver sees the part of a disk
+/// beyond a chord, at the same fraction of the penumbra for every distance of the half-plane: its
+/// width grows with the distance.
+#[test]
+fn penumbra_of_a_sun_is_the_part_of_a_disk_beyond_a_chord() {
+    let mut cases = Vec::new();
+    for (angle, height) in [(0.53, 1.0), (0.53, 7.0), (2.0, 1.0), (2.0, 0.1)] {
+        for chord in [-1.1, -0.8, -0.5, 0.0, 0.25, 0.6, 0.9, 1.1f64] {
+            let edge = chord * height * (0.5f64 * angle).to_radians().tan();
+            let cover = format!(
+                "[[object]]\nmaterial = \"black\"\n\
+                 shape.platform = {{ center = [{:?}, {height:?}, 0.0], size = [20.0, 20.0] }}\n",
+                edge - 10.0
+            );
+            let cut = chord.clamp(-1.0, 1.0);
+            let visible = (cut.acos() - cut * (1.0 - cut * cut).sqrt()) / PI;
+            let name = format!("{angle} degrees, edge at {chord} of the penumbra, height {height}");
+            cases.push(case(name, receiver(DVec3::Y, &sun(angle), &cover), PI * visible));
+        }
+    }
+    // Straight edges are chords of the disk if its angle is small.
+    check(&cases, 1 << 14, [1e-3, 1e-3]);
+}
+
 /// Checks that the irradiance by a light of 1 W does not depend on the light's size. A faraway
 /// sphere acts like a point light of 1 / (4 pi) W/sr. A flat light acts along its normal like a
 /// point light of 1 / pi W/sr.

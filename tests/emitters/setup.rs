@@ -1,7 +1,6 @@
 //! Scenes with one receiver and one light, and their radiance with its standard error.
 
 use crate::common::normal::two_sided_z;
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo_kernel::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
@@ -30,8 +29,7 @@ pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: im
         let offset = if world.jitter() { draws.pixel() } else { (half, half) };
         let corner = Vec3::splat(world.camera().pixel_corner_direction((0, 0)));
         let mut radiance = Radiance::black();
-        let (origin, direction) = world.camera().rays(corner, offset);
-        let mut path = Path::new(Ray { origin, direction });
+        let mut path = Path::new(world.camera().rays(corner, offset));
         world.trace(&mut path, None, &draws, L::mask(true), &mut radiance);
         for lane in 0..L::WIDTH {
             let groups = &radiance.groups[..world.groups()];

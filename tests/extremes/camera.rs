@@ -4,6 +4,7 @@ use crate::common::Numbers;
 use crate::common::rays::to_dvec3;
 use crate::common::report::{precision, report};
 use glam::DVec3;
+use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, Frame, SimdFloat, Single, Vec3};
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
@@ -20,7 +21,7 @@ fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let ys = [0, size[1] / 2, size[1] - 1];
     for pixel in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
         for offset in [0.0, 0.5, 1.0] {
-            let (o, d) = view.rays(
+            let Ray { origin: o, direction: d } = view.rays(
                 Vec3::<L>::splat(view.pixel_corner_direction(pixel)),
                 (L::from_f64(offset), L::from_f64(offset)),
             );
@@ -66,9 +67,9 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
         let view = PerspectiveCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
-            let (_, left) =
+            let Ray { direction: left, .. } =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((0, 0))), (0.0, y));
-            let (_, right) =
+            let Ray { direction: right, .. } =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((999, 0))), (1.0, y));
             let (a, b) =
                 (DVec3::new(left.x, left.y, left.z), DVec3::new(right.x, right.y, right.z));

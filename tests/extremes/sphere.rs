@@ -5,6 +5,7 @@ use crate::common::rays::{Line, Traced, closest, scene};
 use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::DVec3;
 use std::f64::consts::PI;
+use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Double, SimdFloat, Single, Vec3};
 use zerkalo_kernel::primitive::{Aggregate, Form, SphereForm};
 use zerkalo_scene::camera::{Camera, PerspectiveCamera, ViewAngle};
@@ -177,7 +178,7 @@ fn extreme_02_sphere_as_ground() {
         let lines: Vec<Line> = pixels
             .iter()
             .map(|at| {
-                let (o, d) =
+                let Ray { origin: o, direction: d } =
                     view.rays(Vec3::<f64>::splat(view.pixel_corner_direction(*at)), (0.5, 0.5));
                 (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z))
             })
@@ -271,7 +272,7 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     let mut covered = 0;
     for y in 0..200 {
         for x in 0..320 {
-            let (o, d) =
+            let Ray { origin: o, direction: d } =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((x, y))), (0.5, 0.5));
             let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
             let hit = closest(&geometry, &[line])[0].is_some();

@@ -5,7 +5,9 @@ use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
 use crate::support::{parsed, shipped};
-use zerkalo_scene::light::{Environment, Falloff, Light, LightUnit, Point};
+use zerkalo_scene::light::{
+    Directional, Environment, Falloff, Light, LightKind, LightUnit, Point, RectangleLight,
+};
 use zerkalo_scene::{RayTypes, Scene};
 
 /// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
@@ -19,6 +21,21 @@ fn lamp(scene: &mut Scene) -> &mut Light {
     &mut scene.lights[0]
 }
 
+fn radius(scene: &mut Scene) -> &mut f64 {
+    match &mut lamp(scene).kind {
+        LightKind::Sphere(sphere) => &mut sphere.radius,
+        LightKind::Disk(disk) => &mut disk.radius,
+        kind => panic!("a {} light has no radius", kind.key()),
+    }
+}
+
+fn rectangle(scene: &mut Scene) -> &mut RectangleLight {
+    match &mut lamp(scene).kind {
+        LightKind::Rectangle(rectangle) => rectangle,
+        kind => panic!("a {} light is no rectangle", kind.key()),
+    }
+}
+
 #[test]
 fn d4_sphere_light() {
     alike(
@@ -26,11 +43,10 @@ fn d4_sphere_light() {
         &[
             ("a point", &|s| {
                 let position = lamp(s).position().unwrap();
-                lamp(s).clear_kind();
-                lamp(s).point = Some(Point { position });
+                lamp(s).kind = Point { position }.into();
             }),
             ("a smaller sphere of the same power", &|s| {
-                lamp(s).sphere.as_mut().unwrap().radius *= 0.5;
+                *radius(s) *= 0.5;
                 lamp(s).intensity *= 4.0;
             }),
             ("invisible", &|s| lamp(s).visible = false),
@@ -48,7 +64,7 @@ fn d5_rectangle_light() {
             ("a visible window", &|s| s.lights[1].visible = true),
             ("an invisible ceiling lamp", &|s| lamp(s).visible = false),
             ("the wrong side", &|s| lamp(s).direction_mut().unwrap()[1] = 1.0),
-            ("sides exchanged", &|s| lamp(s).rectangle.as_mut().unwrap().size.reverse()),
+            ("sides exchanged", &|s| rectangle(s).size.reverse()),
             ("power for radiance", &|s| lamp(s).unit = LightUnit::Power),
             ("a diffuse floor", &|s| material(s, "floor").reflection = 0.0),
         ],
@@ -78,7 +94,7 @@ fn d8_disk_light() {
     alike(
         "disk-light.toml",
         &[
-            ("half the size", &|s| lamp(s).disk.as_mut().unwrap().radius *= 0.5),
+            ("half the size", &|s| *radius(s) *= 0.5),
             ("facing the wall", &|s| *lamp(s).direction_mut().unwrap() = [0.0, 0.0, -1.0]),
             ("radiance for power", &|s| lamp(s).unit = LightUnit::Radiance),
             ("another place", &|s| lamp(s).position_mut().unwrap()[1] += 0.2),
@@ -87,9 +103,29 @@ fn d8_disk_light() {
 }
 
 #[test]
+fn d12_sun() {
+    fn sun(scene: &mut Scene) -> &mut Directional {
+        match &mut lamp(scene).kind {
+            LightKind::Directional(sun) => sun,
+            kind => panic!("a {} light is no sun", kind.key()),
+        }
+    }
+    alike(
+        "sun.toml",
+        &[
+            ("parallel rays", &|s| sun(s).angle = 0.0),
+            ("half the angle", &|s| sun(s).angle *= 0.5),
+            ("another direction", &|s| sun(s).direction[0] = 0.7),
+            ("invisible", &|s| lamp(s).visible = false),
+            ("half the intensity", &|s| lamp(s).intensity *= 0.5),
+        ],
+    );
+}
+
+#[test]
 fn d9_environment() {
     fn sky(scene: &mut Scene) -> &mut Environment {
-        lamp(scene).environment.as_mut().unwrap()
+        lamp(scene).environment_mut().unwrap()
     }
     alike(
         "environment.toml",

@@ -25,8 +25,7 @@ fn d6_rough_transmission() {
     // solids.
     let mut lit = original;
     let lamp = &mut lit.lights[0];
-    lamp.clear_kind();
-    lamp.sphere = Some(SphereLight { center: [1.0, 1.2, -3.0], radius: 0.5 });
+    lamp.kind = SphereLight { center: [1.0, 1.2, -3.0], radius: 0.5 }.into();
     lamp.intensity = 4.0;
     agrees(&lit, &lit, 384).unwrap();
 }

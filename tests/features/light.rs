@@ -7,7 +7,7 @@ use crate::features::row::{Verdict, ensure, material, object, row};
 use crate::support::{parsed, shipped, sized};
 use glam::DVec3;
 use zerkalo_scene::camera::ViewAngle;
-use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
+use zerkalo_scene::light::{Directional, Falloff, Light, LightKind, Point, Spot};
 use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Masking, Metal};
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{RayTypes, Scene};
@@ -80,7 +80,7 @@ fn floor_is_lit(original: &Scene, tested: &Scene) -> Verdict {
         }
         let mut expected = DVec3::ZERO;
         for light in &original.lights {
-            let position = DVec3::from(light.point.as_ref().unwrap().position);
+            let position = light.apex().unwrap();
             if blocked(on_floor, position) {
                 shadowed += 1;
                 continue;
@@ -107,10 +107,9 @@ fn a8_point_light() {
         &[
             ("falling off with distance", &|s| warm(s).falloff = Falloff::InverseSquare),
             ("a directional light", &|s| {
-                warm(s).point = None;
-                warm(s).directional = Some(Directional { direction: [2.2, -2.0, -1.2] });
+                warm(s).kind = Directional::along([2.2, -2.0, -1.2]).into();
             }),
-            ("another place", &|s| warm(s).point = Some(Point { position: [-2.2, 2.1, 1.2] })),
+            ("another place", &|s| warm(s).kind = Point { position: [-2.2, 2.1, 1.2] }.into()),
             ("half the intensity", &|s| warm(s).intensity *= 0.5),
             ("white", &|s| warm(s).color = Color::WHITE),
             ("without shadows", &|s| s.trace.ray_types = RayTypes::Primary),
@@ -292,11 +291,10 @@ fn c3_what_the_tracks_lacked() {
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[0].on = false),
             ("a distant point light", &|s| {
-                s.lights[0].directional = None;
-                s.lights[0].point = Some(Point { position: [-100.0, 100.0, 50.0] });
+                s.lights[0].kind = Point { position: [-100.0, 100.0, 50.0] }.into();
             }),
             ("from another side", &|s| {
-                s.lights[0].directional = Some(Directional { direction: [1.0, -1.0, 0.5] });
+                s.lights[0].kind = Directional::along([1.0, -1.0, 0.5]).into();
             }),
         ],
     );
@@ -317,14 +315,17 @@ fn d2_spot_light() {
         &mut scene.lights[1]
     }
     fn cone(scene: &mut Scene) -> &mut Spot {
-        middle(scene).spot.as_mut().expect("a spot light")
+        match &mut middle(scene).kind {
+            LightKind::Spot(spot) => spot,
+            kind => panic!("a {} light has no cone", kind.key()),
+        }
     }
     exact(
         "spot-light.toml",
         &[
             ("a point light", &|s| {
                 let position = cone(s).position;
-                (middle(s).spot, middle(s).point) = (None, Some(Point { position }));
+                middle(s).kind = Point { position }.into();
             }),
             ("another axis", &|s| cone(s).direction = [0.1, -1.0, -0.5]),
             ("another inner angle", &|s| cone(s).inner_angle = 15.0),

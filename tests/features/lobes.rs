@@ -35,8 +35,8 @@ fn mirrored_scene(scene: &Scene) -> Scene {
         object.transform.push(TransformOp::Scale(Scale([1.0, 1.0, -1.0])));
         object.transform.push(TransformOp::Translate([0.0, 0.0, -4.0]));
     }
-    for point in scene.lights.iter_mut().filter_map(|l| l.point.as_mut()) {
-        point.position[2] = -4.0 - point.position[2];
+    for position in scene.lights.iter_mut().filter_map(|light| light.position_mut()) {
+        position[2] = -4.0 - position[2];
     }
     scene
 }

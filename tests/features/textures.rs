@@ -125,7 +125,7 @@ fn is_raised(original: &Scene, tested: &Scene) -> Verdict {
     let plaster = &original.materials["plaster"];
     let color = DVec3::from(plaster.color.0);
     let light = &original.lights[0];
-    let light_position = DVec3::from(light.point.as_ref().unwrap().position);
+    let light_position = light.apex().unwrap();
     let eye = DVec3::from(original.camera.eye);
     let hits = points(tested, "plaster ball");
     ensure(hits == points(original, "plaster ball"), || "another outline".into())?;

@@ -163,7 +163,7 @@ fn light_changes_keep_samples() {
     assert_eq!(names, ["ambient", "background", "sun", "light 2"]);
     // A moved light needs new samples.
     let mut moved = newer;
-    moved.lights[0].point.as_mut().unwrap().position[0] = 1.0;
+    moved.lights[0].position_mut().unwrap()[0] = 1.0;
     assert_eq!(after.lighting.unwrap().mix(&moved), None);
     session.set_stop(spp(16));
     let generation = session.set_scene(Arc::new(moved));

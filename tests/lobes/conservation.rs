@@ -51,11 +51,11 @@ fn transparent_surfaces_have_declared_properties() {
             for (n_i, n_t) in [(1.0, material.ior), (material.ior, 1.0)] {
                 let incident = Vec3::new(sin, 0.0, -cos);
                 let there = Interface::new(incident, n, n_i, n_t);
-                let split = there.split(&transmission, n_i == 1.0);
+                let split = there.split(&transmission, n_i == 1.0, false);
                 lost = lost.max((split.reflected + split.transmitted + split.tir - 1.0).abs());
                 if !there.tir {
                     let back = Interface::new(-there.refracted, -n, n_t, n_i);
-                    let back = back.split(&transmission, n_i != 1.0);
+                    let back = back.split(&transmission, n_i != 1.0, false);
                     lopsided = lopsided.max((back.reflected - split.reflected).abs());
                 }
             }

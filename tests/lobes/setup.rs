@@ -1,11 +1,10 @@
 //! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo_scene::Scene;
 use zerkalo_scene::material::{
-    Bsdf, BsdfQuery, InterfaceQuery, Lobe, Masking, Material, ReflectionLobe,
+    Bsdf, BsdfQuery, InterfaceMedia, InterfaceQuery, Lobe, Masking, Material, ReflectionLobe,
 };
 use zerkalo_world::{Path, Radiance, World};
 
@@ -166,10 +165,12 @@ impl Sides {
     pub fn query<L: SimdFloat>(self, at: (Vector, Vector), fold: bool) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: query(at, fold),
-            n_i: L::from_f64(self.n_i),
-            n_t: L::from_f64(self.n_t),
-            outer: L::mask(self.n_i <= self.n_t),
-            thin: L::mask(self.thin),
+            media: InterfaceMedia {
+                n_i: L::from_f64(self.n_i),
+                n_t: L::from_f64(self.n_t),
+                outer: L::mask(self.n_i <= self.n_t),
+                thin: L::mask(self.thin),
+            },
             reflecting: L::mask(true),
         }
     }
@@ -239,8 +240,7 @@ pub fn trace<L: SimdFloat>(
     let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
     let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let (origin, direction) = world.camera().rays(corner, jitter);
-    let mut path = Path::new(Ray { origin, direction });
+    let mut path = Path::new(world.camera().rays(corner, jitter));
     let mut radiance = Radiance::black();
     world.trace(&mut path, None, &draws, active, &mut radiance);
     let groups = &radiance.groups[..world.groups()];

@@ -12,7 +12,7 @@ use zerkalo_kernel::primitive::{
     ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm,
 };
 use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo_scene::light::{Directional, Falloff, Light, Point, Spot};
+use zerkalo_scene::light::{Directional, Falloff, Light, LightKind, Point, Spot};
 use zerkalo_scene::value::{Color, Description, Field, TomlValue};
 use zerkalo_scene::{
     Acceleration, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
@@ -260,16 +260,22 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
         let strongest = if layout == Layout::Wild { 1e6 } else { 10.0 };
         let strength = log(numbers, 1.0 / strongest, strongest);
         let area = if falloff == Falloff::None { 1.0 } else { spots.radius * spots.radius };
+        // The order of the draws determines the scenes of all seeds.
+        let sun = far.then(|| Directional::along(direction(numbers).to_array()));
+        let color = Color([(); 3].map(|()| numbers.unit()));
+        let on = chance(numbers, 9, 10);
+        let kind = match sun {
+            Some(sun) => LightKind::from(sun),
+            None if narrow => spot(numbers, position, spots.middle).into(),
+            None => Point { position: position.to_array() }.into(),
+        };
         Light {
             name: format!("l{i}"),
-            point: (!far && !narrow).then_some(Point { position: position.to_array() }),
-            directional: far.then(|| Directional { direction: direction(numbers).to_array() }),
-            color: Color([(); 3].map(|()| numbers.unit())),
+            color,
             intensity: if far { strength } else { strength * area },
             falloff: if far { Falloff::None } else { falloff },
-            on: chance(numbers, 9, 10),
-            spot: narrow.then(|| spot(numbers, position, spots.middle)),
-            ..Light::default()
+            on,
+            ..Light::new(kind)
         }
     };
     (0..count).map(light).collect()

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo_scene::light::{Directional, Falloff, Light, Point};
+use zerkalo_scene::light::{Directional, Falloff, Light, LightKind, Point};
 use zerkalo_scene::material::{Fresnel, Highlight, Lobe, Material, Metal};
 use zerkalo_scene::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, Plane,
@@ -170,13 +170,14 @@ fn light() -> impl Strategy<Value = Light> {
     (name(), point(), direction(), color(), 0.0..100.0f64, any::<(bool, bool, bool)>()).prop_map(
         |(name, position, direction, color, intensity, (is_point, inverse, on))| Light {
             name,
-            point: is_point.then_some(Point { position }),
-            directional: (!is_point).then_some(Directional { direction }),
             color,
             intensity,
             falloff: if is_point && inverse { Falloff::InverseSquare } else { Falloff::None },
             on,
-            ..Light::default()
+            ..Light::new(match is_point {
+                true => LightKind::from(Point { position }),
+                false => Directional::along(direction).into(),
+            })
         },
     )
 }

@@ -153,12 +153,7 @@ pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
     scene.camera.aperture = None;
     scene.trace.max_diffuse_depth = 0;
-    scene.lights.retain(|light| {
-        light.sphere.is_none()
-            && light.rectangle.is_none()
-            && light.disk.is_none()
-            && light.environment.is_none()
-    });
+    scene.lights.retain(|light| !light.has_radiance());
     // With 16 point lights or more, a path traces shadow rays from each surface to a random few of
     // them.
     scene.lights.truncate(15);

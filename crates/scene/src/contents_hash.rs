@@ -1,14 +1,14 @@
 //! Hash of the contents of the files that a scene names. The text of a scene has only their names.
 
 use crate::Scene;
+use crate::light::Light;
 use crate::value::Fnv1a64;
 use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Scene {
-    /// Returns the hash of the contents of the scene's meshes and images, in the order in which the
-    /// scene names them. Returns `None` if there are none. It covers the data as they were read;
-    /// later changes of the files have no influence.
+    /// Returns the hash of the contents of the scene's files, as they were read; `None` if there
+    /// are none.
     pub fn contents_hash(&self) -> Option<u64> {
         // A new field that may name files has to be added here.
         let Self {
@@ -30,15 +30,14 @@ impl Scene {
         });
         let images = materials.values().flat_map(|material| material.images());
         add_each(&mut hash, images, |image, hash| image.hash_contents(hash));
-        let environments = lights.iter().filter_map(|light| light.environment.as_ref());
+        let environments = lights.iter().filter_map(Light::environment);
         let maps = environments.filter_map(|environment| environment.map());
         add_each(&mut hash, maps, |map, hash| map.hash_contents(hash));
         (hash != Fnv1a64::default()).then(|| hash.value())
     }
 }
 
-/// Adds the hash of each file's contents, which `add_contents` computes, to `hash`. A file that the
-/// scene names repeatedly is hashed once.
+/// Adds the hash of each file's contents. A file that the scene names repeatedly is hashed once.
 fn add_each<'a, T: 'a>(
     hash: &mut Fnv1a64,
     files: impl Iterator<Item = &'a Arc<T>>,

@@ -9,11 +9,9 @@ use std::fmt;
 pub struct Diagnostic {
     /// Name of the scene file as the user gave it.
     pub file: String,
-    /// Line and column, both counted from 1; the column counts characters. `None` if the diagnostic
-    /// is about the whole file.
+    /// Line and column in characters, counted from 1; `None` for the whole file.
     pub line_column: Option<(usize, usize)>,
-    /// Table that the diagnostic is about, such as `object "queen"`. Empty for the scene as a
-    /// whole.
+    /// Table, such as `object "queen"`; empty for the whole scene.
     pub subject: String,
     /// Phrase that states the error, such as `radius is -1`.
     pub found: String,
@@ -21,8 +19,7 @@ pub struct Diagnostic {
     pub help: String,
 }
 
-/// Largest indentation of the second line of a printed diagnostic [characters]. The second line is
-/// indented by the width of file name and location, up to this limit.
+/// Largest indentation of the second line of a printed diagnostic [characters].
 const MAX_INDENT: usize = 24;
 
 impl fmt::Display for Diagnostic {
@@ -56,20 +53,17 @@ pub struct SceneErrors {
     more: usize,
 }
 
-/// Collector of the diagnostics of a scene file. It stores the [`MAX_REPORTED`] diagnostics with
-/// the smallest byte offsets in the file, and only counts the others.
+/// Collector of the first [`MAX_REPORTED`] diagnostics of a file; further ones are only counted.
 #[derive(Default)]
 pub(super) struct FirstDiagnostics {
     found: Vec<(usize, Diagnostic)>,
     more: usize,
-    /// Byte offset above which further diagnostics are only counted; `None` as long as all are
-    /// stored.
+    /// Byte offset above which diagnostics are only counted; `None` as long as all are stored.
     last: Option<usize>,
 }
 
 impl FirstDiagnostics {
-    /// Adds a diagnostic at the byte offset `at`, which `make` creates without file, line and
-    /// column. `make` is not called if the diagnostic is only counted.
+    /// Adds a diagnostic at the byte offset `at`. `make` leaves out file, line and column.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -80,8 +74,7 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true` if the diagnostic at the byte offset `at` need not be created, because it
-    /// comes after the first [`MAX_REPORTED`] in the file. It is then only counted.
+    /// Returns `true` if a diagnostic at `at` would only be counted, and counts it.
     pub fn skips(&mut self, at: usize) -> bool {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
@@ -107,9 +100,7 @@ impl FirstDiagnostics {
         self.found.is_empty()
     }
 
-    /// Returns `(diagnostics, number)`: the stored diagnostics, sorted by location, and the number
-    /// of those that were not stored. Each diagnostic has the file name `file`, and its line and
-    /// column in `text`.
+    /// Returns the stored diagnostics, sorted and located in `text`, and the number of the others.
     pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);
@@ -126,9 +117,8 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors of a scene file. `messages` has at least one entry and is sorted by
-    /// location. An entry that repeats the previous one is removed. `more` is the number of errors
-    /// that are not in `messages`.
+    /// Creates the errors of a file from the result of [`FirstDiagnostics::located`], without
+    /// repetitions.
     pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.dedup();

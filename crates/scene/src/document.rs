@@ -13,15 +13,13 @@ use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
 
-/// Text of a scene file and the scene that it describes. An edit of the scene changes only the
-/// values in the text that the edit concerns. Comments, order and layout of the rest of the text
-/// are kept.
+/// Text of a scene file and the scene that it describes. An edit changes only the values that it
+/// concerns; the rest of the text is kept.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
-    /// Text and scene as read: the origin of each change. [`Document::apply`] always changes a copy
-    /// of this text, not the result of the previous change. Undoing a removal therefore restores
-    /// its comments.
+    /// Text and scene as read. Each change starts from a copy of them, so that undoing a removal
+    /// restores its comments.
     origin: (Arc<String>, Arc<Scene>),
     /// Warnings about the text of the scene file as read.
     warnings: Vec<Diagnostic>,
@@ -37,17 +35,12 @@ impl Scene {
 }
 
 impl Document {
-    /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
-    /// scene refers to.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Reads and validates the scene file at `path`. Returns the errors of [`Scene::read`].
     pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 
-    /// Reads and validates the scene in the regular file at `path`. Other kinds of files are
-    /// refused without blocking.
+    /// Reads a regular file; other kinds are refused without blocking.
     pub(super) fn read_regular(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, open_regular)
     }
@@ -62,10 +55,8 @@ impl Document {
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics. Returns the errors of
+    /// [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
@@ -121,16 +112,14 @@ impl Document {
         &self.text
     }
 
-    /// Returns [`Scene::warnings`] about the file as it was read, with line and column, sorted by
-    /// location.
+    /// Returns the located [`Scene::warnings`] about the file as it was read.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
     }
 }
 
-/// Changes `text`, which describes the scene `old`, to describe the scene `new`, and returns the
-/// result. Uniform line endings are kept, as are a byte order mark and a missing line ending at the
-/// end of the file. Mixed line endings become LF.
+/// Changes `text`, which describes `old`, to describe `new`. Uniform line endings are kept, as are
+/// a byte order mark and a missing line ending at the end; mixed line endings become LF.
 fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),

@@ -18,32 +18,30 @@ pub struct SceneFile {
     fingerprint: u64,
 }
 
-/// State of a scene file on disk relative to the bytes that this program last read or wrote.
+/// State of the file on disk relative to the bytes last read or written.
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// State: the file still has the bytes that this program last read or wrote, or the scene has
-    /// no file yet.
     Unchanged,
-    /// State: another program has written the file, or it is no longer a readable regular file.
+    /// Written by another program, or no longer a readable regular file.
     Changed,
-    /// State: the scene file has been deleted or moved.
+    /// Deleted or moved.
     Missing,
 }
 
 /// Reason why a scene was not saved.
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// Error: the scene has no file yet, and no path was given.
+    /// The scene has no file yet, and no path was given.
     Untitled,
-    /// Error: another program has written the file since it was read. The value is its path.
+    /// Another program has written the file since it was read.
     Changed(PathBuf),
-    /// Error: a file with this path exists, and overwriting was not requested.
+    /// The file exists, and overwriting was not requested.
     Exists(PathBuf),
-    /// Error: the scene file cannot be written.
     Failed {
-        /// Path of the scene file.
         path: PathBuf,
-        /// Cause of the failure, as a clause for the error message.
+        /// Cause of the failure, as a clause.
         what: String,
     },
 }
@@ -70,19 +68,12 @@ impl fmt::Display for SaveError {
 impl std::error::Error for SaveError {}
 
 impl SceneFile {
-    /// Reads and validates the scene file at `path`, which must be a regular file.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Reads and validates the regular file at `path`. Returns the errors of [`Scene::read`].
     pub fn open(path: &Path) -> Result<Self, SceneErrors> {
         Self::open_with(path, Arc::default())
     }
 
-    /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
-    /// scene refers to.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Reads a scene like [`SceneFile::open`], with a cache of the files that it refers to.
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let document = Document::read_regular(path, assets)?;
         let fingerprint = fnv1a64(document.text().as_bytes());
@@ -90,42 +81,29 @@ impl SceneFile {
     }
 
     /// Creates a scene without a file. `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::parse`].
     pub fn untitled(text: String, name: &str) -> Result<Self, SceneErrors> {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
 
-    /// Creates a scene from `text`, the unsaved edits in a recovery file. `path` is the scene file
-    /// that was edited. The present content of the file differs from `text`, and stays until the
-    /// edits are saved.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Scene::parse`].
+    /// Creates a scene from the unsaved edits `text` of the file at `path`, which stays until they
+    /// are saved.
     pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
         let document = Document::parse(text, &path.display().to_string())?;
         let fingerprint = content(path).ok().flatten().unwrap_or_default();
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
-    /// Parses `text` as a scene. File names in the scene are relative to the folder of this file.
-    /// `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::parse`].
+    /// Parses `text` as a scene whose file names are relative to the folder of this file.
     pub fn parse(&self, text: &str, name: &str) -> Result<Scene, SceneErrors> {
         Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
-    /// Returns the hash of the bytes that this program last read from or wrote to the file. Returns
-    /// `None` if the scene has no file.
+    /// Returns the hash of the bytes last read or written; `None` without a file.
     pub fn fingerprint(&self) -> Option<u64> {
         self.path.as_ref().map(|_| self.fingerprint)
     }
 
-    /// Returns `true` if `text` is the text that this program last read from or wrote to the file.
-    /// For a scene without a file, it is the text from which the scene was created.
+    /// Returns `true` if `text` was last read or written, or created a scene without a file.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
             Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
@@ -150,7 +128,7 @@ impl SceneFile {
         &self.document
     }
 
-    /// Reads the scene file and compares it with the bytes that this program last read or wrote.
+    /// Compares the file with the bytes last read or written.
     pub fn on_disk(&self) -> DiskState {
         self.path.as_deref().map_or(DiskState::Unchanged, |path| self.state_of(&content(path)))
     }
@@ -163,12 +141,8 @@ impl SceneFile {
         }
     }
 
-    /// Reads the scene file again.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Scene::read`]; the document then stays unchanged. The fingerprint
-    /// (hash of the file's bytes) is updated even then, so that a broken file is reported only
-    /// once.
+    /// Reads the file again. If it is not valid, only the fingerprint changes, so that a broken
+    /// file is reported once.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
         if let Ok(Some(found)) = content(&path) {
@@ -178,13 +152,9 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Writes the valid `scene` to its file. Comments, order and layout of unchanged parts are
-    /// kept. The file is replaced atomically; a symbolic link and the permissions are kept.
-    ///
-    /// # Errors
-    /// Fails if there is no file yet, if another program has written the file (unless `overwrite`
-    /// is `true`), if the path leads to something other than a regular file, or if the file cannot
-    /// be written.
+    /// Writes the valid `scene` to its file, which is replaced atomically; comments, a symbolic
+    /// link and permissions are kept. Fails without a file, if another program has written it
+    /// (unless `overwrite`), or if it is not a regular file.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
         let found = content(&path);
@@ -202,11 +172,8 @@ impl SceneFile {
         self.write(document, &path, true)
     }
 
-    /// Writes the valid `scene` to another file, which becomes the scene's file.
-    ///
-    /// # Errors
-    /// Fails if the file exists (unless `overwrite` is `true`), or if it cannot be written. Also
-    /// fails if a file name in the scene would lead to another file, or to none, from the new
+    /// Writes the valid `scene` to another file, which becomes the scene's file. Fails if it exists
+    /// (unless `overwrite`), or if a file name in the scene would lead elsewhere from the new
     /// folder.
     pub fn save_as(
         &mut self,
@@ -217,8 +184,7 @@ impl SceneFile {
         let resolver = &scene.resolver;
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
-        let environments =
-            scene.lights.iter().filter_map(|light| light.environment.as_ref()?.file());
+        let environments = scene.lights.iter().filter_map(|light| light.environment()?.file());
         if let Some(file) = meshes
             .chain(images)
             .chain(environments)
@@ -238,8 +204,7 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Replaces the content of the file at `path` by the text of `document` atomically and durably.
-    /// If `overwrite` is `false`, fails if the file exists.
+    /// Replaces the content of the file at `path` atomically and durably.
     fn write(&mut self, document: Document, path: &Path, overwrite: bool) -> Result<(), SaveError> {
         let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
         let text = document.text().as_bytes();
@@ -257,10 +222,8 @@ impl SceneFile {
     }
 }
 
-/// Returns the fingerprint (hash) of the content of the file at `path`; `None` if there is no file.
-///
-/// # Errors
-/// Returns [`ErrorKind::InvalidInput`] if the path leads to something other than a regular file.
+/// Returns the fingerprint of the file at `path`; `None` if there is none. Fails with
+/// [`ErrorKind::InvalidInput`] if it is not a regular file.
 fn content(path: &Path) -> io::Result<Option<u64>> {
     match open_regular(path) {
         Ok(file) => {

@@ -12,19 +12,16 @@ const MAX_BYTES: usize = 64 << 20;
 /// Largest number of edits that can be undone.
 const MAX_STEPS: usize = 10_000;
 
-/// Undo history of an editor. Each step has a label. Edits with the same label during a gesture (a
-/// drag or mode), or by the repeats of a held key, are coalesced into one step.
+/// Undo history of an editor. Edits with the same label during a gesture (a drag, a mode, or the
+/// repeats of a held key) are coalesced into one step.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// Scenes to which undo returns, the oldest first: one for each step, as it was before the
-    /// step.
+    /// Scenes to which undo returns, the oldest first.
     past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
-    /// Scenes to which redo returns: one for each undone step, as it was after the step. The step
-    /// to redo next is the last entry.
+    /// Scenes to which redo returns; the next one is the last.
     future: Vec<HistoryEntry>,
-    /// `true` if the next edit may be merged with the previous step: during a gesture (a drag or
-    /// mode) or the repeats of a held key.
+    /// `true` during a gesture: the next edit may be coalesced.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -55,10 +52,8 @@ impl History {
         &self.now
     }
 
-    /// Makes `scene` the current scene, by a step with the label `label`. `held` is `true` if the
-    /// step belongs to a gesture (a drag or mode) or to the repeats of a held key. It is then
-    /// coalesced with the previous step, if that has the same label and belongs to the same gesture
-    /// or held key. Returns `false`, and records nothing, if the scene has not changed.
+    /// Makes `scene` the current scene. `held` is `true` during a gesture. Returns `false`, and
+    /// records nothing, if the scene has not changed.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;
@@ -80,8 +75,7 @@ impl History {
         true
     }
 
-    /// Ends a gesture (a drag or mode) or the repeats of a held key: the next step is not merged
-    /// with the previous one.
+    /// Ends a gesture.
     pub fn end_gesture(&mut self) {
         self.open = false;
     }
@@ -110,8 +104,7 @@ impl History {
         self.open = false;
     }
 
-    /// Returns `true` if the current scene equals the saved one, even if edits were made and
-    /// reverted since saving.
+    /// Returns `true` if the current scene equals the saved one.
     pub fn is_saved(&self) -> bool {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
@@ -121,8 +114,7 @@ impl History {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps until the undo history is within its limits of memory and of steps.
-    /// The latest step is always kept.
+    /// Drops the oldest steps beyond the limits. The latest step is kept.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {

@@ -1,9 +1,7 @@
 //! Scene as the user describes it: editable, in double precision, with validation.
 //!
-//! [`Document`] parses and validates a file once; every edit ([`edit::Edit`]) is validated once,
-//! too. The fields of [`Scene`] are public, so that other code can set them to invalid values
-//! without such an edit. A render session (the rendering thread) therefore validates the scene that
-//! it is given.
+//! [`Document`] and [`edit::Edit`] are validated once. The fields of [`Scene`] are public: a render
+//! session validates the scene that it is given.
 
 #[cfg(not(unix))]
 compile_error!("zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX file locks.");

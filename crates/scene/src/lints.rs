@@ -8,12 +8,10 @@ use crate::material::{Fresnel, Highlight, Material};
 use crate::validate::Problem;
 use crate::value::{Color, number};
 
-/// Doubtful value: its path in the scene, and a phrase that states the problem, such as
-/// `alpha has no effect here`.
+/// Path of a doubtful value, and a phrase such as `alpha has no effect here`.
 type Case = (Vec<String>, String);
 
-/// Lint of materials: returns the key of a doubtful value and a phrase that states the problem.
-/// Returns `None` if the material has no such value.
+/// Key of a doubtful value of a material, and a phrase that states the problem.
 type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
 
 /// Lints of materials, each with the help text of its warning.
@@ -44,9 +42,8 @@ fn without_effect(key: &'static str, is_found: bool) -> Option<(&'static str, St
 }
 
 impl Scene {
-    /// Returns one warning for each kind of doubtful value in the scene. The warning states the
-    /// first such value and the number of others.
-    /// [`Document::warnings`](crate::Document::warnings) adds file, line and column.
+    /// Returns one warning for each kind of doubtful value: the first one, and the number of
+    /// others.
     pub fn warnings(&self) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut add = |help: &str, cases: &mut dyn Iterator<Item = Case>| {
@@ -99,12 +96,9 @@ impl Scene {
     }
 }
 
-/// Returns a warning if a material may reflect more light than it receives: if the weights of its
-/// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
-/// returns `None`. The warning is `(key, phrase)`: the key that it refers to, and a statement of
-/// the sum. A Cook-Torrance highlight is the mirror reflection of lights; the key `reflection` is
-/// the weight of the mirror reflection of surfaces. Both stand for one physical reflection; only
-/// the larger of the two weights is therefore added.
+/// Returns a warning if a material may reflect more light than it receives. A Cook-Torrance
+/// highlight and the key `reflection` stand for one physical reflection, of lights and of surfaces:
+/// only the larger weight counts.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,
@@ -112,8 +106,8 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
-        // A dielectric reflects the share F of the light and transmits 1 - F. The larger of the two
-        // weights is therefore an upper bound.
+        // A dielectric reflects the share F and transmits 1 - F: the larger weight is an upper
+        // bound.
         Fresnel::Dielectric => mirrored.max(m.transmission),
         Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => mirrored * f0 + m.transmission,
     };

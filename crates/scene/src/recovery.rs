@@ -1,10 +1,9 @@
 //! Recovery files: unsaved edits on disk, similar to the swap files of vim.
 //!
-//! The text that saving would write is kept in a hidden file beside the scene. This recovery file
-//! is replaced atomically, and removed when the scene is saved or closed deliberately. The process
-//! that writes the file holds a lock on it; the lock ends with the process. An unlocked recovery
-//! file is an orphan of a process that was killed. The lock is taken before the file gets its name,
-//! so that other processes never see the file of a running process unlocked.
+//! The text that saving would write is kept in a hidden file beside the scene, until the scene is
+//! saved or closed deliberately. The process that writes it holds a lock on it. An unlocked
+//! recovery file is an orphan of a process that was killed. The lock is taken before the file gets
+//! its name, so that other processes never see it unlocked.
 
 use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
 use crate::format::read::MAX_BYTES;
@@ -17,32 +16,26 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use tempfile::NamedTempFile;
 
-/// Largest number of recovery files of one scene in one folder, from crashed or concurrent
-/// processes.
+/// Largest number of recovery files of one scene in one folder.
 const MAX_FILES: u32 = 9;
-/// Beginning of the first line of a recovery file. The fingerprint (hash) of the scene file
-/// follows.
+/// Beginning of a recovery file; the fingerprint of the scene file follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
-/// Word in the first line of a recovery file in place of the fingerprint, if the scene has no file.
+/// Word in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age (time since the last modification) from which an unlocked temporary file is taken to be that
-/// of a killed process. Such a file is removed.
+/// Age from which an unlocked temporary file is that of a killed process, and is removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Folder of the scene file, and name of the recovery file in this folder. `None` for a scene
-    /// without a file.
+    /// Folder of the scene file, and name of the recovery file in it.
     beside: Option<(PathBuf, OsString)>,
-    /// Program's folder in the user's state folder, and name of the recovery file in it. It is used
-    /// if the recovery file cannot be written `beside` the scene file. `None` if the user has no
-    /// state folder.
+    /// Folder and name if the file cannot be written `beside` the scene file.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
 
-/// Recovery file that this process has written or opened, and the handle that holds its lock.
+/// Recovery file of this process, and the handle that holds its lock.
 #[derive(Debug)]
 struct Saved {
     path: PathBuf,
@@ -52,36 +45,32 @@ struct Saved {
 /// Result of the search for recovery files of a scene.
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
-    /// Unsaved edits of processes that were killed, in recovery files; the newest first.
+    /// Unsaved edits of killed processes; the newest first.
     pub orphans: Vec<Orphan>,
-    /// Recovery files that cannot be read, each as `(path, reason)`. These files stay on disk.
+    /// Recovery files that cannot be read, with the reason.
     pub unreadable: Vec<(PathBuf, String)>,
-    /// Recovery files of other users, each as `(path, name or number of the user)`. They are not
-    /// read.
+    /// Recovery files of other users, which are not read, with the name or number of the user.
     pub foreign: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
     pub elsewhere: bool,
 }
 
-/// Unsaved edits of a process that was killed. The recovery file stays locked while this value
-/// exists, so that other processes do not offer it.
+/// Unsaved edits of a killed process. The file stays locked, so that other processes do not offer
+/// it.
 #[derive(Debug)]
 pub struct Orphan {
     kept: Saved,
     /// Text that saving would have written to the scene file.
     pub text: String,
-    /// Fingerprint of the scene file that was edited (see
-    /// [`crate::SceneFile::fingerprint`]); `None` if there was no file or the fingerprint
-    /// cannot be read.
+    /// Fingerprint of the scene file that was edited; `None` if there was none or it is unknown.
     pub base: Option<u64>,
     /// Time at which the recovery file was written.
     pub written: SystemTime,
 }
 
-/// Returns the program's folder for recovery files in the user's state folder (XDG Base Directory
-/// Specification). It is used for scenes without a file, or in a folder that is not writable.
-/// `variable` returns the value of an environment variable. Returns `None` if the environment does
-/// not define the folder.
+/// Returns the program's folder in the user's state folder (XDG Base Directory Specification), for
+/// scenes without a file or in a folder that is not writable. `variable` returns the value of an
+/// environment variable.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -90,14 +79,13 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Creates the writer and finder of the recovery files for a scene. The scene is in the file at
-    /// `path`, or has no file and the name `name`. `state` is the folder from [`state_folder`].
+    /// Creates the writer and finder for the scene at `path`, or for one without a file, called
+    /// `name`. `state` is the [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut beside = None;
         let stem = match path {
             Some(path) => {
-                // The path is made canonical, so that every path to the same file gives the same
-                // name.
+                // Every path to the same file gives the same name.
                 let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
                 let canonical = canonical.unwrap_or_else(|_| path.to_path_buf());
                 let name = canonical.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
@@ -115,14 +103,12 @@ impl Recovery {
         Self { beside, state, saved: None }
     }
 
-    /// Returns the places where the recovery file may be written, each as `(folder, file name)`,
-    /// the preferred one first: beside the scene file, then in the state folder.
+    /// Returns folder and name of the places for the recovery file, the preferred one first.
     fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
         self.beside.iter().chain(&self.state)
     }
 
-    /// Returns a writer and finder of recovery files for the same scene that uses only the state
-    /// folder.
+    /// Returns a writer and finder for the same scene that uses only the state folder.
     pub fn elsewhere(&self) -> Self {
         Self { beside: None, state: self.state.clone(), saved: None }
     }
@@ -132,12 +118,8 @@ impl Recovery {
         self.saved.as_ref().map(|saved| saved.path.as_path())
     }
 
-    /// Writes the recovery file. `text` is the text that saving would write, and `base` is the
-    /// fingerprint of the scene file that saving would replace.
-    ///
-    /// # Errors
-    ///
-    /// Fails if none of the possible folders is writable; the previous recovery file then stays.
+    /// Writes the recovery file: the text that saving would write, and the fingerprint of the file
+    /// that it would replace. If no folder is writable, the previous recovery file stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -155,15 +137,14 @@ impl Recovery {
         Ok(())
     }
 
-    /// Removes the recovery file. Callers use this when no edits are unsaved.
+    /// Removes the recovery file.
     pub fn forget(&mut self) {
         if let Some(saved) = self.saved.take() {
             saved.remove();
         }
     }
 
-    /// Finds the unsaved edits of the scene that killed processes have left. Empty files are
-    /// removed. Files of other users are not read, because they are not this user's work.
+    /// Finds the unsaved edits that killed processes have left. Empty files are removed.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
         for (folder, name) in self.candidates() {
@@ -190,7 +171,7 @@ impl Recovery {
         found
     }
 
-    /// Takes over the recovery file of `lost`: this process writes to it from now on.
+    /// Takes over the recovery file of `lost`.
     pub fn adopt(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -203,15 +184,14 @@ impl Orphan {
         &self.kept.path
     }
 
-    /// Removes the recovery file of these unsaved edits.
+    /// Removes the recovery file.
     pub fn discard(self) {
         self.kept.remove();
     }
 }
 
 impl Saved {
-    /// Returns `true` if the path still leads to the locked file, which another process may have
-    /// replaced.
+    /// Returns `true` if the path still leads to the locked file.
     fn has_its_name(&self) -> bool {
         let named = fs::symlink_metadata(&self.path);
         self.file.metadata().is_ok_and(|saved| named.is_ok_and(|named| is_same(&saved, &named)))
@@ -249,8 +229,7 @@ fn locked_temporary(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Writes `text` to a new recovery file in `folder` and returns the file, which is locked. Its name
-/// is the first free one of `name`, `name-2`, `name-3` and so on.
+/// Writes `text` to a new locked recovery file: `name`, `name-2`, `name-3` and so on.
 fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     let mut folders = DirBuilder::new();
     folders.recursive(true);
@@ -273,32 +252,26 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens the recovery file at `path` for reading and writing, because some file systems lock only
-/// files that are open for writing.
+/// Opens the recovery file for writing, too, because some file systems lock only such files.
 fn open(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true).write(true), path)
 }
 
-/// Result of opening a recovery file for reading: its edits, or a reason why there are none.
+/// Result of opening a recovery file.
 enum Found {
-    /// No recovery file exists at the path.
     Nothing,
-    /// The recovery file belongs to the user with this number.
+    /// The file belongs to the user with this number.
     OfUser(u32),
     Orphan(Orphan),
 }
 
-/// Reads the unsaved edits in the recovery file at `path`.
-///
-/// # Errors
-/// [`ErrorKind::WouldBlock`] if a running process holds the lock; any other error if the file
-/// cannot be read.
+/// Reads the recovery file at `path`. Fails with [`ErrorKind::WouldBlock`] if a running process
+/// holds the lock.
 fn read_orphan(path: &Path) -> io::Result<Found> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    // If another process replaces the file after it was opened here, the loop opens the new file.
+    // Another process may replace the file after it was opened.
     for _ in 0..5 {
-        // The type is checked before opening, so that the target of a symbolic link is never
-        // opened.
+        // The target of a symbolic link is never opened.
         match fs::symlink_metadata(path) {
             Ok(metadata) if !metadata.is_file() => {
                 return Err(io::Error::other("it is not a regular file"));

@@ -3,6 +3,7 @@
 use crate::Scene;
 use crate::diagnostic::MAX_REPORTED;
 use crate::format::suggest::did_you_mean;
+use crate::light::Light;
 use crate::material::Mapping;
 use crate::value::{Description, ValidationError, truncated};
 use std::borrow::Cow;
@@ -12,8 +13,7 @@ use std::fmt;
 /// Problem of a scene (error or warning), without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Path to the value in question: keys and list indices (from 0), such as `object`, `3`,
-    /// `shape`, `sphere`.
+    /// Keys and list indices, such as `object`, `3`, `shape`, `sphere`.
     pub path: Vec<String>,
     /// Table that the problem is about, such as `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
@@ -33,9 +33,8 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
-/// `name(list, index)` returns the name of the entry at `index` in the scene's list `list`, and
-/// `None` if there is no such entry.
+/// Returns the name in diagnostics of the table at `path`: `object "queen"`, `light 2`. `name(list,
+/// index)` returns the name of an entry.
 pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
     match path {
         [list, index, ..] if list == "object" || list == "light" => {
@@ -61,8 +60,7 @@ struct Problems<'a> {
 }
 
 impl Problems<'_> {
-    /// Adds a problem of the value at `path`. `make` returns the phrase and the help of the
-    /// problem; it is called only if a further problem can be stored.
+    /// Adds a problem of the value at `path`. `make` returns phrase and help.
     fn report(&mut self, path: &[&str], make: impl FnOnce() -> (String, String)) {
         if self.found.len() < MAX_REPORTED {
             let (found, help) = make();
@@ -103,14 +101,14 @@ impl Scene {
         Problem { subject: self.subject(&path), path, found, help }
     }
 
-    /// Loads the files that the scene refers to, except for those that are loaded already. Files
-    /// that cannot be read are errors in the next validation.
+    /// Loads the files that the scene refers to and that are not loaded yet. Unreadable files are
+    /// errors in the next validation.
     pub fn resolve(&mut self) {
         let (resolver, assets) = (&self.resolver, self.resolver.assets());
         for object in &mut self.objects {
             object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }
-        for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
+        for environment in self.lights.iter_mut().filter_map(Light::environment_mut) {
             environment.resolve(|name| assets.radiance_map(&resolver.path(name)));
         }
         for material in self.materials.values_mut() {
@@ -118,14 +116,12 @@ impl Scene {
         }
     }
 
-    /// Returns the first 100 validation errors of the scene. A scene that was read from a file has
-    /// none; an edited scene may have some.
+    /// Returns the first 100 validation errors.
     pub fn faults(&self) -> Vec<Problem> {
         self.check().0
     }
 
-    /// Returns `(errors, number)`: the first 100 validation errors of the scene, and the number of
-    /// further ones.
+    /// Returns [`Scene::faults`] and the number of further ones.
     pub(super) fn check(&self) -> (Vec<Problem>, usize) {
         let mut problems = Problems { scene: self, found: Vec::new(), more: 0 };
         problems.add(&["film"], self.film.validator().errors());
@@ -154,9 +150,8 @@ impl Scene {
         (problems.found, problems.more)
     }
 
-    /// Adds a problem for each object with a part whose material maps a texture or a bump map by
-    /// texture coordinates (`mapping = "uv"`) but whose shape has no texture coordinates. An object
-    /// with several such parts gets one problem. The shapes must be valid.
+    /// Adds a problem for each valid object with a part whose material needs texture coordinates
+    /// (`mapping = "uv"`) that its shape does not have.
     fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

@@ -1,77 +1,65 @@
-//! Capabilities of the terminal, and of a multiplexer if the program runs inside one. They are
-//! derived from the environment and from the terminal's replies.
+//! Capabilities of the terminal, derived from the environment and from its replies.
 
 use crate::cells::Colors;
 use std::time::Duration;
 
-/// Terminal multiplexer: a program between the dashboard and the terminal.
+/// Terminal multiplexer: a program between this one and the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplexer {
-    /// The multiplexer tmux.
     Tmux,
-    /// The multiplexer GNU Screen.
+    /// GNU Screen.
     Screen,
 }
 
 /// Values of the environment variables that describe the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
-    /// Value of `TERM`, the name of the terminal's type.
+    /// Value of `TERM`.
     pub term: String,
-    /// Value of the environment variable `COLORTERM`, such as `truecolor`.
+    /// Value of `COLORTERM`, such as `truecolor`.
     pub color_term: String,
     /// `true` if `NO_COLOR` is set and not empty.
     pub no_color: bool,
-    /// Value of `SSH_CONNECTION`: address and port of the client, then of the server. `None`
-    /// without SSH.
+    /// Value of `SSH_CONNECTION`: address and port of the client, then of the server.
     pub ssh: Option<String>,
-    /// Multiplexer around the program, recognised by `TMUX`, `STY` or `TERM`; `None` if there is
-    /// none.
+    /// Multiplexer around the program, recognised by `TMUX`, `STY` or `TERM`.
     pub multiplexer: Option<Multiplexer>,
 }
 
-/// Capabilities of the terminal. A field is `None` if the terminal has not replied to the request
-/// for it.
+/// Capabilities of the terminal. A field is `None` without a reply.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Capabilities {
-    /// Environment variables that describe the terminal.
     pub environment: Environment,
-    /// Set of colours that the terminal shows. It is derived from the environment variables and the
-    /// terminal's replies.
+    /// Set of colours that the terminal shows.
     pub colors: Colors,
     /// `true` if the terminal supports synchronised updates (mode 2026).
     pub synchronised: bool,
-    /// Name and version of the terminal, as its reply to XTVERSION states them. `None` without a
-    /// reply.
+    /// Name and version (XTVERSION).
     pub version: Option<String>,
-    /// Background colour of the terminal, 8-bit sRGB, as its reply to OSC 11 states it. `None`
-    /// without a reply.
+    /// Background colour, 8-bit sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
     /// `true` if the terminal supports kitty's graphics protocol.
     pub kitty_graphics: bool,
-    /// `true` if the terminal supports Unicode placeholders: characters whose cells show an image
-    /// of kitty's protocol. Inside of tmux, images need placeholders.
+    /// `true` if the terminal supports Unicode placeholders, characters whose cells show an image
+    /// of kitty's protocol. Inside tmux, images need them.
     pub placeholders: bool,
     /// `true` if the terminal supports sixel images.
     pub sixel: bool,
-    /// Largest number of colours of a sixel image. `None` if the terminal has not replied.
+    /// Largest number of colours of a sixel image.
     pub sixel_colors: Option<u16>,
-    /// Largest width and height of a sixel image in pixels. `None` if the terminal has not replied.
+    /// Largest width and height of a sixel image in pixels.
     pub sixel_px: Option<[u16; 2]>,
-    /// Width and height of a terminal cell in pixels. `None` if the terminal has not replied.
+    /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to the first reply. Inside of a multiplexer, the multiplexer
-    /// itself replies and not the terminal. `None` if no reply has arrived.
+    /// Time from the first request to the first reply, of a multiplexer if there is one.
     pub round_trip: Option<Duration>,
-    /// Round-trip time to the terminal outside of the multiplexer, measured by a request that the
-    /// multiplexer passes on. `None` if the time was not measured or the multiplexer passes no
+    /// Round-trip time to the terminal outside the multiplexer; `None` if the multiplexer passes no
     /// requests on.
     pub passthrough: Option<Duration>,
 }
 
 impl Environment {
-    /// Reads the environment variables that describe the terminal. `variable` returns the value of
-    /// the variable with a given name.
+    /// Reads the environment through `variable`, which returns the value of a variable.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
@@ -91,10 +79,9 @@ impl Environment {
         }
     }
 
-    /// Returns the set of colours that the terminal is expected to show, according to the
-    /// environment variables alone.
+    /// Returns the set of colours to expect by the environment alone.
     pub fn colors(&self) -> Colors {
-        /// Values of `TERM` with 24-bit colour that do not end in `-direct` or `-truecolor`.
+        /// Values of `TERM` with 24-bit colour, besides `*-direct` and `*-truecolor`.
         const TRUE: [&str; 8] = [
             "xterm-kitty",
             "alacritty",

@@ -1,9 +1,8 @@
-//! Query of the terminal's capabilities (colours, graphics protocols, sizes), before the first
-//! frame.
+//! Query of the terminal's capabilities before the first frame.
 //!
-//! All requests are sent in one write, and terminals reply in the order of the requests. The last
-//! request is for the device attributes, to which every terminal replies. The reply to it ends the
-//! query. A reply that arrives after the timeout is still decoded as a reply and not as keys.
+//! All requests are sent in one write, and terminals reply in their order. Every terminal replies
+//! to the last one, for the device attributes, and this ends the query. A later reply is still
+//! decoded as a reply and not as keys.
 
 use crate::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::cells::Colors;
@@ -13,12 +12,12 @@ use crate::{Event, Reply};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Longest wait for the terminal's replies to capability requests.
+/// Longest wait for replies.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Longest wait for the terminal's replies to capability requests over SSH.
+/// Longest wait for replies over SSH.
 const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 
-/// Interval at which the capability query checks if it should stop.
+/// Interval at which the query checks if it should stop.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request of the device attributes (DA1), to which every terminal replies.
@@ -34,20 +33,18 @@ const ATTRIBUTES: &str = "\x1b[c";
 /// - width and height of a cell in pixels
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests that tmux passes on to the terminal outside of tmux. The first tests kitty's graphics
-/// protocol by an image that is not shown. The second is for the name and version of the terminal.
+/// Requests that tmux passes on: a test of kitty's graphics protocol, and XTVERSION.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
-/// First version of the terminal kitty that supports Unicode placeholders: `[major, minor]`.
+/// First version of kitty with Unicode placeholders: `[major, minor]`.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// Forms in which terminals with 24-bit colour report red 1, green 2, blue 3 in a reply to DECRQSS.
+/// Forms in which terminals with 24-bit colour report red 1, green 2, blue 3 (DECRQSS).
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
-/// Number of the terminal's private mode for synchronised updates.
+/// Number of the private mode for synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
-/// Returns the request of the cursor position. A terminal replies when it has processed all earlier
-/// bytes. If `through` is a multiplexer, the request is wrapped, so that the multiplexer passes it
-/// on. The terminal outside of the multiplexer then replies.
+/// Returns the request of the cursor position, to which a terminal replies when it has processed
+/// all earlier bytes. It is wrapped to pass through a multiplexer.
 pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -56,16 +53,14 @@ pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     }
 }
 
-/// Queries the capabilities of the terminal. This takes about one round trip, or two inside of a
-/// multiplexer over SSH. Keys that are pressed during the query are kept in `input`. `is_ending`
-/// returns `true` if the query should stop.
+/// Queries the capabilities, in about one round trip, or two inside a multiplexer over SSH. Keys
+/// that are pressed meanwhile are kept in `input`. `is_ending` returns `true` if the query should
+/// stop.
 ///
-/// Inside of a local tmux, some requests are passed on to the terminal outside of tmux. The query
-/// does not wait for the replies of this outer terminal, because it may never reply. If such a
-/// reply arrives after the query, the caller passes it to [`Capabilities::learn`].
+/// The query does not wait for a terminal outside a local tmux, which may never reply. The caller
+/// passes such a late reply to [`Capabilities::learn`].
 ///
-/// # Errors
-/// Fails if the terminal is closed.
+/// # Errors Fails if the terminal is closed.
 pub fn query_capabilities(
     tty: &Tty,
     input: &mut InputReader,
@@ -105,9 +100,8 @@ pub fn query_capabilities(
     Ok(capabilities)
 }
 
-/// Passes the terminal's replies to `take`, each with the time of its arrival. Ends when `take`
-/// returns `true`, at `deadline`, or when `is_ending` returns `true`. Events other than replies are
-/// kept in `input`.
+/// Passes replies to `take` until it returns `true`, `deadline` has come, or `is_ending` returns
+/// `true`. Other events are kept in `input`.
 fn listen(
     input: &mut InputReader,
     deadline: Instant,
@@ -130,8 +124,7 @@ fn listen(
 }
 
 impl Capabilities {
-    /// Updates the capabilities according to `reply`, a reply of the terminal to one of the
-    /// requests for capabilities.
+    /// Updates the capabilities by a reply.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
             Reply::Attributes(attributes) => {
@@ -165,8 +158,7 @@ impl Capabilities {
     }
 }
 
-/// Returns `true` if the terminal supports kitty's Unicode placeholders. `version` is its name and
-/// version, as it reports them.
+/// Returns `true` if a terminal of this name and version supports Unicode placeholders.
 fn has_placeholders(version: &str) -> bool {
     let kitty = || {
         let numbers = version.strip_prefix("kitty(")?.split(['.', ')']);

@@ -1,10 +1,10 @@
-//! Clipboard on the user's machine, written through the terminal.
+//! Clipboard on the user's machine.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 /// Returns the escape sequence OSC 52, which copies `text` to the clipboard if the terminal permits
-/// it. `text` is encoded in base64, so that its control characters cannot end the sequence.
+/// it.
 pub fn copied(text: &str) -> String {
     format!("\x1b]52;c;{}\x07", STANDARD.encode(text))
 }

@@ -26,18 +26,16 @@ use crate::sequence::{Interpreter, console_key, single_shift, x10_mouse};
 use crate::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after the first two bytes of an escape sequence (`ESC [`, `ESC O`, …). After a
-/// longer pause the two bytes are decoded as a key pressed with Alt.
+/// Longest pause after the first two bytes of an escape sequence, which are a key pressed with Alt
+/// then.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
-/// Longest pause inside of an escape sequence, except for its first two bytes and for pasted text.
+/// Longest pause inside an escape sequence.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
-/// Longest pause inside of pasted text. After a longer pause the text so far is reported; later
-/// bytes are still pasted text.
+/// Longest pause inside pasted text, after which the text so far is reported.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
-/// Largest number of bytes of a control string (reply of the terminal) that are kept. Further bytes
-/// are skipped.
+/// Largest number of bytes of a control string that are kept.
 const MAX_STRING: usize = 4096;
-/// Largest number of bytes of pasted text that are kept. Further bytes are skipped.
+/// Largest number of bytes of pasted text that are kept.
 const MAX_PASTE: usize = 1 << 20;
 
 const ETX: u8 = 0x03;
@@ -47,62 +45,57 @@ const CAN: u8 = 0x18;
 const SUB: u8 = 0x1a;
 const PASTE_END: &[u8] = b"\x1b[201~";
 
-/// State of the input decoder: the kind of character or escape sequence that the next byte belongs
-/// to.
+/// Kind of character or escape sequence that the next byte belongs to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
     #[default]
     Ground,
-    /// State inside of a UTF-8 character of several bytes.
+    /// UTF-8 character of several bytes.
     Character,
     Escape,
-    /// State after ESC and this byte. Both together either begin a sequence or are a key pressed
-    /// with Alt.
+    /// ESC and this byte, which begin a sequence or are a key pressed with Alt.
     Introducer(u8),
-    /// State after `ESC O` and decimal digits. The value is the number that the digits form, 0
-    /// without digits. It encodes the modifiers of the key that follows.
+    /// `ESC O` and decimal digits of this number, the modifiers of the key that follows.
     SingleShift(u16),
-    /// State inside of a control sequence, which began with `ESC [`.
+    /// Control sequence, after `ESC [`.
     ControlSequence,
-    /// State after `ESC [ [`, with which function keys begin on the Linux console.
+    /// Function key of the Linux console, after `ESC [ [`.
     Console,
-    /// State after `ESC [ M`, with which mouse reports of the X10 protocol begin.
+    /// Mouse report of the X10 protocol, after `ESC [ M`.
     X10Mouse,
-    /// State inside of a control string, which began with ESC and this byte.
+    /// Control string, which began with ESC and this byte.
     String(u8),
-    /// State after an ESC inside of a control string. A backslash after this ESC ends the string.
-    /// The value is the byte after the ESC with which the string began.
+    /// ESC inside the control string that began with this byte. A backslash ends the string.
     StringEscape(u8),
     Paste,
-    /// State inside of pasted text whose first part was reported after a pause.
+    /// Pasted text whose first part was reported after a pause.
     PausedPaste,
 }
 
-/// Decoder of terminal input. The caller measures time: if no byte arrives within
-/// [`Decoder::patience`], it calls [`Decoder::give_up`].
+/// Decoder of terminal input. If no byte arrives within [`Decoder::patience`], the caller calls
+/// [`Decoder::give_up`].
 #[derive(Default)]
 pub struct Decoder {
     parser: vte::Parser,
     interpreter: Interpreter,
     state: State,
-    /// Bytes of the pasted text or of the X10 mouse report that is being decoded.
+    /// Bytes of the pasted text or of the X10 mouse report.
     taken: Vec<u8>,
-    /// Number of bytes of the current control string (a reply of the terminal) that have been read
-    /// so far.
+    /// Number of bytes of the control string so far.
     string_length: usize,
     escape_wait: Duration,
-    /// `true` if the last byte was an ESC that was reported as the key Escape after a pause.
+    /// `true` if the last byte was an ESC that was reported as the key Escape.
     escape_given_up: bool,
 }
 
 impl Decoder {
-    /// Creates a decoder. `escape_wait` is the longest pause between ESC and the next byte of its
-    /// sequence. After a longer pause, ESC is the key Escape.
+    /// Creates a decoder. `escape_wait` is the longest pause between ESC and the rest of a
+    /// sequence.
     pub fn new(escape_wait: Duration) -> Self {
         Self { escape_wait, ..Self::default() }
     }
 
-    /// Decodes `bytes`, the result of one read, and returns the events that they complete.
+    /// Decodes the result of one read, and returns the events that it completes.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Event> {
         if std::mem::take(&mut self.escape_given_up) && is_reply_without_escape(bytes) {
             self.state = State::Escape;
@@ -113,9 +106,8 @@ impl Decoder {
         std::mem::take(&mut self.interpreter.events)
     }
 
-    /// Returns the longest time to wait for the next byte of the current sequence. After this time
-    /// the caller calls [`Decoder::give_up`]. Returns `None` between sequences, and after a pause
-    /// in a paste until more of the paste arrives.
+    /// Returns the longest time to wait for the next byte of the current sequence. Returns `None`
+    /// between sequences, and after a pause in a paste.
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,
@@ -128,7 +120,7 @@ impl Decoder {
         }
     }
 
-    /// Ends an incomplete sequence after a pause. Returns the events decoded from its bytes.
+    /// Ends an incomplete sequence after a pause. Returns its events.
     pub fn give_up(&mut self) -> Vec<Event> {
         match self.state {
             State::Escape => {
@@ -146,40 +138,87 @@ impl Decoder {
     }
 
     fn byte(&mut self, byte: u8) {
+        match self.state {
+            State::Paste | State::PausedPaste => self.paste(byte),
+            State::Ground | State::Character => self.character(byte),
+            State::Escape => self.escape(byte),
+            State::Introducer(introducer) => self.introduced(introducer, byte),
+            State::ControlSequence
+            | State::Console
+            | State::X10Mouse
+            | State::SingleShift(_)
+            | State::String(_) => self.sequence(byte),
+            State::StringEscape(_) if byte == b'\\' => self.end_string(b"\x1b\\"),
+            State::StringEscape(_) => {
+                // Another sequence interrupts the string.
+                self.restart();
+                self.state = State::Escape;
+                self.byte(byte);
+            }
+        }
+    }
+
+    fn character(&mut self, byte: u8) {
         match (self.state, byte) {
-            (State::Paste | State::PausedPaste, _) => self.paste(byte),
             (State::Ground, ESC) => {
                 self.restart();
                 self.state = State::Escape;
             }
-            (State::Ground, _) | (State::Character, 0x80..=0xbf) => {
+            (State::Ground, _) | (_, 0x80..=0xbf) => {
                 self.interpreter.is_character_complete = false;
                 self.parse(&[byte]);
                 let is_complete = self.interpreter.is_character_complete;
                 self.state = if is_complete { State::Ground } else { State::Character };
             }
-            // `byte` does not continue the UTF-8 character, which is incomplete and produces no
-            // key.
-            (State::Character, _) => {
+            // An incomplete UTF-8 character produces no key.
+            _ => {
                 self.restart();
                 self.byte(byte);
             }
-            (State::Escape, ESC) => self.interpreter.press(Key::plain(Code::Esc)),
-            (State::Escape, b'[' | b'O' | b'P' | b']' | b'_') => {
-                self.state = State::Introducer(byte);
-            }
-            (State::Escape, _) => {
+        }
+    }
+
+    fn escape(&mut self, byte: u8) {
+        match byte {
+            ESC => self.interpreter.press(Key::plain(Code::Esc)),
+            b'[' | b'O' | b'P' | b']' | b'_' => self.state = State::Introducer(byte),
+            _ => {
                 self.interpreter.alt = true;
                 self.in_ground(byte);
             }
+        }
+    }
 
-            (State::Introducer(b'['), b'[') => self.state = State::Console,
-            (State::Introducer(b'['), b'M') => self.state = State::X10Mouse,
-            (State::Introducer(b'['), 0x20..=0x7e) => {
+    fn introduced(&mut self, introducer: u8, byte: u8) {
+        match (introducer, byte) {
+            (b'[', b'[') => self.state = State::Console,
+            (b'[', b'M') => self.state = State::X10Mouse,
+            (b'[', 0x20..=0x7e) => {
                 self.parse(b"\x1b[");
                 self.state = State::ControlSequence;
                 self.byte(byte);
             }
+            (b'O', b'0'..=b'9' | 0x40..=0x7e) => {
+                self.state = State::SingleShift(0);
+                self.byte(byte);
+            }
+            (b'[' | b'O', _) => {
+                self.abandon();
+                self.in_ground(byte);
+            }
+            _ => {
+                self.interpreter.is_apc = introducer == b'_';
+                self.interpreter.reply = Reply::Other;
+                self.string_length = 0;
+                self.parse(if introducer == b']' { b"\x1b]" } else { b"\x1bP" });
+                self.state = State::String(introducer);
+                self.byte(byte);
+            }
+        }
+    }
+
+    fn sequence(&mut self, byte: u8) {
+        match (self.state, byte) {
             (State::ControlSequence, 0x20..=0x3f) => self.parse(&[byte]),
             (State::ControlSequence, 0x40..=0x7e) => {
                 self.parse(&[byte]);
@@ -194,11 +233,6 @@ impl Decoder {
                     self.complete(x10_mouse(&report));
                 }
             }
-
-            (State::Introducer(b'O'), b'0'..=b'9' | 0x40..=0x7e) => {
-                self.state = State::SingleShift(0);
-                self.byte(byte);
-            }
             (State::SingleShift(modifiers), b'0'..=b'9') => {
                 let digit = u16::from(byte - b'0');
                 let modifiers = modifiers.saturating_mul(10).saturating_add(digit);
@@ -206,23 +240,6 @@ impl Decoder {
             }
             (State::SingleShift(modifiers), 0x40..=0x7e) => {
                 self.complete(single_shift(modifiers, byte));
-            }
-
-            (
-                State::Introducer(b'[' | b'O') | State::ControlSequence | State::SingleShift(_),
-                _,
-            ) => {
-                self.abandon();
-                self.in_ground(byte);
-            }
-
-            (State::Introducer(introducer), _) => {
-                self.interpreter.is_apc = introducer == b'_';
-                self.interpreter.reply = Reply::Other;
-                self.string_length = 0;
-                self.parse(if introducer == b']' { b"\x1b]" } else { b"\x1bP" });
-                self.state = State::String(introducer);
-                self.byte(byte);
             }
             (State::String(introducer), ESC) => self.state = State::StringEscape(introducer),
             (State::String(b']'), BEL) => self.end_string(b"\x07"),
@@ -234,13 +251,7 @@ impl Decoder {
                     self.parse(&[byte]);
                 }
             }
-            (State::StringEscape(_), b'\\') => self.end_string(b"\x1b\\"),
-            (State::StringEscape(_), _) => {
-                // Another sequence interrupts the string.
-                self.restart();
-                self.state = State::Escape;
-                self.byte(byte);
-            }
+            _ => self.in_ground(byte),
         }
     }
 
@@ -248,7 +259,7 @@ impl Decoder {
         self.parser.advance(&mut self.interpreter, bytes);
     }
 
-    /// Resets the decoder and the parser to the state between escape sequences.
+    /// Resets the decoder to the state between sequences.
     fn restart(&mut self) {
         self.parser = vte::Parser::new();
         self.interpreter.alt = false;
@@ -256,8 +267,7 @@ impl Decoder {
         self.taken.clear();
     }
 
-    /// Resets the decoder, except for a pending Alt modifier, and decodes `byte` as the first one
-    /// of a new character or escape sequence.
+    /// Decodes `byte` as the first one of a new sequence, with a pending Alt modifier.
     fn in_ground(&mut self, byte: u8) {
         let alt = self.interpreter.alt;
         self.restart();
@@ -265,14 +275,13 @@ impl Decoder {
         self.byte(byte);
     }
 
-    /// Ends an escape sequence that `vte` does not parse, and adds its event.
+    /// Ends a sequence that `vte` does not parse.
     fn complete(&mut self, event: Option<Event>) {
         self.interpreter.events.extend(event);
         self.restart();
     }
 
-    /// Ends a control string, which is a reply of the terminal, and adds the event of this reply.
-    /// `terminator` ends the string for the parser.
+    /// Ends a control string by `terminator` and adds its reply.
     fn end_string(&mut self, terminator: &[u8]) {
         self.parse(terminator);
         let reply = std::mem::take(&mut self.interpreter.reply);
@@ -280,8 +289,7 @@ impl Decoder {
     }
 
     fn paste(&mut self, byte: u8) {
-        // Bytes of the paste after the first `MAX_PASTE` are skipped. The latest of them are kept
-        // here only to recognise the end sequence.
+        // The last bytes are kept to recognise the end sequence.
         if self.taken.len() >= MAX_PASTE + PASTE_END.len() {
             self.taken.remove(MAX_PASTE);
         }
@@ -297,9 +305,8 @@ impl Decoder {
         self.complete(Some(Event::Paste(text)));
     }
 
-    /// Reports the pasted text so far. The caller calls this after a pause in the paste. From the
-    /// second pause on, the key Escape or Ctrl-C ends the paste if its byte is the last one before
-    /// the pause. This key is then reported too.
+    /// Reports the pasted text so far after a pause. From the second pause on, a final Escape or
+    /// Ctrl-C ends the paste and is reported too.
     fn pause_paste(&mut self) {
         let is_paused = self.state == State::PausedPaste;
         let key = self.taken.pop_if(|last| is_paused && [ESC, ETX].contains(last));
@@ -317,8 +324,7 @@ impl Decoder {
         }
     }
 
-    /// Ends an incomplete escape sequence. If only its first two bytes have arrived, reports the
-    /// key Alt-`[`, Alt-`O` or a similar one.
+    /// Ends an incomplete sequence. Its first two bytes alone are a key such as Alt-`[`.
     fn abandon(&mut self) {
         if let State::Introducer(introducer) = self.state {
             self.interpreter.alt = true;
@@ -327,9 +333,8 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if `bytes`, the result of one read, can only be the remainder of a reply of the
-/// terminal. The first byte of the reply, an ESC, was the result of an earlier read. Typed
-/// characters would not arrive together in one read.
+/// Returns `true` if the result of one read can only be the remainder of a reply whose ESC was read
+/// before. Typed characters would not arrive together.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

@@ -6,49 +6,33 @@ use std::str::FromStr;
 /// Key without modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// Character as typed, such as `a` or `A`. The modifier `shift` is `false` even for a capital
-    /// letter.
+    /// Character as typed, such as `a` or `A`, never with `shift`.
     Char(char),
-    /// Enter key.
     Enter,
-    /// Escape key.
     Esc,
-    /// Tab key. Together with `shift` it is back-tab.
+    /// Tab, with `shift` back-tab.
     Tab,
-    /// Backspace key.
     Backspace,
-    /// Delete key.
     Delete,
-    /// Left arrow key.
     Left,
-    /// Right arrow key.
     Right,
-    /// Up arrow key.
     Up,
-    /// Down arrow key.
     Down,
-    /// Home key.
     Home,
-    /// End key.
     End,
-    /// Page up key.
     PageUp,
-    /// Page down key.
     PageDown,
-    /// Function key with its number, 1 for F1.
+    /// Function key, 1 for F1.
     F(u8),
 }
 
-/// Key press with its modifiers.
+/// Key press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key {
-    /// Key that was pressed, without its modifiers.
     pub code: Code,
-    /// `true` if Control is pressed.
     pub ctrl: bool,
-    /// `true` if Alt is pressed.
     pub alt: bool,
-    /// `true` if Shift is pressed. Always `false` for characters.
+    /// `true` if Shift is pressed, except for characters.
     pub shift: bool,
 }
 
@@ -62,43 +46,35 @@ impl Key {
 /// Kind of a mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {
-    /// Press of a mouse button.
     Press(Button),
-    /// Movement of the mouse while this button is pressed.
+    /// Movement while this button is pressed.
     Drag(Button),
-    /// Release of a mouse button.
     Release(Button),
-    /// The wheel was turned by this number of ticks: positive if away from the user, negative if
-    /// towards the user.
+    /// Ticks of the wheel, positive if away from the user.
     Scroll(i32),
 }
 
 /// Mouse button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
-    /// Left mouse button.
     Left,
-    /// Middle mouse button.
     Middle,
-    /// Right mouse button.
     Right,
 }
 
 /// Mouse event with the cell under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mouse {
-    /// Kind of the mouse event: press, drag, release or scroll.
     pub kind: MouseKind,
-    /// Column of the cell under the pointer, counted from 0.
+    /// Column, counted from 0.
     pub column: u16,
-    /// Row of the cell under the pointer, counted from 0.
+    /// Row, counted from 0.
     pub row: u16,
-    /// `true` if Control or Alt is pressed. Shift does not count, because most terminals use it
-    /// themselves, for example to select text.
+    /// `true` if Control or Alt is pressed. Most terminals use Shift themselves.
     pub modified: bool,
 }
 
-/// Names of the keys that do not produce a character.
+/// Names of keys without a character.
 const NAMED: &[(&str, Code)] = &[
     ("Enter", Code::Enter),
     ("Esc", Code::Esc),
@@ -116,7 +92,7 @@ const NAMED: &[(&str, Code)] = &[
     ("Space", Code::Char(' ')),
 ];
 
-/// Formats a key as in the key table and in help: `Ctrl-s`, `Shift-Left`, `a`, `?`, `Space`.
+/// Formats a key as in help: `Ctrl-s`, `Shift-Left`, `a`, `?`, `Space`.
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for (on, name) in [(self.ctrl, "Ctrl-"), (self.alt, "Alt-"), (self.shift, "Shift-")] {

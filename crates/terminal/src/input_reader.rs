@@ -1,5 +1,4 @@
-//! Reader of all terminal input: keys, mouse events, pasted text and replies. If the rest of an
-//! escape sequence does not arrive in time, the reader ends the sequence.
+//! Reader of all terminal input.
 
 use crate::decode::Decoder;
 use crate::{Environment, Event};
@@ -7,35 +6,29 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
 
-/// Longest pause between ESC and the next byte of its sequence. After a longer pause, ESC is the
-/// key Escape.
+/// Longest pause between ESC and the rest of its sequence.
 const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// Longest pause between ESC and the next byte of its sequence over SSH, where a sequence can be
-/// split between packets.
+/// Longest pause between ESC and the rest of its sequence over SSH, where packets can divide it.
 const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
 /// Terminal event with the time at which it was read.
 #[derive(Debug)]
 pub struct TimedEvent {
-    /// Time at which the event was read.
     pub at: Instant,
-    /// Key, mouse event, pasted text or reply.
     pub event: Event,
 }
 
-/// Reader of keys, mouse events, pasted text and replies from stdin.
+/// Reader of events from stdin.
 pub struct InputReader {
     stdin: Stdin,
     decoder: Decoder,
     buffer: Vec<u8>,
-    /// Events that were read during the query of the terminal's capabilities. The next
-    /// [`InputReader::wait`] returns them.
+    /// Events that were read during the capability query, for the next [`InputReader::wait`].
     pub(super) early: Vec<TimedEvent>,
 }
 
 impl InputReader {
-    /// Creates a reader of stdin. `environment` describes the terminal. If the terminal is
-    /// connected by SSH, the reader waits longer for the byte after an ESC.
+    /// Creates a reader, which waits longer for the byte after an ESC over SSH.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
@@ -46,11 +39,9 @@ impl InputReader {
         }
     }
 
-    /// Waits for terminal events until `deadline`; `None` means without limit. Returns an empty
-    /// list at the deadline.
+    /// Waits for events until `deadline`, at which the list is empty.
     ///
-    /// # Errors
-    /// Fails if the terminal is closed.
+    /// # Errors Fails if the terminal is closed.
     pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<TimedEvent>> {
         if !self.early.is_empty() {
             return Ok(std::mem::take(&mut self.early));
@@ -82,8 +73,8 @@ impl InputReader {
         }
     }
 
-    /// Waits at most `wait` for input; `None` means without limit. Returns `Some(true)` if input
-    /// has arrived, `Some(false)` if the time is over, and `None` if a signal interrupted the wait.
+    /// Waits at most `wait` for input. Returns `Some(true)` if it has arrived, `Some(false)` if the
+    /// time is over, and `None` after a signal.
     fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
         let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
         let mut stdin = [PollFd::new(&self.stdin, PollFlags::IN)];

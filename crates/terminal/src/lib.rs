@@ -1,6 +1,18 @@
-//! Terminal driver: decoding of input, query of capabilities, raw mode and its restoration,
-//! encoding of cells and images, frame differences, flow control. The module is independent of
-//! scenes and of the renderer.
+//! Terminal driver for full-screen programs that show pictures, also over slow connections.
+//!
+//! - [`Screen`] starts full-screen use and restores the terminal, even after a crash; [`SignalQueue`]
+//!   turns signals into events.
+//! - [`query_capabilities`] asks what the terminal supports; [`InputReader`] decodes keys, mouse
+//!   events, pasted text and replies.
+//! - [`cells`] converts images to glyphs with colours; [`image`] encodes them by kitty's protocol and
+//!   sixel.
+//! - [`diff`] encodes the differences between two ratatui buffers, within a byte budget that [`flow`]
+//!   derives from the rate of the connection.
+//!
+//! The crate knows no scene and no renderer.
+
+// Many variants and fields speak for themselves.
+#![allow(missing_docs)]
 
 mod capabilities;
 mod capability_query;
@@ -21,8 +33,7 @@ mod tests;
 
 use crate::event::{Key, Mouse};
 pub use capabilities::{Capabilities, Environment, Multiplexer};
-pub use capability_query::cursor_request;
-pub use capability_query::query_capabilities;
+pub use capability_query::{cursor_request, query_capabilities};
 pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};
@@ -32,13 +43,9 @@ pub use signals::{HUNG_UP, SignalEvent, SignalQueue, Signals};
 /// Event to which terminal input is decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Key press by the user.
     Key(Key),
-    /// Mouse button, drag or wheel event.
     Mouse(Mouse),
-    /// Pasted text.
     Paste(String),
-    /// Reply of the terminal to a request of the program.
     Reply(Reply),
 }
 
@@ -46,19 +53,13 @@ pub enum Event {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Reply {
     /// Position of the cursor, counted from 1 (CPR).
-    Cursor {
-        /// Row of the cursor, counted from 1.
-        row: u16,
-        /// Column of the cursor, counted from 1.
-        column: u16,
-    },
-    /// Device attributes (DA1): numbers of the supported features, such as 4 for sixel.
+    Cursor { row: u16, column: u16 },
+    /// Numbers of the supported features, such as 4 for sixel (DA1).
     Attributes(Vec<u16>),
     /// State of a private mode of the terminal (DECRPM).
     Mode {
-        /// Number of the terminal's private mode (DEC).
         mode: u16,
-        /// State of the mode: 0 unknown, 1 set, 2 reset, 3 permanently set, 4 permanently reset.
+        /// 0 unknown, 1 set, 2 reset, 3 permanently set, 4 permanently reset.
         setting: u16,
     },
     /// Default background colour, 8-bit sRGB (OSC 11).
@@ -69,7 +70,7 @@ pub enum Reply {
     Setting(String),
     /// Result of a command of kitty's graphics protocol. `true` means `OK`.
     Graphics(bool),
-    /// Width and height of a terminal cell in pixels.
+    /// Width and height of a cell in pixels.
     CellSize([u16; 2]),
     /// Largest number of colours of a sixel image (XTSMGRAPHICS).
     SixelColors(u16),

@@ -1,10 +1,9 @@
-//! Restoration of the terminal if the program ends without restoring it. Examples are SIGKILL, an
-//! abort after a failed allocation in a library, and a processor exception such as SIGILL.
+//! Restoration of the terminal if the program ends without it, as after SIGKILL, an abort or
+//! SIGILL.
 //!
-//! The terminal is restored by a helper process, a shell that runs a script and reads from a pipe.
-//! When the program ends, the pipe closes, and the script continues. Signal handlers of the program
-//! cannot replace the helper process: SIGKILL has no handler, and after the handler of SIGABRT
-//! returns, the process ends at once.
+//! A helper process, a shell that reads from a pipe, continues when the program ends and the pipe
+//! closes. Signal handlers cannot replace it: SIGKILL has none, and after that of SIGABRT returns,
+//! the process ends at once.
 
 use crate::LEAVE;
 use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
@@ -12,30 +11,25 @@ use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-/// Script of the helper process, a shell that restores the terminal if the program is killed. `$0`
-/// is [`LEAVE`]; the other arguments are those of `stty`. When the program ends normally, it sends
-/// a line to the script, which then exits. Otherwise the script restores the terminal. It sets the
-/// terminal modes only if output processing is still off (`-opost`), as in full-screen use. If
-/// output processing is on, the user's shell has already set its own modes.
+/// Script of the helper process. `$0` is [`LEAVE`]; the other arguments are those of `stty`. A line
+/// from the program ends the script. The modes are set only if output processing is still off
+/// (`-opost`); otherwise the user's shell has already set its own.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit
 case $(stty -a </dev/tty) in *-opost*) stty \"$@\" </dev/tty ;; esac
 printf %s \"$0\" >/dev/tty";
 
-/// Helper process that restores the terminal if the program is killed. It is a shell that waits
-/// until this value is dropped or the program ends.
+/// Helper process, which waits until this value is dropped or the program ends.
 pub struct Restorer {
     shell: Child,
     messages: ChildStdin,
 }
 
 impl Restorer {
-    /// Starts the helper process, a shell that sets the terminal modes `modes_before` if the
-    /// program is killed.
+    /// Starts the helper process, which would restore `modes_before`.
     ///
-    /// # Errors
-    /// Fails if there is no shell.
+    /// # Errors Fails if there is no shell.
     pub fn start(modes_before: &Termios) -> io::Result<Self> {
         let mut shell = Command::new("/bin/sh")
             .args(["-c", PROGRAM, LEAVE])
@@ -43,8 +37,7 @@ impl Restorer {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
-            // The helper process has a process group of its own, so that keys such as Ctrl-C and
-            // Ctrl-Z do not send it signals.
+            // Keys such as Ctrl-C and Ctrl-Z send no signals to other process groups.
             .process_group(0)
             .spawn()?;
         let messages = shell.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
@@ -52,8 +45,7 @@ impl Restorer {
     }
 }
 
-/// Returns the arguments with which POSIX `stty` restores all modes that raw mode changes. Each
-/// mode is set to its value in `modes`: the argument is `echo` if `echo` is set there, otherwise
+/// Returns the arguments of POSIX `stty` for all modes that raw mode changes, such as `echo` or
 /// `-echo`.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
     let (input, local) = (modes.input_modes, modes.local_modes);
@@ -77,8 +69,7 @@ fn stty_arguments(modes: &Termios) -> Vec<String> {
 }
 
 impl Drop for Restorer {
-    /// Ends the helper process, the shell that would restore the terminal if the program were
-    /// killed. The terminal is restored already at this point.
+    /// Ends the helper process; the terminal is restored already.
     fn drop(&mut self) {
         let _ = self.messages.write_all(b"\n");
         let _ = self.shell.try_wait();

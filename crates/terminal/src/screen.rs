@@ -1,5 +1,4 @@
-//! Full-screen use of the terminal and its restoration: raw mode, alternate screen, mouse,
-//! bracketed paste.
+//! Full-screen use of the terminal and its restoration.
 
 use crate::restorer::Restorer;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -12,26 +11,22 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Bytes that prepare the terminal for full-screen use: alternate screen, hidden cursor, bracketed
-/// paste, mouse reports, an empty screen. Mouse reports cover buttons, the wheel and drags (mode
-/// 1002), with decimal coordinates (mode 1006).
+/// Bytes that start full-screen use: alternate screen, hidden cursor, bracketed paste, mouse
+/// reports with drags (mode 1002) and decimal coordinates (mode 1006), an empty screen.
 pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x1b[2J";
 
-/// Bytes that restore the terminal. They first end an incomplete frame (synchronised update). Then
-/// they reset colours and attributes, and undo the parts of [`ENTER`] in the opposite order.
+/// Bytes that restore the terminal. They end an incomplete synchronised update, reset colours and
+/// attributes, and undo [`ENTER`].
 pub const LEAVE: &str = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
 
-/// Longest time for which restoration of the terminal waits for a slow terminal that is still
-/// reading a frame.
+/// Longest wait for a terminal that is still reading a frame.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Full-screen use of the terminal. The terminal is restored when this value is dropped, or when
-/// any thread panics. If the process ends in another way, a helper process (`Restorer`) restores
-/// the terminal, unless this helper could not be started.
+/// Full-screen use of the terminal, which is restored when this value is dropped or any thread
+/// panics, and by a helper process if the process ends in another way.
 pub struct Screen {
     tty: Arc<Tty>,
-    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, for example
-    /// after a panic in another thread.
+    /// Notification that [`Tty::leave`] has restored the terminal, for example after a panic.
     pub left: Receiver<()>,
     restorer: Option<Restorer>,
 }
@@ -40,33 +35,30 @@ pub struct Screen {
 pub struct Tty {
     out: Mutex<Box<dyn Write + Send>>,
     entered: AtomicBool,
-    /// Terminal modes of stdin before [`Screen::enter`]; `None` in tests, which write to memory.
+    /// Modes of stdin before [`Screen::enter`]; `None` in tests, which write to memory.
     modes_before: Option<Termios>,
     leaving: Sender<()>,
-    /// Bytes that are sent before [`LEAVE`] when the terminal is restored, such as the removal of
-    /// an image.
+    /// Bytes that are sent before [`LEAVE`], such as the removal of an image.
     exit_sequence: Mutex<Vec<u8>>,
 }
 
-/// Returns the columns and rows of the terminal, or 80 and 24 if the terminal does not report them.
+/// Returns the columns and rows of the terminal, or 80 and 24 if it does not report them.
 ///
-/// # Errors
-/// Fails if neither the process nor stdout has a terminal.
+/// # Errors Fails if there is no terminal.
 pub fn size() -> io::Result<[u16; 2]> {
     let size = terminal::window_size()?;
     let is_known = size.columns > 0 && size.rows > 0;
     Ok(if is_known { [size.columns, size.rows] } else { [80, 24] })
 }
 
-/// Returns the width and height of a terminal cell in pixels. Returns `None` if the terminal does
-/// not report its size in pixels.
+/// Returns the width and height of a cell in pixels, if the terminal reports them.
 pub fn cell_px() -> Option<[u16; 2]> {
     let size = terminal::window_size().ok()?;
     let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
     Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-/// Calls `change`, which changes terminal modes. Repeats the call if a signal interrupts it.
+/// Repeats a change of modes that a signal interrupts.
 fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     loop {
         match change() {
@@ -76,9 +68,8 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. When raw mode begins, crossterm stores the current terminal modes; when raw mode
-/// ends, it restores them. A shell may have changed the modes while the program was suspended.
-/// `modes_before` is therefore set first, so that crossterm stores these modes.
+/// Sets raw mode. `modes_before`, which crossterm stores and later restores, are set first, because
+/// a shell may have changed the modes while the program was suspended.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
     uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
@@ -113,8 +104,7 @@ impl Screen {
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
         panic::set_hook(Box::new(move |panic| {
-            // The terminal is restored before the report, because the message would disappear with
-            // the alternate screen.
+            // The message would disappear with the alternate screen.
             tty.leave();
             report(panic);
         }));
@@ -122,7 +112,6 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Returns the writer to the terminal.
     pub fn tty(&self) -> Arc<Tty> {
         Arc::clone(&self.tty)
     }
@@ -135,11 +124,9 @@ impl Drop for Screen {
 }
 
 impl Tty {
-    /// Writes `bytes` to the terminal in one call. Does nothing while full-screen use is suspended
-    /// or after its end.
+    /// Writes `bytes` in one call. Does nothing outside full-screen use.
     ///
-    /// # Errors
-    /// Fails if the terminal is closed.
+    /// # Errors Fails if the terminal is closed.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
         let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if self.entered.load(Ordering::Acquire) {
@@ -149,50 +136,46 @@ impl Tty {
         Ok(())
     }
 
-    /// Sets the bytes that are sent before [`LEAVE`] when the terminal is restored. They replace
-    /// the bytes of an earlier call.
+    /// Sets the bytes that are sent before [`LEAVE`].
     pub fn set_exit_sequence(&self, bytes: &[u8]) {
         let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
         exit_sequence.clear();
         exit_sequence.extend(bytes);
     }
 
-    /// Restores the terminal at the end of full-screen use. Does nothing if the terminal is
-    /// restored already.
+    /// Ends full-screen use.
     pub fn leave(&self) {
         if self.suspend() {
             let _ = self.leaving.try_send(());
         }
     }
 
-    /// Suspends full-screen use and restores the terminal, until [`Tty::resume`] is called. Returns
-    /// `false` if the terminal is restored already.
+    /// Suspends full-screen use until [`Tty::resume`]. Returns `false` if the terminal is restored
+    /// already.
     pub fn suspend(&self) -> bool {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return false;
         }
-        // The wait is limited, so that the program can end even if the terminal has stopped
-        // reading.
+        // The terminal may have stopped reading.
         if let Some(mut out) = self.lock_within(PATIENCE) {
             let mut exit_sequence =
                 self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
             let bytes = [&*exit_sequence, LEAVE.as_bytes()].concat();
             exit_sequence.clear();
-            // Errors are ignored: a terminal that is gone needs no restoration.
+            // A terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
         if self.modes_before.is_some() {
             let _ = uninterrupted(terminal::disable_raw_mode);
-            // Unread input, such as late replies, is discarded. The shell would read it otherwise.
+            // The shell would read late replies.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
         }
         true
     }
 
-    /// Resumes full-screen use of the terminal, even if other programs have changed its modes.
+    /// Resumes full-screen use, even if other programs have changed the modes.
     ///
-    /// # Errors
-    /// Fails if the terminal is closed.
+    /// # Errors Fails if the terminal is closed.
     pub fn resume(&self) -> io::Result<()> {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;

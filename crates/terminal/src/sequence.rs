@@ -1,36 +1,33 @@
-//! Interpretation of terminal input, that is, of characters and escape sequences: ECMA-48 and the
-//! extensions of xterm and kitty ("Control Sequences", invisible-island.net/xterm/ctlseqs;
+//! Interpretation of characters and escape sequences: ECMA-48 and the extensions of xterm and kitty
+//! ("Control Sequences", invisible-island.net/xterm/ctlseqs;
 //! sw.kovidgoyal.net/kitty/keyboard-protocol).
 
 use crate::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::{Event, Reply};
 use vte::{Params, Perform};
 
-/// Interpreter of terminal input: converts the results of [`vte::Parser`] to events.
+/// Converter of the results of [`vte::Parser`] to events.
 #[derive(Debug, Default)]
 pub struct Interpreter {
-    /// Events of the input so far, in order.
     pub events: Vec<Event>,
-    /// `true` if the next key is pressed with Alt, because ESC preceded it.
+    /// `true` if ESC preceded the next key.
     pub alt: bool,
     /// `true` if the last byte completed a UTF-8 character or made it invalid.
     pub is_character_complete: bool,
     /// `true` if the last control sequence begins a bracketed paste.
     pub is_paste: bool,
-    /// `true` if the control string that is being parsed began as an APC string (`ESC _`). The
-    /// decoder passes it to the parser as a device control string.
+    /// `true` if the control string began as an APC string (`ESC _`), which the parser gets as a
+    /// device control string.
     pub is_apc: bool,
-    /// Reply of the terminal, decoded from the last control string.
+    /// Reply in the last control string.
     pub reply: Reply,
-    /// Data of the device control string being parsed.
+    /// Data of the device control string.
     data: Vec<u8>,
-    /// Function that converts `data`, the data of the control string, to a reply. `None` if the
-    /// program does not use the reply.
+    /// Conversion of `data` to a reply.
     to_reply: Option<fn(String) -> Reply>,
 }
 
 impl Interpreter {
-    /// Adds the event of a key press.
     pub fn press(&mut self, key: Key) {
         let alt = std::mem::take(&mut self.alt);
         self.events.push(Event::Key(Key { alt: key.alt | alt, ..key }));
@@ -40,7 +37,7 @@ impl Interpreter {
 impl Perform for Interpreter {
     fn print(&mut self, c: char) {
         self.is_character_complete = true;
-        // For invalid UTF-8 the parser passes a replacement character. It produces no key.
+        // Invalid UTF-8 produces no key.
         if let Some(key) = character(c).filter(|_| c != char::REPLACEMENT_CHARACTER) {
             self.press(key);
         }
@@ -85,8 +82,7 @@ impl Perform for Interpreter {
     }
 }
 
-/// Returns the key that types the character `c`. Returns `None` for control characters without a
-/// key.
+/// Returns the key that types `c`; `None` for other control characters.
 fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
@@ -101,9 +97,8 @@ fn character(c: char) -> Option<Key> {
     })
 }
 
-/// Interprets a control sequence. `params` are its parameters with their subparameters,
-/// `intermediates` its private marker and intermediate bytes, and `last` its final byte. Returns
-/// `None` if the sequence is an unknown key or an unknown mouse report.
+/// Interprets a control sequence by its parameters with subparameters, its private marker and
+/// intermediate bytes, and its final byte.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -124,12 +119,11 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
     Some(Event::Reply(reply))
 }
 
-/// Returns the key of a control sequence with the parameters `params` and the final byte `last`.
-/// Returns `None` for the release of a key and for unknown keys.
+/// Returns the key of a control sequence; `None` for a release.
 fn key(params: &[&[u16]], last: char) -> Option<Key> {
     let number = params[0][0];
     let key = match (last, number) {
-        // Format of xterm's modifyOtherKeys: 27 ; modifiers ; character.
+        // xterm's modifyOtherKeys: 27 ; modifiers ; character.
         ('~', 27) => character(char::from_u32(params.get(2)?[0].into())?)?,
         ('~', 1 | 7) => Key::plain(Code::Home),
         ('~', 3) => Key::plain(Code::Delete),
@@ -139,8 +133,7 @@ fn key(params: &[&[u16]], last: char) -> Option<Key> {
         ('~', 11..=15) => Key::plain(Code::F(number as u8 - 10)),
         ('~', 17..=21) => Key::plain(Code::F(number as u8 - 11)),
         ('~', 23 | 24) => Key::plain(Code::F(number as u8 - 12)),
-        // In kitty's keyboard protocol the number is a code point, or 57344 and above for keys
-        // without a character. The parser clamps larger code points to 65535.
+        // Kitty's keyboard protocol: code point, or 57344 and above for keys without a character.
         ('u', 0 | 57_344..) => return None,
         ('u', 27) => Key::plain(Code::Esc),
         ('u', _) => character(char::from_u32(number.into())?)?,
@@ -154,27 +147,24 @@ fn key(params: &[&[u16]], last: char) -> Option<Key> {
     }
 }
 
-/// Interprets `ESC O modifiers last` (SS3), which keypads and some function keys send. Returns
-/// `None` for an unknown `last`.
+/// Interprets `ESC O modifiers last` (SS3).
 pub fn single_shift(modifiers: u16, last: u8) -> Option<Event> {
     let code = match last {
         b'M' => Code::Enter,
         b'I' => Code::Tab,
-        // Keys of a number pad in application mode.
+        // Number pad in application mode.
         b'j'..=b'y' => Code::Char(char::from(last - b'j' + b'*')),
         _ => named(char::from(last))?,
     };
     Some(Event::Key(modified(Key::plain(code), modifiers)))
 }
 
-/// Returns the event of the function key that sends `ESC [ [` and the byte `last` on the Linux
-/// console. Returns `None` for an unknown `last`.
+/// Interprets `ESC [ [ last` of the Linux console.
 pub fn console_key(last: u8) -> Option<Event> {
     (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
 }
 
-/// Interprets an X10 mouse report. `bytes` are the three bytes after `ESC [ M`, for button, column
-/// and row, each with 32 added. Returns `None` if the report is not valid.
+/// Interprets an X10 mouse report: button, column and row, each with 32 added.
 pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     let [button, column, row] =
         bytes.iter().map(|b| b.checked_sub(32).map(u16::from)).collect::<Option<Vec<_>>>()?[..]
@@ -186,7 +176,7 @@ pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     mouse(button, [column, row], is_release).map(Event::Mouse)
 }
 
-/// Returns the key whose control sequence has the final byte `last`; `None` for an unknown one.
+/// Returns the key whose control sequence has the final byte `last`.
 fn named(last: char) -> Option<Code> {
     Some(match last {
         'A' => Code::Up,
@@ -203,8 +193,7 @@ fn named(last: char) -> Option<Code> {
     })
 }
 
-/// Adds modifiers to a key. `modifiers` is 1 plus the sum of the pressed modifiers: 1 for Shift, 2
-/// for Alt, 4 for Control.
+/// Adds modifiers: 1 plus the sum of 1 for Shift, 2 for Alt, 4 for Control.
 fn modified(key: Key, modifiers: u16) -> Key {
     let bits = modifiers.saturating_sub(1);
     let is_character = matches!(key.code, Code::Char(_));
@@ -221,10 +210,9 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// Interprets a mouse report. The lowest two bits of `button` are the number of the button, 0 to 2,
-/// or for the wheel its direction. The other bits are 4 for Shift, 8 for Alt, 16 for Control, 32
-/// for motion and 64 for the wheel. `column` and `row` count from 1. Returns `None` for an unknown
-/// button.
+/// Interprets a mouse report. The lowest two bits of `button` are its number or the direction of
+/// the wheel; the others are 4 for Shift, 8 for Alt, 16 for Control, 32 for motion and 64 for the
+/// wheel. `column` and `row` count from 1.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {
         0 => Button::Left,
@@ -247,8 +235,8 @@ fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse
     Some(Mouse { kind, column: column.checked_sub(1)?, row: row.checked_sub(1)?, modified })
 }
 
-/// Parses the colour `rgb:RRRR/GGGG/BBBB` of a terminal's reply as 8-bit sRGB. Each channel has 1
-/// to 4 hexadecimal digits. Returns `None` if `text` has another form.
+/// Parses the colour `rgb:RRRR/GGGG/BBBB` as 8-bit sRGB. Each channel has 1 to 4 hexadecimal
+/// digits.
 fn parse_color(text: &[u8]) -> Option<[u8; 3]> {
     let channel = |digits: &str| {
         let max = 16u32.checked_pow(digits.len() as u32).filter(|_| digits.len() <= 4)? - 1;

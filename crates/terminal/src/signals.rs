@@ -17,13 +17,12 @@ pub const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 /// Meaning of a signal for the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignalEvent {
-    /// End of the program with this exit status: 128 plus the number of the terminating signal.
+    /// End with this exit status: 128 plus the number of the signal.
     End(u8),
-    /// Possible change of the terminal's size (SIGWINCH).
+    /// Possible change of the terminal's size.
     Resized,
-    /// Suspension of the program until it is continued (SIGTSTP).
+    /// Suspension until [`SignalEvent::Continue`].
     Stop,
-    /// Continuation of the program after a suspension (SIGCONT).
     Continue,
 }
 
@@ -32,7 +31,7 @@ pub struct SignalQueue(iterator::Signals);
 
 /// Signals that have been handled.
 pub struct Signals {
-    /// Receiver of the signal events, in the order of the signals.
+    /// Events in the order of the signals.
     pub events: Receiver<SignalEvent>,
     /// Exit status for the last terminating signal; 0 before the first one.
     status: Arc<AtomicU8>,
@@ -40,15 +39,14 @@ pub struct Signals {
 
 impl SignalQueue {
     /// Registers handlers of the signals that concern a program in raw mode. Must be called before
-    /// the terminal enters raw mode, because the default handlers would end the program and leave
-    /// the terminal in raw mode.
+    /// raw mode begins, in which the default handlers would leave the terminal.
     pub fn of_terminal() -> io::Result<Self> {
         let signals = [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH];
         Ok(Self(iterator::Signals::new(signals)?))
     }
 
-    /// Starts the thread that handles signals. It calls `on_end` with the exit status for each
-    /// terminating signal, after the signal's event has been sent.
+    /// Starts the thread that handles signals. It calls `on_end` for each terminating signal, after
+    /// its event has been sent.
     pub fn handle(mut self, mut on_end: impl FnMut(u8) + Send + 'static) -> io::Result<Signals> {
         let (sender, events) = unbounded();
         let signals = Signals { events, status: Arc::default() };
@@ -61,7 +59,6 @@ impl SignalQueue {
                     SIGCONT => SignalEvent::Continue,
                     _ => SignalEvent::End((SIGNALLED + signal) as u8),
                 };
-                // Sending fails only at the end of the program, when the receiver is gone.
                 let _ = sender.send(event);
                 if let SignalEvent::End(status) = event {
                     last_status.store(status, Ordering::Release);

@@ -1,23 +1,21 @@
 //! Compilation of a scene into a [`World`], step by step: geometry translated to the scene's
 //! centre, materials, lights, transmission, culling.
 
+use crate::analysis::inventory::inventory;
+use crate::analysis::radiance_range::SceneDistances;
+use crate::analysis::truncation_bias;
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
-use crate::emissive_sheets::{Emits, move_off_surfaces};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::light_choice::LightChoice;
-use crate::light_groups::{LightGroupSource, LightGroups};
-use crate::lights_on_surfaces::OnSurface;
-use crate::radiance_range::SceneDistances;
-use crate::scene_inventory::inventory;
-use crate::surface_emission::SurfaceEmission;
-use crate::truncation_bias;
-use crate::world::{
-    DeltaSource, EmitterSource, EnvironmentSource, LightSource, ShadowRayTarget, World,
-};
+use crate::lights::choice::LightChoice;
+use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
+use crate::lights::emitters::{Emitters, ObjectGeometry};
+use crate::lights::groups::{LightGroupSource, LightGroups};
+use crate::lights::on_surfaces::OnSurface;
+use crate::world::{DeltaSource, EnvironmentSource, LightSource, ShadowRayTarget, World};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::{Float, SimdFloat};
@@ -25,16 +23,15 @@ use zerkalo_kernel::primitive::{
     AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{DeltaLight, Emitter, EmitterSurface, EnvironmentLight, Light};
+use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface, Light};
 use zerkalo_scene::material::{Bsdf, Material};
 use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 
-/// Geometry of all objects in double precision, translated so that the scene's centre is the
-/// origin.
-pub(super) struct RecenteredGeometry {
-    /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
+/// Geometry of all objects in double precision, relative to the scene's centre.
+pub(crate) struct RecenteredGeometry {
+    /// The scene's centre.
     pub origin: DVec3,
-    /// Geometry of each object in canonical form, with its transform applied.
+    /// Canonical form of each object, with its transform applied.
     pub forms: Vec<Form>,
     /// Largest absolute coordinate, relative to `origin`, of the camera's lens and of all shapes
     /// with finite bounds.
@@ -67,9 +64,7 @@ impl RecenteredGeometry {
         Self { origin, forms, extent }
     }
 
-    /// Returns the largest rounding error of the coordinates in the scene file. The error is in
-    /// proportion to the distance between the scene's centre and the origin of the file's
-    /// coordinates.
+    /// Returns the largest rounding error of the coordinates in the scene file.
     pub fn input_error(&self) -> f64 {
         f64::EPSILON * self.origin.abs().max_element()
     }
@@ -79,16 +74,13 @@ impl RecenteredGeometry {
 struct CompiledMaterials<'a, S> {
     /// Distinct materials, in order of first use.
     materials: Vec<&'a Material>,
-    /// BSDF of each of `materials`.
     bsdfs: Vec<Bsdf<S>>,
-    /// Indices into `materials`. The outer list has an entry for each object, the inner list has an
-    /// entry for each part of the object.
+    /// Indices into `materials`, one for each part of each object.
     of_object: Vec<Vec<u32>>,
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// Compiles the materials of all objects and their parts. `default` replaces materials whose
-    /// names the scene does not define.
+    /// `default` replaces materials whose names the scene does not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
@@ -123,13 +115,12 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.materials[self.index(primitive) as usize]
     }
 
-    /// Returns the materials of the parts of object number `object`.
     fn of_parts(&self, object: usize) -> Vec<&'a Material> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
 
-    /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
-    /// of the camera. Returns `None` if no object is moved.
+    /// Moves flat emissive objects off the opaque surfaces on which they lie. Returns `None` if no
+    /// object is moved.
     fn move_emissive_sheets(
         &self,
         geometry: &RecenteredGeometry,
@@ -153,19 +144,15 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         move_off_surfaces(geometry, (&emits, &transmits), eye, emitter_lift::<S>(geometry))
     }
 
-    /// Returns `true` if some material reflects light that arrives directly from lights.
     fn has_direct(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
     }
 
-    /// Returns `true` if some material reflects ambient light.
     fn has_ambient(&self) -> bool {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
     }
 
-    /// Returns the limits of indirect diffuse light: the largest number of bounces, and whether
-    /// caustics are included. Returns `None` if the scene switches indirect diffuse light off, or
-    /// if no material is matt.
+    /// Returns the limits of indirect diffuse light; `None` if the scene has none.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
@@ -173,41 +160,38 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         (traced && self.materials.iter().any(is_matt)).then_some(DiffuseLimits { depth, caustics })
     }
 
-    /// Returns `true` if some surface reflects or transmits rays.
     fn has_secondary(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() || bsdf.transmission.is_some())
     }
 }
 
-/// Height of emitters (lights with a size) above the surfaces that they touch. The unit is the
-/// larger of two rounding errors: that of the scene's extent, and that of the coordinates in the
-/// scene file. Rays that leave a surface start at about half this height, below the emitter, so
-/// they can hit the emitter.
+/// Height of lights with a size above the surfaces that they touch, in the larger of two rounding
+/// errors: that of the scene's extent, and that of the coordinates in the scene file. Rays that
+/// leave a surface start at about half this height, so that they can hit the light.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns a distance that serves two purposes. Points are sampled at this height above emissive
-/// objects. Lights with a size are moved by this distance off the finite surfaces that they touch.
+/// Returns the height at which points are sampled above emissive objects, and by which lights with
+/// a size are moved off the finite surfaces that they touch.
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Largest distance by which a sphere light, or a light whose centre is on no surface, is moved off
-/// the surfaces that it touches. The unit is the light's radius or shorter side.
+/// Largest lift of a sphere light, or a light whose centre is on no surface, in radii or shorter
+/// sides.
 const MAX_LIFT: f64 = 1e-4;
 
-/// Returns the distance by which `light`, which has a size, is moved off the surfaces that it
-/// touches; see [`Emitter::new`]. Infinite surfaces are not part of the scene's extent, so that the
+/// Returns the distance by which a light with the surface `surface` is moved off the surfaces that
+/// it touches. Infinite surfaces are not part of the scene's extent, so that the
 /// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
 /// own coordinates then counts as well.
-fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
+fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface) -> f64 {
     let lift = emitter_lift::<S>(geometry);
-    let Some(surface) = light.surface() else { return lift };
     let center = surface.center() - geometry.origin;
     let largest = center.abs().max_element() + surface.radius();
     let lift_on_infinite = lift.max(EMITTER_LIFT * S::EPSILON * largest);
     let max_lift = MAX_LIFT * surface.thickness();
     // A sphere touches a flat surface at a single point, which is too small to see.
-    if matches!(surface, EmitterSurface::Sphere(_)) {
+    if matches!(surface, EmissiveSurface::Sphere { .. }) {
         return lift.min(max_lift);
     }
     let lift_on = |form: &Form| {
@@ -221,33 +205,25 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, light: &Light) -> f64 {
     lifts.fold(lift.min(max_lift), f64::max)
 }
 
-/// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
-/// lights are left out. `emitting` has three values for each light that emits: its index in the
-/// scene, the index of its light group, and its emission. The tracer multiplies samples of the
-/// light by the emission.
-fn light_sources<T, S: Float>(
-    scene: &Scene,
-    emitting: &[(usize, usize, [f64; 3])],
-    compile: impl Fn(&Light) -> Option<T>,
-) -> Vec<LightSource<T, S>> {
-    let source = |&(index, group, emission): &(usize, usize, [f64; 3])| {
-        let light = compile(&scene.lights[index])?;
-        let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-        Some(LightSource { light, group, emission, visible: scene.lights[index].visible })
-    };
-    emitting.iter().filter_map(source).collect()
+fn shadow_ray_target<S: Float>(
+    geometry: &RecenteredGeometry,
+    light: &Light,
+    delta: DeltaLight<S>,
+) -> ShadowRayTarget<S> {
+    let on_surface = light.apex().and_then(|position| {
+        let position = position - geometry.origin;
+        OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
+    });
+    ShadowRayTarget { light: delta, on_surface }
 }
 
-/// Lights of a scene and their light groups, with the scale of each group: the number of integer
-/// steps per unit of radiance in the film.
 struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
     sources: Vec<DeltaSource<S>>,
     choice: Option<LightChoice<S>>,
-    emitters: Vec<EmitterSource<S>>,
+    emitters: Emitters<S>,
     environments: Vec<EnvironmentSource<S>>,
-    emission: SurfaceEmission<S>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -261,37 +237,43 @@ impl<S: Float> CompiledLights<S> {
     ) -> Self {
         let reflected = (materials.has_direct(), materials.has_ambient());
         let groups = LightGroups::new(scene, reflected, merge_lights);
-        let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let emitter =
-            |light: &Light| Emitter::new(light, geometry.origin, light_lift::<S>(geometry, light));
-        let scales = groups.scales::<S>(scene, geometry.origin, emitter, &distances);
-        let emitting = groups.lights(scene);
-        let delta_light = |light: &Light| {
-            let delta = DeltaLight::new(light, geometry.origin)?;
-            let on_surface = light.apex().and_then(|position| {
-                let position = DVec3::from(position) - geometry.origin;
-                OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
-            });
-            Some(ShadowRayTarget { light: delta, on_surface })
-        };
-        let mut sources = light_sources(scene, &emitting, delta_light);
+        let (mut sources, mut emitters, mut environments) = (Vec::new(), Vec::new(), Vec::new());
+        let mut ranges = HashMap::new();
+        for (index, group, emission) in groups.lights(scene) {
+            let light = &scene.lights[index];
+            let lift = |surface: &EmissiveSurface| light_lift::<S>(geometry, surface);
+            let Some(compiled) = light.compile(geometry.origin, lift) else { continue };
+            ranges.insert(index, distances.light(&compiled, light.visible));
+            let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+            let source = LightSource { light: (), group, emission, visible: light.visible };
+            match compiled {
+                CompiledLight::Delta(delta) => {
+                    sources.push(source.with_light(shadow_ray_target(geometry, light, delta)));
+                }
+                CompiledLight::Emitter(emitter) => emitters.push(source.with_light(Some(emitter))),
+                CompiledLight::Environment(sky) => environments.push(source.with_light(sky)),
+            }
+        }
+        let scales = groups.scales::<S>(scene, &ranges, &distances);
         let choice = LightChoice::take(&mut sources, &groups.many, geometry.extent);
-        let emitters = light_sources(scene, &emitting, emitter);
-        let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let start = start_region(scene, camera);
         let is_entered = |form: usize| {
             let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
             materials.of_object[form].iter().any(transmits) || start.reaches(&geometry.forms[form])
         };
-        let emission =
-            SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift, is_entered);
-        Self { groups, scales, sources, choice, emitters, environments, emission }
+        let objects = ObjectGeometry {
+            scene,
+            forms: &geometry.forms,
+            primitives,
+            lift: emitter_lift::<S>(geometry),
+            is_entered: &is_entered,
+        };
+        let emitters = Emitters::new(emitters, &objects, &groups);
+        Self { groups, scales, sources, choice, emitters, environments }
     }
 
-    /// Returns the target of shadow rays to each light without a size: the position of the light,
-    /// or the direction to it.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
@@ -301,23 +283,15 @@ impl<S: Float> CompiledLights<S> {
         self.sources.iter().map(target_of_source).collect()
     }
 
-    /// Returns bounding spheres in this order: lights with a size, emissive objects on which points
-    /// are sampled, and the spatial groups (strata) of lights in `self.choice`.
+    /// Returns a sphere around each emitter, and then around each stratum of lights.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
-        let emitters = self.emitters.iter().map(|source| &source.light);
-        let emitters = emitters.map(|light| (light.center(), light.radius()));
-        let objects = self.emission.emitters().map(|light| (light.center, light.radius));
-        let balls = emitters.chain(objects);
-        let balls = balls.map(|(center, radius)| BoundingSphere { center, radius });
-        balls.chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
+        self.emitters.balls().chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
     }
 
-    /// Returns the number of lists of possible occluders: one for each light in `sources`, each
-    /// light with a size, each object from which light is sampled, and each stratum (spatial group
-    /// of lights) of `choice`. Environments have no list.
+    /// Returns the number of lists of possible occluders, see [`TileCandidates::occluders`].
     fn count(&self) -> usize {
         let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0] + strata
+        self.sources.len() + self.emitters.sampled() + strata
     }
 
     /// Returns the largest distance between a light on a surface and the end point of its shadow
@@ -328,9 +302,6 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// Compiled culling of a scene: the method that makes the candidate lists of a tile (primitives
-/// that a ray must be tested against), the candidates of all rays of the picture together, and the
-/// light buffers.
 struct CompiledCulling<S> {
     mode: CullingMode,
     all_candidates: TileCandidates,
@@ -338,8 +309,6 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling data of a scene. `outside_only` has one entry for each primitive:
-    /// `true` if rays hit it only from outside.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -383,8 +352,7 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns the region in which camera rays start: a sphere around the eye. It contains the lens and
-/// every start point on the near plane.
+/// Returns a sphere around the eye that contains the lens and every start point on the near plane.
 fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
@@ -479,7 +447,6 @@ impl<L: SimdFloat> World<L> {
             light_choice: lights.choice,
             emitters: lights.emitters,
             environments: lights.environments,
-            emission: lights.emission,
             culling: culling.mode,
             all_candidates: culling.all_candidates,
             light_buffers: culling.light_buffers,

@@ -10,25 +10,21 @@ use zerkalo_scene::camera::PerspectiveCamera;
 /// Largest number of pixels in a block that is traced together; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
 
-/// Block of up to [`MAX_BLOCK_PIXELS`] pixels that are traced together. Adjacent pixels share a
-/// packet; the last packet is filled with copies of the last pixel.
+/// Block of pixels. Adjacent pixels share a packet; the last packet is filled with copies of the
+/// last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    /// Column in the picture of each pixel of the block.
     x: [u32; MAX_BLOCK_PIXELS],
-    /// Row in the picture of each pixel of the block.
     y: [u32; MAX_BLOCK_PIXELS],
-    /// Key of each pixel's random numbers, see [`Sampler::key`].
+    /// See [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
-    /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: the x
-    /// coordinates of all pixels, then y, then z.
+    /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: all x,
+    /// then y, then z.
     corner_directions: [[S; MAX_BLOCK_PIXELS]; 3],
 }
 
 impl<S: Float> PixelBlock<S> {
-    /// Creates a block of pixels that are traced together. `replicate` is 0 for replicate A, 1 for
-    /// replicate B; each has half of the samples. `pixels` are the columns and rows of the pixels
-    /// in the picture, at most [`MAX_BLOCK_PIXELS`].
+    /// Creates a block of at most [`MAX_BLOCK_PIXELS`] `pixels`, pairs of column and row.
     pub fn new<L: SimdFloat<Scalar = S>>(
         camera: &PerspectiveCamera,
         sampler: &Sampler<L>,
@@ -63,27 +59,25 @@ impl<S: Float> PixelBlock<S> {
         out
     }
 
-    /// Returns the number of pixels in the block.
+    /// Returns the number of pixels.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Returns the column and the row of pixel `i` of the block.
+    /// Returns the column and the row of pixel `i`.
     pub fn pixel(&self, i: usize) -> (u32, u32) {
         (self.x[i], self.y[i])
     }
 
-    /// Returns two values for pixel `i`: the key of its random numbers, and the vector from the eye
-    /// to the pixel's upper left corner. Both are the same in all lanes.
+    /// Returns the key of pixel `i` and the vector to its corner, the same in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
-    /// Returns two values for each lane: the key of its pixel's random numbers, and the vector from
-    /// the eye to the pixel's upper left corner. The lanes hold the `WIDTH / COUNT` pixels of the
-    /// block from `first` on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` must be a power
-    /// of two, and `first` a multiple of `WIDTH / COUNT`.
+    /// Returns the keys of the `WIDTH / COUNT` pixels from `first` on and the vectors to their
+    /// corners. Each pixel occupies `COUNT` adjacent lanes. `COUNT` must be a power of two, and
+    /// `first` a multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,

@@ -6,7 +6,6 @@ use crate::integrator::path::{Counts, Path, Radiance};
 use crate::pixel_block::PixelBlock;
 use crate::world::World;
 use std::ops::Range;
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp::disk;
 use zerkalo_kernel::sampling::{PacketSampler, SampleSettings, Sampler};
@@ -22,13 +21,10 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Self { world, sampler: Sampler::new(*sampling, world.camera_dimensions()) }
     }
 
-    /// Creates the tracer of `pixels`. `replicate` is 0 for replicate A, 1 for replicate B; each
-    /// has half of the samples. `pixels` has at most
-    /// [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) pairs of column and row. All pixels
-    /// must be in the rectangle of the raster with the upper left corner `origin` and the size
-    /// `extent`, because culling uses this rectangle. Returns `None` if all samples in the
-    /// rectangle are black: no camera ray can hit a primitive, no light with a size and no
-    /// environment is visible, and the background is black.
+    /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
+    /// of column and row, in `replicate` 0 (A) or 1 (B). Culling uses the rectangle of the raster
+    /// with the upper left corner `origin` and the size `extent`, which must contain them. Returns
+    /// `None` if all samples in the rectangle are black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -42,8 +38,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
     }
 
-    /// Creates the tracer of `pixels` at any positions in the picture, without culling. `replicate`
-    /// is 0 for replicate A, 1 for replicate B; each has half of the samples.
+    /// Creates the tracer of `pixels` at any positions in the picture, without culling.
     pub fn scattered(
         &self,
         replicate: usize,
@@ -60,7 +55,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
 }
 
 /// Tracer of the samples of up to [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) pixels in
-/// one replicate (half of the samples). It tests rays against the candidate primitives of the tile.
+/// one replicate. It tests rays against the candidate primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,
@@ -130,13 +125,11 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let center = L::from_f64(0.5);
         let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
         let camera = world.camera();
-        let (origin, direction) = camera.rays(corner_directions, offset);
-        let mut path = Path::new(Ray { origin, direction });
+        let mut path = Path::new(camera.rays(corner_directions, offset));
         if let Some(lens) = camera.lens() {
             let (u, v) = sampler.lens();
             let (x, y, _) = disk(u, v);
-            let (origin, direction) = camera.lens_rays(lens, corner_directions, offset, (x, y));
-            path.ray = Ray { origin, direction };
+            path.ray = camera.lens_rays(lens, corner_directions, offset, (x, y));
         }
         let candidates = self.candidates.as_ref();
         world.trace(&mut path, candidates, sampler, active, &mut self.radiance);

@@ -5,35 +5,32 @@ use crate::culling::tile::{CullingMode, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::light_choice::LightChoice;
-use crate::light_groups::LightGroups;
-use crate::lights_on_surfaces::OnSurface;
-use crate::surface_emission::SurfaceEmission;
+use crate::lights::choice::LightChoice;
+use crate::lights::emitters::Emitters;
+use crate::lights::groups::LightGroups;
+use crate::lights::on_surfaces::OnSurface;
 use crate::tile_tracer::CameraTracer;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Aggregate;
 use zerkalo_kernel::sampling::{CameraDimensions, SampleSettings};
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{DeltaLight, Emitter, EnvironmentLight};
+use zerkalo_scene::light::{DeltaLight, EnvironmentLight};
 use zerkalo_scene::material::Bsdf;
 
 /// Compiled light of type `T`, with its light group. `S` is the scalar type.
 pub(super) struct LightSource<T, S> {
     pub light: T,
-    /// Index of the light group (part of the picture that the film stores separately) that the
-    /// light belongs to.
+    /// Index of the light group.
     pub group: usize,
-    /// Emission (colour times intensity) by which the tracer multiplies the light's samples, for a
-    /// light that shares its light group. `None` for a light with a group of its own.
+    /// Emission, colour times intensity, of a light that shares its group. `None` for a light with a
+    /// group of its own, whose samples are white.
     pub emission: Option<[S; 3]>,
-    /// `true` if the camera and reflected rays see the light. Lights without a size are never
-    /// visible; the field has no effect on them.
+    /// `true` if the camera and reflected rays see the light, which must have a size.
     pub visible: bool,
 }
 
 impl<T, S: Float> LightSource<T, S> {
-    /// Returns `value` times the light's emission (colour times intensity) if the light shares its
-    /// light group, otherwise `value`.
+    /// Returns `value` times the emission of a light that shares its group.
     #[inline(always)]
     pub fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
         match self.emission {
@@ -42,7 +39,7 @@ impl<T, S: Float> LightSource<T, S> {
         }
     }
 
-    /// Returns a copy of this source in which `light` takes the place of the light.
+    /// Returns this source with another `light`.
     #[inline(always)]
     pub fn with_light<U>(&self, light: U) -> LightSource<U, S> {
         let Self { group, emission, visible, .. } = *self;
@@ -53,18 +50,12 @@ impl<T, S: Float> LightSource<T, S> {
 /// Light without a size, and the end points of shadow rays to it.
 pub(super) struct ShadowRayTarget<S> {
     pub light: DeltaLight<S>,
-    /// End points of shadow rays to a light that is located on a surface. `None` for other lights,
-    /// whose shadow rays end at the light itself.
+    /// End points of the shadow rays; `None` if they end at the light itself.
     pub on_surface: Option<OnSurface<S>>,
 }
 
-/// A light without a size, with its light group.
 pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
 
-/// A light with a size, with its light group.
-pub(super) type EmitterSource<S> = LightSource<Emitter<S>, S>;
-
-/// An environment light, with its light group.
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 
 /// Scene compiled for the SIMD type `L`. Fields of features that the scene does not use are empty
@@ -79,15 +70,12 @@ pub struct World<L: SimdFloat> {
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<DeltaSource<L::Scalar>>,
-    /// Point and spot lights of which paths choose a few at each hit; `sources` holds the other
-    /// lights without a size. `None` if shadow rays go to all lights.
+    /// Point and spot lights of which paths choose a few at each hit. `None` if shadow rays go to
+    /// all lights.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
-    /// Lights with a size, and their light groups.
-    pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
-    /// Environment lights, and their light groups.
+    /// Lights with a size and emissive objects.
+    pub(super) emitters: Emitters<L::Scalar>,
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
-    /// Emission of objects with an emissive material.
-    pub(super) emission: SurfaceEmission<L::Scalar>,
     /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Index of the light group of the background. `None` if the background is black.
@@ -102,37 +90,30 @@ pub struct World<L: SimdFloat> {
     /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
     /// lists, without BVH and bounding boxes. Kernels have a faster instance for such worlds.
     pub(super) simple: bool,
-    /// Textures and bump maps of primitives. `None` if the scene has neither.
     pub(super) surface_textures: Option<SurfaceTextures<L>>,
-    /// Transmissive surfaces and the media between them. `None` if the scene has none.
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
-    /// Limits of diffuse bounces. `None` if the scene has no indirect diffuse light.
+    /// `None` if the scene has no indirect diffuse light.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
-    /// Smallest throughput with which a path continues. The throughput of a path is that of its
-    /// largest channel.
+    /// Smallest throughput, in its largest channel, with which a path continues.
     pub(super) min_weight: f64,
-    /// `true` if sampled directions that point into the surface are mirrored at its tangent plane.
+    /// See [`BsdfQuery::fold`](zerkalo_scene::material::BsdfQuery::fold).
     pub(super) fold: bool,
     pub(super) camera: PerspectiveCamera,
-    /// Candidate primitives of all rays of the picture together, for rays that belong to no tile.
+    /// Candidates for rays that belong to no tile.
     pub(super) all_candidates: TileCandidates,
-    /// Light buffer of each light without a size: its possible occluders by direction. Shadow rays
-    /// to a light without a buffer traverse the BVH.
+    /// Light buffer of each light in `sources`; shadow rays to a light without one traverse the BVH.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     pub(super) culling: CullingMode,
     pub(super) groups: LightGroups,
-    /// Name of each light group of the scene.
     pub(super) group_names: Vec<String>,
     /// Scale of each light group: the number of integer steps per unit of radiance in the film.
     pub(super) scales: Vec<f64>,
-    /// `true` if samples are distributed over the area of their pixel; `false` if they are at its
-    /// centre.
+    /// `true` if samples are distributed over the area of their pixel, not at its centre.
     pub(super) jitter: bool,
     pub(super) inventory: String,
-    /// One sentence for each setting of the scene that ends paths early, with an upper bound of the
-    /// light that is lost.
+    /// One sentence for each setting that ends paths early, with an upper bound of the lost light.
     pub(super) truncation_biases: Vec<String>,
 }
 
@@ -142,20 +123,17 @@ impl<L: SimdFloat> World<L> {
         self.scales.len()
     }
 
-    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film.
+    /// Returns the scale of each light group.
     pub fn scales(&self) -> &[f64] {
         &self.scales
     }
 
-    /// Returns `true` if samples are distributed over the area of their pixel, and `false` if they
-    /// are at its centre.
+    /// Returns `true` if samples are distributed over the area of their pixel.
     pub fn jitter(&self) -> bool {
         self.jitter
     }
 
-    /// Returns two flags: whether camera rays use random numbers for their position in the pixel,
-    /// and whether they use random numbers for their position on the lens.
+    /// Returns the random positions that camera rays use.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
     }
@@ -170,10 +148,8 @@ impl<L: SimdFloat> World<L> {
         CameraTracer::new(self, sampling)
     }
 
-    /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
-    /// those that can occlude shadow rays from the hit points of these camera rays. `origin` is the
-    /// upper left corner of the rectangle, and `extent` its size \[pixels\]. Returns `None` if rays
-    /// must be tested against all primitives.
+    /// Returns the candidates of the rectangle of the picture with the upper left corner `origin`
+    /// and the size `extent` \[pixels\]; `None` if rays must be tested against all primitives.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],
@@ -183,30 +159,28 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Returns the number of lists of possible occluders: one for each light, and one for each
-    /// stratum (spatial group) of the lights among which paths choose.
+    /// stratum of `light_choice`.
     pub(super) fn light_lists(&self) -> usize {
         self.all_candidates.occluders.len()
     }
 
-    /// Returns the index of the first stratum (spatial group of the lights among which paths
-    /// choose) in the lists of possible occluders.
+    /// Returns the index of the first stratum in the lists of possible occluders.
     #[inline(always)]
     pub(super) fn first_stratum(&self) -> usize {
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
+        self.sources.len() + self.emitters.sampled()
     }
 
     /// Returns `true` if the world has lights with a size, environment lights or emissive objects.
     #[inline(always)]
     pub(super) fn has_emitters(&self) -> bool {
-        !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
+        !self.emitters.is_empty() || !self.environments.is_empty()
     }
 
-    /// Returns `true` if all samples of a tile with these candidate primitives are black: its
-    /// camera rays have no candidate, the background is black, and no emitter is visible.
+    /// Returns `true` if all samples of a tile with these candidates are black.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()
-            && !self.emitters.iter().any(|source| source.visible)
+            && self.emitters.visible_lights().next().is_none()
             && !self.environments.iter().any(|source| source.visible)
     }
 

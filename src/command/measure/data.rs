@@ -1,5 +1,4 @@
-//! Results of `zerkalo measure` as JSON and CSV. The keys must not change, because scripts rely on
-//! them.
+//! Results of `zerkalo measure` as JSON and CSV. Scripts rely on the keys.
 
 use crate::command::measure::table::MeasureReport;
 use crate::measure::{Expected, Measured, Measurement, TimeToTarget, median, spread};
@@ -18,15 +17,13 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_levels: f64,
-    /// Largest relative uncertainty that the noise of the reference picture causes in a measured
-    /// error. Points of the error curves with too uncertain an error are left out.
+    /// Largest relative uncertainty of a measured error by the noise of the reference.
     errors_spread: f64,
-    /// Largest relative spread of a reported time over the repetitions of its render.
+    /// Largest relative spread of a time over the repetitions of its render.
     times_spread: f64,
-    /// Largest fraction of the processors' time that other programs used during a measured render.
-    /// Null if unknown.
+    /// Largest fraction of the processors' time that other programs used. Null if unknown.
     taken_by_others: Option<f64>,
-    /// Noise targets that were not reached, each with a range of extrapolated times.
+    /// Noise targets that were not reached, with ranges of extrapolated times.
     expected: &'a [Expected],
     variations: Vec<Variation<'a>>,
 }
@@ -40,17 +37,17 @@ struct Variation<'a> {
     samples_per_second_spread: Option<f64>,
     slope: Option<f64>,
     slope_standard_error: Option<f64>,
-    /// Efficiency of the render: 1 / (MSE of the linear picture x seconds).
+    /// 1 / (MSE of the linear picture x seconds).
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_levels: Option<f64>,
-    /// Smallest bias of the picture that can be distinguished from noise, in 8-bit levels.
+    /// Smallest bias that can be distinguished from noise.
     bias_least_levels: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
 }
 
-/// Point of an error curve: error of the picture after a number of samples and seconds.
+/// Point of an error curve.
 #[derive(Serialize)]
 struct Point {
     samples: u64,
@@ -64,8 +61,7 @@ struct Point {
     rel_mse: f64,
 }
 
-/// First columns of a line of the CSV file: the compared setting, its value, and the number of
-/// threads. The fields of [`Point`] are the columns after them.
+/// First columns of a line of CSV, before the fields of [`Point`].
 #[derive(Serialize)]
 struct Variant<'a> {
     setting: &'static str,
@@ -99,7 +95,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         slope: slope.map(|s| s.value),
         slope_standard_error: slope.map(|s| s.standard_error),
         efficiency: measured.efficiency(),
-        // The z-score of a difference without noise is infinite, which JSON cannot represent.
+        // Without noise, the z-score is infinite, which JSON cannot represent.
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
         bias_levels: measured.bias.map(|b| b.levels),
         bias_least_levels: measured.bias.map(|b| b.least_levels),
@@ -108,7 +104,6 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     }
 }
 
-/// Serialises the results of `zerkalo measure` as JSON.
 pub fn json(report: &MeasureReport) -> Vec<u8> {
     let m = report.measurement;
     let steadiness = m.steadiness();
@@ -135,7 +130,7 @@ pub fn json(report: &MeasureReport) -> Vec<u8> {
     bytes
 }
 
-/// Serialises the points of all error curves as CSV, one line per point.
+/// Serialises the points of all error curves, one line per point.
 pub fn csv(measurement: &Measurement) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for measured in &measurement.measured {

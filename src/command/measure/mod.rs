@@ -1,5 +1,4 @@
-//! `zerkalo measure`: measures the cost of accuracy on a scene. The result is a table, data files
-//! and a plot.
+//! `zerkalo measure`: measures the cost of accuracy on a scene.
 
 mod data;
 mod table;
@@ -16,7 +15,7 @@ use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
 use zerkalo_world::{self as world, AnyWorld};
 
-/// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
+/// Experiments without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
@@ -30,28 +29,11 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let document = read_scene_and_warn(&args.scene)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
-    let display = args.picture.display();
     let reference = args.reference.as_ref();
+    let display = args.picture.display();
     let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
     let reference = reference.transpose()?;
-    let threads = args.compute.threads();
-    let experiments = match (&args.only, args.full) {
-        (experiments, _) if !experiments.is_empty() => experiments.clone(),
-        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
-        _ => SHORT.to_vec(),
-    };
-    let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
-    let mut targets = args.noise.clone();
-    targets.sort_by(|a, b| b.total_cmp(a));
-    let plan = Plan {
-        targets,
-        experiments,
-        repetitions: usize::from(args.repetitions),
-        seconds,
-        threads,
-        seed: args.compute.seed,
-        display,
-    };
+    let plan = plan(args);
     let world = AnyWorld::compile(&scene, &world::Options::default());
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
@@ -67,7 +49,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
 
     let report = table::MeasureReport {
         scene: &args.scene,
-        threads,
+        threads: plan.threads,
         lanes,
         single,
         measurement: &measurement,
@@ -89,7 +71,26 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// File format of the plot: SVG or PNG.
+fn plan(args: &MeasureArgs) -> Plan {
+    let experiments = match (&args.only, args.full) {
+        (experiments, _) if !experiments.is_empty() => experiments.clone(),
+        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
+        _ => SHORT.to_vec(),
+    };
+    let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
+    let mut targets = args.noise.clone();
+    targets.sort_by(|a, b| b.total_cmp(a));
+    Plan {
+        targets,
+        experiments,
+        repetitions: usize::from(args.repetitions),
+        seconds,
+        threads: args.compute.threads(),
+        seed: args.compute.seed,
+        display: args.picture.display(),
+    }
+}
+
 enum Drawing {
     Svg,
     Png,
@@ -116,7 +117,7 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
     Ok(disk::write(path, &bytes)?)
 }
 
-/// Reads the reference picture at `path`, an EXR file that must have the given size.
+/// Reads the reference picture, an EXR file of the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = image_file::read_exr(path).map_err(failed)?;

@@ -4,19 +4,17 @@ use crate::measure::{Experiment, Measured, Measurement, Median, Steadiness, Time
 use std::fmt;
 use std::path::Path;
 
-/// Report of `zerkalo measure`: the measurement, and the scene and settings with which it was made.
-/// It is displayed as a text table.
+/// Measurement with its scene and settings, displayed as a text table.
 pub struct MeasureReport<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
-    /// `true` if the program renders the measured scene in single precision by default.
+    /// `true` if the scene is rendered in single precision by default.
     pub single: bool,
     pub measurement: &'a Measurement,
 }
 
 impl MeasureReport<'_> {
-    /// Returns the title for a plot of the measurement.
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
         format!("{}, {width} x {height}, {} threads", self.scene.display(), self.threads)
@@ -42,8 +40,8 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Returns the number of decimals with which `value` has three significant digits, but at most 2.
-/// `value` must be positive.
+/// Returns the number of decimals, at most 2, with which a positive `value` has three significant
+/// digits.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -63,8 +61,7 @@ fn reached(target: &TimeToTarget) -> String {
     format!("{bound}{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Formats a range of seconds from its lower to its upper end, such as `12.0 to 30.0 s`. If both
-/// ends have the same unit, the unit is written once.
+/// Formats a range of seconds, such as `12.0 to 30.0 s`.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
@@ -73,15 +70,12 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Relative spread of a time over repeated renders, above which the printed table warns that the
-/// times are unsteady.
+/// Spread of a time over repeated renders above which the table warns.
 const UNSTEADY: f64 = 0.1;
-/// Fraction of the processors' time that other programs use during a measurement, above which the
-/// printed table warns.
+/// Fraction of the processors' time of other programs above which the table warns.
 const STOLEN: f64 = 0.03;
 
-/// Returns a warning about the measured times if they are unsteady or other programs used the
-/// processors. Returns `None` otherwise.
+/// Returns a warning about unsteady times and other programs.
 fn caution(steadiness: &Steadiness) -> Option<String> {
     let Steadiness { spread, stolen, .. } = steadiness;
     let others = stolen.filter(|share| *share > STOLEN).map(|share| {
@@ -142,6 +136,33 @@ impl fmt::Display for MeasureReport<'_> {
             writeln!(f, "{warning}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
+        self.times(f, default)?;
+        let mut last = Experiment::Default;
+        for measured in &m.measured[1..] {
+            if measured.experiment != last {
+                last = measured.experiment;
+                self.heading(f, last)?;
+                self.row(f, &last.default_name(self.single, self.threads), default)?;
+            }
+            self.row(f, &measured.name, measured)?;
+        }
+        for experiment in &m.idle {
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
+        }
+        if m.measured.iter().any(|m| m.bias.is_some()) {
+            writeln!(
+                f,
+                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
+                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl MeasureReport<'_> {
+    fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
+        let m = self.measurement;
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
         for target in &m.targets {
@@ -172,30 +193,9 @@ impl fmt::Display for MeasureReport<'_> {
         if !m.expected.is_empty() {
             writeln!(f, "  ~ extrapolated from the convergence so far")?;
         }
-        let mut last = Experiment::Default;
-        for measured in &m.measured[1..] {
-            if measured.experiment != last {
-                last = measured.experiment;
-                self.heading(f, last)?;
-                self.row(f, &last.default_name(self.single, self.threads), default)?;
-            }
-            self.row(f, &measured.name, measured)?;
-        }
-        for experiment in &m.idle {
-            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
-        }
-        if m.measured.iter().any(|m| m.bias.is_some()) {
-            writeln!(
-                f,
-                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
-                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
-            )?;
-        }
         Ok(())
     }
-}
 
-impl MeasureReport<'_> {
     fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
         writeln!(
             f,

@@ -14,37 +14,32 @@ use zerkalo_terminal::{
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Shortest duration of a test transfer, round trip excluded, that gives a precise transfer rate.
-/// The test sends larger and larger transfers until one takes this long.
+/// Shortest duration of a test transfer, round trip excluded, that gives a precise rate.
 const MEASURED: Duration = Duration::from_millis(300);
-/// Number of bytes of the largest test transfer. The test ends after this transfer, even if it
-/// takes less than [`MEASURED`].
+/// Number of bytes of the largest test transfer.
 const MOST_BYTES: usize = 1 << 20;
 
 /// Capabilities of the terminal and of its connection, for `zerkalo doctor`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerminalReport {
-    /// Capabilities of the terminal, such as true colour and image protocols.
     pub terminal: Capabilities,
-    /// Method by which a dashboard on this terminal would limit the rate of its output.
+    /// Method by which a dashboard would limit the rate of its output.
     pub mode: PacingMode,
-    /// Numbers of columns and rows of the terminal.
+    /// Columns and rows.
     pub cells: [u16; 2],
-    /// Width and height of the terminal in pixels; `None` if unknown.
+    /// Width and height in pixels; `None` if unknown.
     pub pixels: Option<[u16; 2]>,
-    /// Measured transfer rate in bytes per second. `None` if the measurement was not requested, is
-    /// not possible on this connection, or has failed.
+    /// Measured transfer rate in bytes per second. `None` if it was not requested or cannot be
+    /// measured.
     pub rate: Option<f64>,
 }
 
 /// Queries the capabilities of the terminal at stdin and stdout. If `measure` is `true`, also
-/// measures the transfer rate, which takes a second or more. The state of the terminal is restored
-/// afterwards.
+/// measures the transfer rate, which takes a second or more.
 ///
-/// # Errors
-/// Fails if there is no terminal, or the terminal is closed during the query.
+/// # Errors Fails if there is no terminal, or the terminal is closed during the query.
 pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalReport> {
-    // The alternate screen hides text that a terminal prints for requests that it does not support.
+    // The alternate screen hides text that a terminal prints for requests that it does not know.
     let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
@@ -57,9 +52,8 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
     }
     let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
-    // A request must be wrapped to pass through a multiplexer. Otherwise the multiplexer itself
-    // replies, and the connection to the terminal is not measured. `through` is `None` if no
-    // transfer can be measured. Its inner `Option` is the multiplexer, if there is one.
+    // Without a wrapper, a multiplexer would reply itself. `through` is `None` if no transfer can
+    // be measured.
     let through = match mode {
         PacingMode::Unlimited => Some(None),
         PacingMode::AckClocked(through) => Some(through),
@@ -84,9 +78,8 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` to the terminal, followed by a request of the cursor position. The request is
-/// wrapped for the multiplexer `through`, if there is one. Returns the time until the reply, or
-/// `None` if no reply arrives within `patience`.
+/// Writes `before` and a request of the cursor position, wrapped for the multiplexer `through`.
+/// Returns the time until the reply, or `None` after `patience`.
 fn answer(
     tty: &Tty,
     input: &mut InputReader,
@@ -108,10 +101,8 @@ fn answer(
     }
 }
 
-/// Measures the transfer rate to the terminal in bytes per second. Each transfer has four times as
-/// many bytes as the one before. `through` is the multiplexer (such as tmux) for which requests are
-/// wrapped, if there is one. `round_trip` is the time from a request to its reply without a
-/// transfer. It is subtracted from each measured time. Returns `None` if a reply does not arrive.
+/// Measures the transfer rate in bytes per second by larger and larger transfers. `round_trip` is
+/// the time of a request without a transfer. Returns `None` if a reply does not arrive.
 fn rate(
     tty: &Tty,
     input: &mut InputReader,
@@ -133,9 +124,8 @@ fn rate(
     }
 }
 
-/// Returns escape sequences that move the cursor to the upper left corner and hide text, followed
-/// by `bytes` pseudo-random characters. SSH could compress regular text, which would distort the
-/// measured rate.
+/// Returns escape sequences that hide text, followed by `bytes` pseudo-random characters, which SSH
+/// cannot compress.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;

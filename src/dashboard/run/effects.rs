@@ -1,10 +1,10 @@
-//! Executor of the effects that the dashboard's function `update` returns.
+//! Executor of the effects that `update` returns.
 
-use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
+use crate::dashboard::{Effect, Format, Message};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;
@@ -17,8 +17,7 @@ use zerkalo_render::schedule::Settings;
 use zerkalo_render::session::Session;
 use zerkalo_scene::{Scene, SceneFile};
 
-/// Niceness of tracing threads with low priority: the largest value of Linux. Threads of normal
-/// priority get nearly all the time of a processor that they share with such a thread.
+/// Niceness of tracing threads with low priority: the largest value of Linux.
 const LOW_PRIORITY: i32 = 19;
 
 /// Action that the event loop must take after it has executed an effect.
@@ -34,8 +33,7 @@ pub enum Outcome {
     Quit,
 }
 
-/// Executor of the dashboard's effects. It owns the session, the threads of the scene file, and the
-/// exports.
+/// Executor of effects: the session, the threads of the scene file, and the exports.
 pub struct EffectRunner {
     /// Renderer of the scene, or reader of watched films.
     pub session: Session,
@@ -59,7 +57,7 @@ struct Editing {
 impl EffectRunner {
     /// Starts the threads that render, read and write. `file` is the scene file, or the path of an
     /// unreadable one. `state` is the folder for recovery files that cannot be written beside their
-    /// scene file. The results of effects are sent to `results`.
+    /// scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -81,8 +79,7 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
 
-    /// Starts the thread that reads `films`, which other processes write. Its reports are sent to
-    /// `results`, as are the results of effects.
+    /// Starts the thread that reads `films`, which other processes write.
     pub fn watching(
         films: WatchedFilms,
         threads: usize,
@@ -97,12 +94,11 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
-    /// Pauses or resumes rendering.
     pub fn rest(&self, resting: bool) {
         if resting { self.session.pause() } else { self.session.resume() }
     }
 
-    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal.
+    /// Executes `effect`. Its results arrive as messages.
     pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
             Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
@@ -134,7 +130,6 @@ impl EffectRunner {
         Outcome::Done
     }
 
-    /// Executes an effect of a dashboard with a scene.
     fn edit(&mut self, effect: Effect) {
         let Some(editing) = &mut self.editing else { return };
         match effect {
@@ -212,20 +207,17 @@ impl EffectRunner {
         });
     }
 
-    /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
-    /// editing. Blocks until the edits are written, at most for `patience`.
+    /// Writes unsaved edits to the recovery file at once. Blocks until they are written, at most
+    /// for `patience`.
     pub fn flush(&self, patience: Duration) {
         self.editing.iter().for_each(|editing| editing.files.flush(patience));
     }
 
-    /// Completes pending writes and ends the threads. First writes unsaved edits. Then waits until
-    /// `deadline` for the session and for pictures that are being written, or without limit if
-    /// `deadline` is `None`.
+    /// Completes pending writes and ends the threads. Waits until `deadline` for the session and
+    /// for pictures that are being written, or without limit if it is `None`. Returns the path of
+    /// the recovery file, or `None` if there are no unsaved edits.
     ///
-    /// Returns the path of the recovery file, or `None` if there are no unsaved edits.
-    ///
-    /// # Errors
-    /// Fails with the reason if unsaved edits are lost.
+    /// # Errors Fails with the reason if unsaved edits are lost.
     pub fn finish(self, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
         let Self { session, editing, exporting, .. } = self;
         let (kept, resized) = match editing {
@@ -245,8 +237,8 @@ impl EffectRunner {
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        // If the thread cannot be started, the closure `end` is dropped without being run. The
-        // session ends then, and pictures that were not written yet are lost.
+        // If the thread cannot be started, the session ends, and pictures that were not written are
+        // lost.
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }
@@ -256,8 +248,7 @@ impl EffectRunner {
 
 impl Editing {
     fn set_threads(&self, session: &Session) {
-        // If the threads cannot be started, the old ones continue. No message is needed, because
-        // the renderer's reports contain the number of threads.
+        // If the threads cannot be started, the old ones continue, as the renderer's reports show.
         let _ = session.set_threads(self.threads, self.niceness);
     }
 }

@@ -1,9 +1,6 @@
 //! Event loop of the dashboard. One thread updates the model and draws it. Work that may block runs
 //! in other threads, whose results come back through channels.
 
-use crate::dashboard::message::{Effect, Message};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::effects::{EffectRunner, Outcome};
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
@@ -11,6 +8,7 @@ use crate::dashboard::run::input::{self, Input};
 use crate::dashboard::run::job_control::{ResizeDebounce, TerminalIo, stop_group};
 use crate::dashboard::run::latency::LatencyRecorder;
 use crate::dashboard::update::update;
+use crate::dashboard::{Effect, Message, Model, Overlay};
 use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
 use std::sync::Arc;
@@ -19,42 +17,40 @@ use zerkalo_render::session::{Snapshot, State};
 use zerkalo_terminal::flow::LinkStatus;
 use zerkalo_terminal::{Event, HUNG_UP, Reply, TimedEvent};
 
-/// Shortest interval between two updates of the displayed connection status, and between two
-/// updates of the displayed upload progress.
+/// Shortest interval between updates of the displayed connection status or upload progress.
 pub const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Dashboard on a terminal.
 pub struct Dashboard {
     pub model: Model,
     pub effects: EffectRunner,
-    /// Receiver of the results of effects.
     pub done: Receiver<Message>,
     pub terminal_io: TerminalIo,
     pub frames: FramePipeline,
     pub latency: LatencyRecorder,
     pub began: Instant,
-    /// Generation of the visible picture: the version number of the scene that it shows.
+    /// Generation of the visible picture.
     pub shown: u64,
-    /// Counter that increases when the picture is replaced by a different one. It stays when more
-    /// samples refine the same picture.
+    /// Counter that increases when another picture replaces the present one, but not when more
+    /// samples refine it.
     pub image_epoch: u64,
     /// Changes of the terminal's size that have not taken effect yet.
     pub resizing: ResizeDebounce,
     /// Time at which the model last received the connection's status or upload progress.
     pub status_sent_at: Duration,
-    /// `true` if rendering is paused because the terminal no longer replies.
+    /// `true` if rendering is paused because the terminal does not reply.
     pub resting: bool,
-    /// `true` if the model has changed since the last frame was drawn.
+    /// `true` if the model has changed since the last frame.
     pub changed: bool,
-    /// `true` if the program is to be suspended after the messages that are being handled.
+    /// `true` if the program is to be suspended after the present messages.
     pub suspend: bool,
-    /// `true` if the program is to quit after the messages that are being handled.
+    /// `true` if the program is to quit after the present messages.
     pub quit: bool,
 }
 
 impl Dashboard {
-    /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
-    /// loss of the terminal ends the program, and `None` if the user quits.
+    /// Runs the event loop. Returns the exit status if a signal or the loss of the terminal ends
+    /// the program, and `None` if the user quits.
     pub fn event_loop(&mut self) -> io::Result<Option<u8>> {
         let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
         let wakeup = self.effects.session.wakeup().clone();
@@ -76,10 +72,7 @@ impl Dashboard {
                 Some(Duration::ZERO) => (&wakeup, None),
                 wait => (&silence, wait),
             };
-            let timer = match wait.into_iter().chain(wants_snapshot).min() {
-                Some(wait) => after(wait),
-                None => never(),
-            };
+            let timer = wait.into_iter().chain(wants_snapshot).min().map_or(never(), after);
             select! {
                 recv(input) -> event => match event {
                     Ok(Ok(event)) => self.enqueue(event, &mut waiting),
@@ -94,15 +87,11 @@ impl Dashboard {
                 recv(done) -> message => if let Ok(message) = message {
                     self.dispatch(message);
                 },
-                recv(written) -> frame => {
-                    if let Ok(written) = frame {
-                        self.frames.record_written();
-                        match written {
-                            Ok(at) => self.latency.written(at),
-                            Err(_) => return Ok(Some(HUNG_UP)),
-                        }
-                    }
-                }
+                recv(written) -> frame => if let Ok(result) = frame {
+                    self.frames.record_written();
+                    let Ok(at) = result else { return Ok(Some(HUNG_UP)) };
+                    self.latency.written(at);
+                },
                 recv(signals) -> event => {
                     if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
                         return Ok(Some(status));
@@ -121,8 +110,8 @@ impl Dashboard {
         Ok(None)
     }
 
-    /// Handles the user input in `waiting` and the results of effects. Returns the exit status if
-    /// the program is to end, otherwise `None`.
+    /// Handles user input and the results of effects. Returns the exit status if the program is to
+    /// end.
     fn handle(&mut self, waiting: &mut Vec<Input>) -> Option<u8> {
         for Input { at, message } in waiting.drain(..) {
             self.frames.flow.record_input(self.began.elapsed());
@@ -156,8 +145,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal, before the terminal is restored. Otherwise
-    /// the shell would read the replies as input.
+    /// Waits for outstanding replies of the terminal, which the shell would read as input
+    /// otherwise.
     pub fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -171,9 +160,8 @@ impl Dashboard {
         }
     }
 
-    /// Updates the model with `message` and executes the resulting effects. If the response to the
-    /// message needs a newly rendered picture, returns the number of the new version of the scene
-    /// (its generation). Otherwise returns `None`.
+    /// Updates the model and executes the effects. Returns the generation of the picture that the
+    /// response to the message needs, if it needs a new one.
     pub fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
@@ -186,9 +174,8 @@ impl Dashboard {
             match self.effects.run(effect, &mut self.frames) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
-                    // A change of lights alone needs no newly rendered picture: the current
-                    // snapshot has one picture per light group, and these are added up with new
-                    // weights.
+                    // A change of lights alone needs none: the snapshot has one picture per light
+                    // group.
                     let snapshot = self.model.snapshot.as_deref();
                     let relit =
                         scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
@@ -221,8 +208,8 @@ impl Dashboard {
         }
     }
 
-    /// Returns the time from now until a frame with a new picture may be sent. Returns `None` while
-    /// the last frame is still being written.
+    /// Returns the time until a frame with a new picture may be sent. Returns `None` while the last
+    /// frame is being written.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
         let flow = &self.frames.flow;
@@ -231,16 +218,14 @@ impl Dashboard {
         self.frames.writing_since.is_none().then(|| due.saturating_sub(now))
     }
 
-    /// Sends [`Message::Tick`] to the model if the time of its next timeout has come.
     fn wake(&mut self) {
         if self.model.next_timeout().is_some_and(|at| at <= self.began.elapsed()) {
             self.dispatch(Message::Tick);
         }
     }
 
-    /// Draws a frame if one is due and the connection has room for it. Returns the time from now
-    /// until this method must be called again, or `None` if it need not be called before the next
-    /// event.
+    /// Draws a frame if one is due and the connection has room for it. Returns the time until this
+    /// method must be called again; `None` means not before the next event.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
         if let Some(due) = self.resizing.due() {
@@ -275,8 +260,7 @@ impl Dashboard {
                         self.latency.sent(self.shown);
                         self.latency.written(Instant::now());
                     }
-                    // Generations of pictures begin at 1, so the value 0 means a frame without
-                    // picture.
+                    // Generations begin at 1; 0 means a frame without picture.
                     DrawOutcome::Text => self.latency.sent(0),
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
@@ -294,7 +278,7 @@ impl Dashboard {
     }
 
     /// Reports the progress of an image transfer to the model, at most once per
-    /// [`STATUS_INTERVAL`]. The end of the transfer is reported at once.
+    /// [`STATUS_INTERVAL`], and its end at once.
     fn report_upload(&mut self, now: Duration) {
         let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
         let known = match &self.model.overlay {
@@ -307,9 +291,8 @@ impl Dashboard {
         }
     }
 
-    /// Pauses rendering while the terminal does not reply, because pictures would not arrive.
-    /// Returns the time at which rendering will be paused unless a reply arrives before. Returns
-    /// `None` if rendering is paused for this reason already, or if no reply is expected.
+    /// Pauses rendering while the terminal does not reply. Returns the time at which rendering will
+    /// be paused unless a reply arrives before.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.flow.silent_at(self.frames.writing_since);
         let is_silent = silent_at.is_some_and(|at| at <= now);

@@ -1,11 +1,9 @@
-//! Frame pipeline: draws the model, compares the result with the contents of the terminal, encodes
-//! the differences and sends them.
+//! Frame pipeline: draws the model, and sends the differences from the contents of the terminal.
 
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{self, Writer};
 use crate::dashboard::view::{View, is_settled};
+use crate::dashboard::{Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;
@@ -15,44 +13,35 @@ use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
 use zerkalo_terminal::{Capabilities, Tty, copied, cursor_request};
 
-/// Sequences that start and end a synchronised update, which the terminal displays as a whole.
+/// Start and end of a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// Upper bound of the number of bytes of an acknowledgement request, that is, of a request of the
-/// cursor position. Inside of tmux such a request has 14 bytes.
+/// Upper bound of the number of bytes of an acknowledgement request, 14 inside tmux.
 const ACK_REQUEST_BYTES: usize = 16;
 
-/// Pipeline of frames to the terminal: drawing, difference, flow control, output.
 pub struct FramePipeline {
     view: View,
-    /// Difference between the contents of the terminal and the model.
     pub diff: FrameDiff,
-    /// Flow control of the connection to the terminal.
     pub flow: FlowControl,
-    /// Send queue of the SSH connection in the kernel; `None` if it cannot be read.
+    /// Send queue of the SSH connection in the kernel.
     queue: Option<TcpSendQueue>,
-    /// Known capabilities of the terminal. Late replies of the terminal add to them.
+    /// Known capabilities, to which late replies add.
     pub terminal: Capabilities,
-    /// Thread that writes frames to the terminal. The caller must report each of its results to
+    /// Thread that writes frames. Each of its results must be reported to
     /// [`FramePipeline::record_written`].
     pub writer: Writer,
-    /// Time at which the frame that is being written was passed to the writing thread; `None` if no
-    /// frame is being written, so that another one can be sent.
+    /// Time since which a frame is being written; `None` if another one can be sent.
     pub writing_since: Option<Duration>,
-    /// Number of bytes of all frames sent so far.
     pub sent: u64,
-    /// Last frame that was drawn. Some of its cells may not have been sent yet.
+    /// Last frame that was drawn, whose cells may not all have been sent.
     target: Buffer,
-    /// Position of the text cursor; `None` if it is invisible.
     cursor: Option<Position>,
-    /// Escape sequence that sets the terminal's clipboard, to be sent with the next frame. Empty if
-    /// there is nothing to copy.
+    /// Escape sequence that sets the clipboard, to be sent with the next frame.
     clipboard: String,
     tty: Arc<Tty>,
-    /// Upload of the image in the image viewer; `None` if there is no such image.
+    /// Upload of the viewed image.
     pub upload: Option<ImageUpload>,
-    /// Escape sequence that removes the previously viewed image from the screen, to be sent before
-    /// the next frame. Empty if there is nothing to remove.
+    /// Escape sequence that removes the previously viewed image, to be sent before the next frame.
     removal: Vec<u8>,
     /// `true` if the frame that is being written removes an image.
     removing: bool,
@@ -61,14 +50,13 @@ pub struct FramePipeline {
 /// Outcome of an attempt to draw and send a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrawOutcome {
-    /// The connection has no room for a frame. Nothing was drawn.
+    /// The connection has no room.
     Nothing,
-    /// The terminal's contents differ visibly from the model only in cells of the picture. These
-    /// cells will be sent later.
+    /// Visible differences remain in the picture, to be sent later.
     Deferred,
-    /// The terminal's contents have no visible differences from the model.
+    /// No visible differences remain.
     Same,
-    /// A part of an image for the viewer was sent. The model was not drawn.
+    /// A part of a viewed image was sent; the model was not drawn.
     Slice,
     /// A frame without picture cells was sent.
     Text,
@@ -77,8 +65,7 @@ pub enum DrawOutcome {
 }
 
 impl FramePipeline {
-    /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second;
-    /// `None` adapts the rate to the connection.
+    /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second.
     pub fn new(tty: Arc<Tty>, terminal: Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
@@ -100,21 +87,17 @@ impl FramePipeline {
         })
     }
 
-    /// Schedules a copy of `text` to the terminal's clipboard. The next frame contains the escape
-    /// sequence for it.
     pub fn copy(&mut self, text: &str) {
         self.clipboard = copied(text);
     }
 
-    /// Treats the contents of the terminal as unknown, so that the next frame redraws the whole
-    /// screen.
+    /// Treats the contents of the terminal as unknown: the next frame redraws the whole screen.
     pub fn forget(&mut self) {
         self.diff = FrameDiff::default();
         self.give_up();
     }
 
-    /// Starts to send the image that the image viewer of `model` shows, unless this image is being
-    /// sent already. Stops sending an image that the viewer no longer shows.
+    /// Sends the image that the viewer of `model` shows, and stops sending any other.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -128,7 +111,6 @@ impl FramePipeline {
         }
     }
 
-    /// Stops sending the viewed image and schedules the removal of the part that was sent.
     fn give_up(&mut self) {
         if let Some(upload) = self.upload.take() {
             let (removal, destroys) = upload.removal();
@@ -139,14 +121,13 @@ impl FramePipeline {
         }
     }
 
-    /// Sends the next part of the viewed image, at most as large as `budget` allows.
+    /// Sends the next part of the viewed image.
     fn slice(&mut self, now: Duration, budget: FrameBudget) -> DrawOutcome {
         let Some(upload) = self.upload.as_mut().filter(|_| budget.picture) else {
             return DrawOutcome::Nothing;
         };
         if !upload.has_begun() {
-            // A signal or panic sends the exit sequence to the terminal. From now on, this sequence
-            // must remove the image. Otherwise the image would stay on the terminal.
+            // The sequence that a signal or panic sends must also remove the image from now on.
             self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
@@ -156,26 +137,22 @@ impl FramePipeline {
         if upload.open {
             self.flow.sent_unasked(now, bytes.len());
         } else {
-            if let Some(through) = self.flow.ack_request() {
-                bytes.extend(cursor_request(through).as_bytes());
-            }
+            self.request_ack(&mut bytes);
             self.flow.sent(now, bytes.len(), true, 0);
         }
         self.send(bytes, now);
         DrawOutcome::Slice
     }
 
-    /// Passes a frame to the writing thread, which must not be writing another one.
+    /// Passes a frame to the writing thread, which must not be writing.
     fn send(&mut self, frame: Vec<u8>, now: Duration) {
         debug_assert!(self.writing_since.is_none(), "one frame at a time");
-        // Sending fails only after a panic of the thread.
         let _ = self.writer.frames.send(frame);
         self.writing_since = Some(now);
     }
 
-    /// Updates flow control at time `now`: stops waiting for overdue acknowledgements of the
-    /// terminal, and reads the length of the kernel's send queue if it is time for the next
-    /// reading.
+    /// Gives up overdue acknowledgements, and reads the length of the kernel's send queue if it is
+    /// time.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
@@ -183,9 +160,9 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which [`FramePipeline::draw`] must be called next. Returns `None` if
-    /// there is nothing to send until the next event. `changed` is `true` if the model has changed
-    /// since the last frame. `answers` is `true` if the frame would respond to user input.
+    /// Returns the time at which [`FramePipeline::draw`] must be called next, if not only after the
+    /// next event. `changed` is `true` if the model has changed since the last frame, and `answers`
+    /// if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let pending = self.diff.pending();
         let text = changed || pending.text || !self.removal.is_empty();
@@ -206,10 +183,9 @@ impl FramePipeline {
         }
     }
 
-    /// Draws the model if `changed` is `true`, and sends as many of the changed cells as the
-    /// connection has room for. `answers` is `true` if the frame responds to user input.
-    /// `image_epoch` is a counter that increases when another picture replaces the present one, but
-    /// not when more samples refine it. Must be called only if no frame is being written.
+    /// Draws the model if `changed` is `true`, and sends as many changed cells as the connection
+    /// has room for. `answers` is `true` if the frame responds to user input. Must be called only
+    /// if no frame is being written.
     pub fn draw(
         &mut self,
         model: &Model,
@@ -224,8 +200,7 @@ impl FramePipeline {
             if upload.open {
                 return self.slice(now, whole);
             }
-            // Cells of the picture are not sent if the viewed image covers them or is about to
-            // cover them.
+            // The viewed image covers the picture, or is about to.
             budget.picture &= !upload.follows(true);
         }
         if changed {
@@ -264,16 +239,19 @@ impl FramePipeline {
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
-        if let Some(through) = self.flow.ack_request() {
-            bytes.extend(cursor_request(through).as_bytes());
-        }
+        self.request_ack(&mut bytes);
         self.sent += bytes.len() as u64;
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.send(bytes, now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
-    /// Records that a frame was written to the terminal.
+    fn request_ack(&self, bytes: &mut Vec<u8>) {
+        if let Some(through) = self.flow.ack_request() {
+            bytes.extend(cursor_request(through).as_bytes());
+        }
+    }
+
     pub fn record_written(&mut self) {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);

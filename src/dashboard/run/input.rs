@@ -1,6 +1,6 @@
-//! Conversion of terminal events to messages for the model.
+//! Conversion of terminal events to messages.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;
@@ -11,15 +11,13 @@ use zerkalo_terminal::{InputReader, TimedEvent};
 /// User input with the time at which it was read.
 #[derive(Debug)]
 pub struct Input {
-    /// Time at which the input event was read. If several events were merged into one, the time of
-    /// the first.
+    /// Time of the first of the events that were merged into this one.
     pub at: Instant,
-    /// Message about the input, for the dashboard's model.
     pub message: Message,
 }
 
-/// Starts a thread that reads terminal events until a read fails. The thread sends the events to
-/// the returned receiver, and finally the error.
+/// Starts a thread that sends terminal events to the returned receiver, until a read fails; then
+/// the error.
 pub fn read(mut reader: InputReader) -> io::Result<Receiver<io::Result<TimedEvent>>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
@@ -40,9 +38,8 @@ pub fn read(mut reader: InputReader) -> io::Result<Receiver<io::Result<TimedEven
     Ok(receiver)
 }
 
-/// Appends `input` to `queue`, the user input that waits to be handled. Some successive events are
-/// merged into one. Drags are merged into one with the newest position, and resizes into one with
-/// the newest size. Ticks of the mouse wheel are added up.
+/// Appends `input` to `queue`. Successive drags are merged into one with the newest position, and
+/// resizes into the newest. Ticks of the mouse wheel are added up.
 pub fn join(queue: &mut Vec<Input>, input: Input) {
     if let Some(last) = queue.last_mut() {
         match (&mut last.message, &input.message) {

@@ -1,6 +1,6 @@
-//! Job control by the shell (suspend and resume), resizing, and loss of the terminal.
+//! Job control by the shell, resizing, and loss of the terminal.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::event_loop::Dashboard;
 use crossbeam_channel::Receiver;
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
@@ -10,61 +10,50 @@ use std::thread;
 use std::time::Duration;
 use zerkalo_terminal::{HUNG_UP, SignalEvent, SignalQueue, Signals, TimedEvent, Tty, size};
 
-/// Grace period after a terminating signal. If the dashboard has not ended by then, the thread that
-/// handles signals restores the terminal and ends the program.
+/// Grace period after a terminating signal.
 pub const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Longest time from a terminating signal to the end of the dashboard, even if the renderer is
-/// busy. It is so much shorter than the grace period that the program can still report where
-/// unsaved edits are kept.
+/// Longest time from a terminating signal to the end of the dashboard, so much shorter than the
+/// grace period that the program can report where unsaved edits are kept.
 pub const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
-/// Longest delay of changes of the terminal's size, measured from the first of several changes.
+/// Longest delay of changes of the terminal's size, from the first of several on.
 const LONGEST: Duration = Duration::from_millis(400);
 /// Longest wait for the write of the recovery file before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait until the stop signal has stopped the process. If the process has not stopped by
-/// then, the program resumes.
+/// Longest wait until a stop signal has stopped the process. Otherwise the program resumes.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Terminal, and the receivers of its events.
 #[derive(Clone)]
 pub(super) struct TerminalIo {
-    /// Terminal, for output.
     pub tty: Arc<Tty>,
-    /// Receiver of the terminal's input events.
     pub input: Receiver<io::Result<TimedEvent>>,
-    /// Receiver of signals to the process.
     pub signals: Receiver<SignalEvent>,
-    /// Receiver of the notification that the terminal has been restored and will not be set up
-    /// again, for example because of a panic.
+    /// Notification that the terminal has been restored for good, for example after a panic.
     pub left: Receiver<()>,
 }
 
-/// Debounce of changes of the terminal's size: several changes in quick succession take effect
-/// once. The fields are the times of the first and of the last of these changes. `None` if no
-/// change is pending.
+/// Debounce of changes of the terminal's size: the times of the first and of the last change.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
 impl ResizeDebounce {
-    /// Records a change of the terminal's size at time `now`.
     pub fn note(&mut self, now: Duration) {
         let first = self.0.map_or(now, |(first, _)| first);
         self.0 = Some((first, now));
     }
 
-    /// Returns the time at which a pending change of the terminal's size takes effect. Returns
-    /// `None` if no change is pending.
+    /// Returns the time at which a pending change takes effect.
     pub fn due(&self) -> Option<Duration> {
         self.0.map(|(first, last)| (last + SETTLED).min(first + LONGEST))
     }
 }
 
-/// Handles the signals in `queue`. If the program is still running when `patience` has passed after
-/// a terminating signal, restores the terminal and ends the program.
+/// Handles signals. If the program is still running when `patience` has passed after a terminating
+/// signal, restores the terminal and ends the program.
 pub fn handle_signals(
     queue: SignalQueue,
     tty: Arc<Tty>,
@@ -77,21 +66,19 @@ pub fn handle_signals(
     })
 }
 
-/// Stops this process, which may still run for a moment after this function returns. The signal is
-/// SIGTTIN, because SIGTSTP has a handler in this program. Nothing happens if no shell could
-/// continue the process: the kernel ignores SIGTTIN in orphaned process groups.
+/// Stops this process by SIGTTIN, because SIGTSTP has a handler. It may still run for a moment. The
+/// kernel ignores SIGTTIN in orphaned process groups, which no shell could continue.
 pub fn stop_process() -> rustix::io::Result<()> {
     kill_process(getpid(), Signal::TTIN)
 }
 
-/// Stops all processes in the group of this process as [`stop_process`] does. Ctrl-Z in a shell
-/// suspends such a group.
+/// Stops the group of this process as [`stop_process`] does, and as Ctrl-Z in a shell.
 pub fn stop_group() -> rustix::io::Result<()> {
     kill_current_process_group(Signal::TTIN)
 }
 
 impl Dashboard {
-    /// Handles a signal. Returns the exit status if the program is to end, otherwise `None`.
+    /// Handles a signal. Returns the exit status if the program is to end.
     pub(super) fn handle_signal(&mut self, event: SignalEvent) -> Option<u8> {
         match event {
             SignalEvent::End(status) => Some(status),
@@ -100,15 +87,13 @@ impl Dashboard {
                 None
             }
             SignalEvent::Stop => self.suspend(stop_process),
-            // The process may have been stopped by SIGSTOP, which it cannot handle. The terminal is
-            // therefore set up again.
+            // After a SIGSTOP, which has no handler, the terminal is set up again.
             SignalEvent::Continue => self.resume(),
         }
     }
 
-    /// Restores the terminal and stops the process by `stop`. Sets up the terminal again when the
-    /// shell continues the process. Returns the exit status if the program is to end instead,
-    /// otherwise `None`.
+    /// Restores the terminal and stops the process by `stop`, until the shell continues it. Returns
+    /// the exit status if the program is to end instead.
     pub(super) fn suspend(&mut self, stop: fn() -> rustix::io::Result<()>) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
@@ -130,8 +115,8 @@ impl Dashboard {
         end
     }
 
-    /// Sets up the terminal again after a suspension and redraws the whole screen. Returns the exit
-    /// status [`HUNG_UP`] if the terminal is gone, otherwise `None`.
+    /// Sets up the terminal again and redraws the screen. Returns the exit status if the terminal
+    /// is gone.
     fn resume(&mut self) -> Option<u8> {
         if self.terminal_io.tty.resume().is_err() {
             return Some(HUNG_UP);
@@ -140,12 +125,10 @@ impl Dashboard {
         None
     }
 
-    /// Adopts the current terminal size and redraws the whole screen.
     pub(super) fn resize(&mut self) {
         self.resizing = ResizeDebounce::default();
         self.frames.forget();
-        // An error of `size` is ignored. If its cause is the loss of the terminal, the write of the
-        // next frame fails.
+        // If the terminal is lost, the write of the next frame fails.
         let screen = size().unwrap_or(self.model.screen);
         self.dispatch(Message::Resize(screen));
     }

@@ -1,5 +1,5 @@
-//! Measurement of input latency: the time from reading an input event until the frame that responds
-//! to the event has been written to the terminal.
+//! Measurement of input latency: from reading an event until the frame that responds has been
+//! written.
 
 use std::io;
 use std::path::Path;
@@ -10,55 +10,45 @@ use zerkalo_scene::disk;
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
-    /// Lowest generation (version number of the scene) whose picture responds to the event.
-    /// Pictures of later generations respond, too. 0 means that any frame responds.
+    /// Lowest generation whose picture responds to the event. 0: any frame responds.
     scene: u64,
 }
 
 /// Input event to which a frame has responded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Answered {
-    /// Time at which the input event was read, measured from the start of the recorder.
+    /// Time at which the event was read, since the start of the recorder.
     read: Duration,
-    /// `true` if the response to the input is a new picture.
+    /// `true` if the response is a new picture.
     picture: bool,
-    /// Time from reading the event until the response was written.
+    /// Time until the response was written.
     after: Duration,
 }
 
-/// Recorder of input latencies. It always tracks the input events that await a response: the event
-/// loop sends the frame with the response at once, without waiting for the frame interval. The
-/// recorder stores latencies only on request.
+/// Recorder of input latencies. It always knows the events that await a response, because the event
+/// loop sends such a frame at once; it stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
-    /// Input events to which no frame has responded.
     awaiting: Vec<Awaiting>,
-    /// Input events to which the frame that is being written responds.
+    /// Events to which the frame that is being written responds.
     in_flight: Vec<Awaiting>,
-    /// Input events with their latencies. `None` if latencies are not stored, because they were not
-    /// requested.
     answered: Option<Vec<Answered>>,
     load: Load,
 }
 
-/// Traffic to the terminal, counted only while the terminal differs visibly from the picture that
-/// it should show.
+/// Traffic while the terminal differs visibly from the picture that it should show.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// Time of the last update, and two values at this time: `true` if the terminal differed
-    /// visibly from the picture that it should show, and the number of bytes sent since the start.
+    /// Time of the last update, `true` if the terminal differed visibly then, and the bytes sent
+    /// until then.
     last: (Duration, bool, u64),
-    /// Total time during which the terminal differed visibly from the picture that it should show.
     waited: Duration,
-    /// Number of bytes of the frames after which the terminal still differed visibly from the
-    /// picture that it should show.
     bytes: u64,
 }
 
 impl LatencyRecorder {
-    /// Creates a recorder of input latencies. If `remember` is `true`, they are stored for
-    /// [`LatencyRecorder::write`] and [`LatencyRecorder::summary`].
+    /// Creates a recorder, which stores latencies if `remember` is `true`.
     pub fn new(remember: bool) -> Self {
         Self {
             began: Instant::now(),
@@ -69,26 +59,24 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records an input event that was read at `read` and has been handled. `scene` is the
-    /// generation (number of a version of the scene) that the response must show; `None` if any
-    /// frame is a response.
+    /// Records an event that has been handled. `scene` is the generation that the response must
+    /// show; `None` if any frame is a response.
     pub fn event(&mut self, read: Instant, scene: Option<u64>) {
         self.awaiting.push(Awaiting { read, scene: scene.unwrap_or(0) });
     }
 
-    /// Returns `true` if a frame with the picture of generation `scene` (version number of the
-    /// scene) would respond to an input event.
+    /// Returns `true` if a frame with the picture of generation `scene` would respond to an event.
     pub fn replies(&self, scene: u64) -> bool {
         self.awaiting.iter().any(|waiting| waiting.scene <= scene)
     }
 
-    /// Records that a frame is being written. `scene` is the generation (number of a version of the
-    /// scene) of the picture in the frame; 0 means a frame without picture.
+    /// Records that a frame with the picture of generation `scene` (0: without picture) is being
+    /// written.
     pub fn sent(&mut self, scene: u64) {
         self.in_flight.extend(self.awaiting.extract_if(.., |waiting| waiting.scene <= scene));
     }
 
-    /// Records that the frame passed to [`LatencyRecorder::sent`] was completely written at `at`.
+    /// Records that the frame was written.
     pub fn written(&mut self, at: Instant) {
         for waiting in self.in_flight.drain(..) {
             if let Some(answered) = &mut self.answered {
@@ -101,25 +89,21 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records the traffic to the terminal at time `now`, after a frame. `waits` is `true` if the
-    /// terminal still differs visibly from the picture that it should show. `sent` is the number of
-    /// bytes sent since the start.
+    /// Records the traffic after a frame. `waits` is `true` if the terminal still differs visibly.
+    /// `sent` is the number of bytes since the start.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
             self.load.waited += now.saturating_sub(before);
         }
-        // The bytes of a frame count only if the terminal still differs from the picture after the
-        // frame.
         if waits {
             self.load.bytes += sent - known;
         }
         self.load.last = (now, waits, sent);
     }
 
-    /// Writes a CSV file with one line per event. The columns are the seconds from the start until
-    /// the event was read, the kind of response (`picture`, or `screen` for any other frame), and
-    /// the latency in milliseconds. Events without response are left out.
+    /// Writes a CSV file with one line per event: seconds from the start until it was read, kind of
+    /// response (`picture` or `screen`), latency in milliseconds.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         let mut table = "read_seconds,answer,milliseconds\n".to_string();
         for Answered { read, picture, after } in self.answered.iter().flatten() {
@@ -130,9 +114,8 @@ impl LatencyRecorder {
         disk::write(path, table.as_bytes()).map_err(io::Error::other)
     }
 
-    /// Returns the lines of a summary of input latencies: one for events with a picture as
-    /// response, one for other events, and one for the traffic to the terminal. Lines without data
-    /// are left out.
+    /// Returns a summary: a line for events with a picture as response, one for others, and one for
+    /// the traffic.
     pub fn summary(&self) -> Vec<String> {
         let summary_of = |wanted: bool, name: &str| {
             let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
@@ -162,8 +145,8 @@ impl LatencyRecorder {
     }
 }
 
-/// Returns a quantile of `sorted`: the smallest element such that at least the fraction `share` (0
-/// to 1) of all elements is less than or equal to it. Returns 0 if `sorted` is empty.
+/// Returns the smallest element that at least the fraction `share` of `sorted` does not exceed; 0
+/// if it is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()

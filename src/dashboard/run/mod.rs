@@ -1,4 +1,4 @@
-//! Dashboard on the terminal at stdin and stdout, from its start to its end.
+//! Dashboard on the terminal at stdin and stdout.
 
 mod diagnose;
 mod effects;
@@ -12,8 +12,7 @@ mod latency;
 mod worker;
 mod writer;
 
-use crate::dashboard::message::{Exported, Message};
-use crate::dashboard::model::Model;
+use crate::dashboard::{Exported, Message, Model};
 use crossbeam_channel::{Receiver, unbounded};
 use effects::EffectRunner;
 use event_loop::Dashboard;
@@ -35,54 +34,45 @@ use zerkalo_terminal::{
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
 
-/// Parameters with which a dashboard is run.
+/// Parameters of a dashboard.
 pub struct Setup {
-    /// Scene file. For an unreadable file, its path and the errors in it.
+    /// Scene file. For an unreadable one, its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// Checkpoint from which the render of this scene continues; `None` for a new render.
+    /// Checkpoint from which the render continues.
     pub checkpoint: Option<Checkpoint>,
-    /// Folder for recovery files that cannot be written beside their scene file; `None` if there is
-    /// none.
+    /// Folder for recovery files that cannot be written beside their scene file.
     pub state: Option<PathBuf>,
-    /// Number of tracing threads, at least 1.
     pub threads: usize,
-    /// Options of scene compilation and sampling.
     pub options: Options,
-    /// Settings of sample allocation (the distribution of samples over the picture), and the
-    /// initial stop criteria.
+    /// Settings of sample allocation, and the initial stop criteria.
     pub settings: Settings,
-    /// Settings of the terminal.
     pub terminal: TerminalSetup,
-    /// Path of the CSV file to which input latencies are written; `None` to measure none.
+    /// Path of the CSV file for input latencies; `None` to measure none.
     pub trace: Option<PathBuf>,
 }
 
-/// Settings of the terminal, from the command line and the environment.
+/// Settings of the terminal.
 #[derive(Debug)]
 pub struct TerminalSetup {
-    /// Set of colours that is used on the terminal; `None` to use the detected one.
+    /// Set of colours; `None` to use the detected one.
     pub colors: Option<Colors>,
-    /// Environment variables that describe the terminal.
     pub environment: Environment,
-    /// Fixed rate of output in bytes per second; `None` to adapt it to the connection.
+    /// Fixed rate of output in bytes per second; `None` adapts it to the connection.
     pub bandwidth: Option<f64>,
 }
 
 /// Result of a dashboard after it has ended.
 #[derive(Debug)]
 pub struct Ended {
-    /// Exit status if a signal or the loss of the terminal has ended the dashboard; `None` if the
-    /// user has quit.
+    /// Exit status if a signal or the loss of the terminal has ended the dashboard.
     pub signalled: Option<u8>,
-    /// Result of each export that ended after the screen was restored: the image, or the error.
+    /// Exports that ended after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Path of the recovery file with unsaved edits, which the next start of the program offers to
-    /// recover. `None` if all edits are saved. If unsaved edits are lost, an error with the reason.
+    /// Path of the recovery file with unsaved edits, or the reason why unsaved edits are lost.
     pub kept: Result<Option<PathBuf>, String>,
-    /// Result of each write of a checkpoint that ended after the screen was restored: the path of
-    /// the file, or the error.
+    /// Checkpoints that ended after the screen was restored.
     pub checkpoints: Vec<Result<PathBuf, String>>,
-    /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
+    /// Summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
 }
 
@@ -93,8 +83,7 @@ impl Ended {
     }
 }
 
-/// Runs a dashboard on the terminal at stdin and stdout until the user quits, a terminating signal
-/// arrives or the terminal is lost.
+/// Runs a dashboard until the user quits, a terminating signal arrives or the terminal is lost.
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
     let (scene, file) = match file {
@@ -119,23 +108,20 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     run_on_terminal(effects, done, model, terminal, trace)
 }
 
-/// Shows `films`, which other processes write, until the user quits, a terminating signal arrives
-/// or the terminal is lost. `threads` is the number of threads that compute noise estimates and
-/// pictures. No thread traces rays.
+/// Shows `films`, which other processes write, as [`run`] shows a scene. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;
-    // This waits for the first report, so that the first frame shows the table of films.
+    // The first frame shows the table of films.
     if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
         let _ = results.send(report);
     }
     run_on_terminal(effects, done, model, terminal, None)
 }
 
-/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. `done` receives
-/// the results of effects. The screen size and the colours in `model` are replaced by those of the
-/// terminal. `trace` is the path of the file for input latencies.
+/// Runs a dashboard with `model`. `done` receives the results of effects. `trace` is the path of
+/// the file for input latencies.
 fn run_on_terminal(
     effects: EffectRunner,
     done: Receiver<Message>,
@@ -179,30 +165,27 @@ fn run_on_terminal(
     while let Ok(message) = dashboard.done.try_recv() {
         dashboard.dispatch(message);
     }
-    // This message also informs the renderer of the size of the picture in half cells (upper and
-    // lower halves of terminal cells).
+    // This also informs the renderer of the size of the picture.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let result = dashboard.event_loop();
     end(dashboard, screen, result, trace)
 }
 
-/// Restores the terminal and completes pending writes after the event loop has ended with `result`.
+/// Restores the terminal and completes pending writes.
 fn end(
     mut dashboard: Dashboard,
     screen: Screen,
     result: io::Result<Option<u8>>,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
-    // If the user quits, the program waits without limit for pictures that are being written. If a
-    // signal or the loss of the terminal ends it, the wait is limited.
+    // If the user quits, the wait for pictures that are being written has no limit.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + ENDED_WITHIN);
-    // This call makes the autosave thread write unsaved edits before this thread may block. With a
-    // timeout of 0, the call does not wait for the write.
+    // The autosave thread writes unsaved edits before this thread may block.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers();
     }
-    // The screen is restored before the remaining files are written, which may take a while.
+    // The remaining writes may take a while.
     drop(screen);
     let kept = dashboard.effects.finish(deadline);
     let mut ended = Ended::new(result?, kept);
@@ -220,10 +203,9 @@ fn end(
     Ok(ended)
 }
 
-/// Longest time that `zerkalo watch` waits, when it starts, for the first report on the files.
+/// Longest wait for the first report on watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
-/// Default stop criterion: a noise of half an 8-bit level, which is half a quantisation step of an
-/// 8-bit image file.
+/// Default stop criterion: half a quantisation step of an 8-bit image file.
 pub const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };

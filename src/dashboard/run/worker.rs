@@ -5,7 +5,7 @@ use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Handle of a thread that may never end, because it may wait for a disk or for the renderer.
+/// Handle of a thread that may wait for a disk or the renderer without end.
 pub struct Worker {
     thread: JoinHandle<()>,
     /// Receiver that is disconnected at the end of the thread.
@@ -13,7 +13,6 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread `name`, which runs `run`.
     pub fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<Self> {
         let (running, ended) = bounded(0);
         let thread = thread::Builder::new().name(name.into()).spawn(move || {
@@ -23,8 +22,8 @@ impl Worker {
         Ok(Self { thread, ended })
     }
 
-    /// Waits until the thread has ended, at most for `patience`, or without limit if `patience` is
-    /// `Duration::MAX`. Returns `true` if the thread has ended.
+    /// Waits for the end of the thread, at most for `patience`, without limit for `Duration::MAX`.
+    /// Returns `true` if it has ended.
     pub fn join_within(self, patience: Duration) -> bool {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
             return false;

@@ -7,16 +7,12 @@ use std::thread;
 use std::time::Instant;
 use zerkalo_terminal::Tty;
 
-/// Channels of the thread that writes frames to the terminal, one at a time.
 pub struct Writer {
-    /// Sender of frames.
     pub frames: Sender<Vec<u8>>,
-    /// Receiver of one result for each frame: the time at which it was completely written, or the
-    /// error.
+    /// Time at which each frame was completely written, or the error.
     pub written: Receiver<io::Result<Instant>>,
 }
 
-/// Starts the thread that writes frames to `tty`.
 pub fn start(tty: Arc<Tty>) -> io::Result<Writer> {
     let (frames, inbox) = bounded::<Vec<u8>>(1);
     let (results, written) = bounded(1);

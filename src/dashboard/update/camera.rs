@@ -1,33 +1,30 @@
 //! Commands that move the camera, by keys and mouse.
 
-use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::{Coalesce, Direction, StepSize};
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::{
     Edit, EditError, Target, bounds, pivot_distance, recall_view, scene_bounds, step_length,
 };
 
-/// Angle in degrees of one step of orbiting or rolling the camera.
+/// Angle of one step of orbiting or rolling.
 const ORBIT_DEGREES: f64 = 5.0;
-/// Angle in degrees of one step of turning the camera about the eye.
+/// Angle of one step of rotating the camera about the eye.
 const LOOK_DEGREES: f64 = 3.0;
-/// Length of one step of panning the camera, as a fraction of the distance between the eye and the
-/// pivot (the point that the camera orbits).
+/// Length of one step of panning, as a fraction of the distance between the eye and the pivot, the
+/// point that the camera orbits.
 const PAN_SHARE: f64 = 0.05;
-/// Factor by which a coarse step towards the pivot (the point that the camera orbits) multiplies
-/// the distance between eye and pivot.
+/// Factor of the distance between eye and pivot for a coarse step.
 const DOLLY: f64 = 0.9;
-/// Factor by which a fine step towards the pivot (the point that the camera orbits) multiplies the
-/// distance between eye and pivot.
+/// Factor of the distance between eye and pivot for a fine step.
 const DOLLY_FINE: f64 = 0.99;
-/// Factor by which one step of zooming in multiplies the width of the camera's view.
+/// Factor of the width of the view for one step of zooming in.
 const ZOOM: f64 = 0.95;
 
 impl UpdateContext<'_> {
-    /// Replaces the camera by the result of `f`. The arguments of `f` are the camera and the
-    /// distance from the eye to the pivot, the point that the camera orbits. `coalesce` decides if
-    /// the move joins the previous undo step. Because all camera moves have the same label, moves
-    /// of different kinds can join.
+    /// Replaces the camera by the result of `f` for the camera and its distance from the pivot. All
+    /// camera moves have the same label, so that moves of different kinds can join.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));
@@ -35,7 +32,7 @@ impl UpdateContext<'_> {
             return;
         }
         let next = Scene { camera, ..Scene::clone(scene) };
-        // Camera moves keep a valid camera valid, so the scene is not validated again.
+        // Camera moves keep a valid camera valid.
         let edit =
             Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
         self.commit(Ok::<_, EditError>(edit), coalesce);
@@ -60,8 +57,7 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    /// Moves the camera by `ticks` of the mouse wheel: nearer to its pivot (the point that it
-    /// orbits) if they are positive, otherwise farther away.
+    /// Moves the camera by `ticks` of the mouse wheel, nearer to its pivot if they are positive.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
@@ -83,21 +79,19 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    /// Widens the camera's view by `steps` steps of about 5 % of its width. Negative steps narrow
-    /// it.
+    /// Widens the view by `steps` steps of about 5 %; negative steps narrow it.
     pub(super) fn view_angle(&mut self, steps: i32) {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
         self.say(format!("{key} view angle {degrees}°"));
     }
 
-    /// Moves the camera so that the selection fills the picture. If the selection has no bounds,
-    /// the whole scene fills it.
+    /// Moves the camera so that the selection, or else the whole scene, fills the picture.
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
         let [width, height] = scene.film.size.map(f64::from);
-        // If the bounds have no extent, a radius is chosen that also shows the surroundings.
+        // Bounds without extent get a radius that also shows the surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
         self.set_camera(Coalesce::Single, |camera, _| {
             camera.framed(ball.center, radius, width / height)
@@ -122,9 +116,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Orbits the camera by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). The scene follows the drag. A drag across the full width of the picture
-    /// orbits the camera by 180 degrees.
+    /// Orbits the camera by a drag in half cells: by 180 degrees across the picture.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -132,9 +124,7 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Turns the camera about the eye by a drag of `right` and `down` half cells (upper or lower
-    /// halves of terminal cells). A drag across the full width of the picture turns the camera by
-    /// 90 degrees.
+    /// Rotates the camera about the eye by a drag in half cells: by 90 degrees across the picture.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -142,9 +132,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Pans the camera by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). Points stay under the mouse if they are at the depth of the pivot, the
-    /// point that the camera orbits.
+    /// Pans the camera by a drag in half cells. Points at the depth of the pivot stay under the
+    /// mouse.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -152,17 +141,15 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Returns half the width of the camera's view at distance 1 in front of the eye, in scene
-    /// units.
+    /// Returns half the width of the view at distance 1 in front of the eye.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.scene();
         let [width, height] = scene.film.size.map(f64::from);
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Returns the amount of a camera movement for a drag by one half cell (upper or lower half of
-    /// a terminal cell). `across` is the amount for a drag across the full width of the picture.
-    /// Returns 0 if the terminal is too small for a picture.
+    /// Returns the amount for a drag by one half cell, if `across` is that for the width of the
+    /// picture. Returns 0 if there is no room for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

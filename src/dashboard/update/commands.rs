@@ -1,74 +1,59 @@
-//! Command table: each row is a command with its keys, label, hints, availability and function.
-//!
-//! Key dispatch, hint line, help, command palette and docs/keys.md are derived from the table.
+//! Command table, from which key dispatch, hint line, help, command palette and docs/keys.md are
+//! derived.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
-use crate::dashboard::message::{Effect, Format};
-use crate::dashboard::model::{CompareView, Mode, Model};
-use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
 use crate::dashboard::update::StepSize::{Coarse, Fine};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{CompareView, Effect, Format, Mode, Model, Overlay, UpdateContext};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
 
-/// State of the dashboard that selects the hints in the hint line, the last row of the screen.
+/// State that selects the hints in the hint line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HintLine {
-    /// State before the first key is pressed.
+    /// No key has been pressed yet.
     First,
-    /// State in which no overlay is open and keys are looked up in this context.
+    /// No overlay is open, and keys are looked up in this context.
     In(KeyContext),
-    /// State in which a list or a question is open.
+    /// A list or a question is open.
     List,
-    /// State in which a form for a new object or light is open.
     Form,
-    /// State in which the user types text.
     Typing,
-    /// State in which the help or the list of scene features is open.
+    /// The help or the list of scene features is open.
     Reading,
-    /// State in which film files are watched (`zerkalo watch`).
     Watching,
 }
 
-/// Short description of a command for the hint line. One hint may describe several related
-/// commands, such as those of all arrow keys.
+/// Description of a command, or of several related ones, for the hint line.
 #[derive(Clone, Copy, Debug)]
 pub struct Hint {
-    /// States of the dashboard in which the hint line contains this hint.
     pub lines: &'static [HintLine],
-    /// Position of the hint in the hint line; smaller numbers come first.
+    /// Position in the hint line; smaller numbers come first.
     pub position: u8,
-    /// Keys as the hint shows them, such as `PgUp PgDn`.
+    /// Keys as shown, such as `PgUp PgDn`.
     pub keys: &'static str,
-    /// Effect of the keys, in a word or two.
     pub text: &'static str,
 }
 
-/// Command of the dashboard: a row of the command table.
+/// Row of the command table.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Heading of the chapter of the help that lists the command. The commands of a chapter follow
-    /// each other in the table.
+    /// Chapter of the help. The commands of a chapter follow each other in the table.
     pub chapter: &'static str,
-    /// Description in a few words, for help, command palette and docs/keys.md. Each command has a
-    /// different description.
+    /// Unique description for help, command palette and docs/keys.md.
     pub label: &'static str,
-    /// Contexts of the command, each with the names of its keys there, separated by spaces. A
-    /// command without keys runs only from the command palette.
+    /// Contexts with the names of the keys there, separated by spaces. A command without keys runs
+    /// only from the command palette.
     pub keys: &'static [(KeyContext, &'static str)],
-    /// Hints about the command in the hint line. They may also describe related commands, which
-    /// then have no hints of their own.
+    /// Hints, which may also describe related commands.
     pub hints: &'static [Hint],
-    /// `true` if the command itself handles a value that is being typed, as the commands of Enter
-    /// and Esc do. For all other commands, the typed value is applied before they run.
+    /// `true` if the command itself handles a value that is being typed, as those of Enter and Esc.
+    /// Otherwise the value is applied first.
     pub(super) while_typing: bool,
-    /// `true` if the command also runs in the viewer of exported images. Keys without such a
-    /// command close the viewer.
+    /// `true` if the command also runs in the viewer of exported images, which other keys close.
     pub(super) over_image: bool,
-    /// Function that returns `true` if the command can run in the present state of the model.
+    /// Function that returns `true` if the command can run.
     pub(super) available: fn(&Model) -> bool,
-    /// Function that runs the command.
     pub(super) run: fn(&mut UpdateContext<'_>),
 }
 
@@ -99,8 +84,7 @@ const fn hint(
     Hint { lines, position, keys, text }
 }
 
-/// Returns `true` if there is a picture: of watched files, or of a scene whose file is readable or was
-/// readable earlier.
+/// Returns `true` if there is a picture: of watched files, or of a scene that was readable.
 fn viewing(model: &Model) -> bool {
     !model.file.unreadable
 }
@@ -115,8 +99,7 @@ fn not_watching(model: &Model) -> bool {
     model.watch.is_none()
 }
 
-/// Returns `true` if there is a picture, or if the command palette or a question is open. The user
-/// can answer these without a scene.
+/// Returns `true` if there is a picture, or a command palette or question, which need none.
 fn viewing_or_choosing(model: &Model) -> bool {
     viewing(model)
         || matches!(model.overlay, Some(Overlay::CommandPalette(_) | Overlay::Question(_)))
@@ -126,7 +109,7 @@ fn always(_: &Model) -> bool {
     true
 }
 
-/// All commands of the dashboard, in the order of the help.
+/// All commands, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
     command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
@@ -315,20 +298,19 @@ impl Command {
         Self { over_image: true, ..self }
     }
 
-    /// Returns `true` if help and command palette list the command. In `zerkalo watch` they omit
-    /// commands that cannot run there.
+    /// Returns `true` if help and command palette list the command: if it can run in `zerkalo
+    /// watch`, or this is another dashboard.
     pub fn is_listed(&self, model: &Model) -> bool {
         model.watch.is_none() || (self.available)(model)
     }
 
-    /// Returns all keys of the command with their contexts as text, such as `Left in the picture`
-    /// or `U Ctrl-r`. `key` formats the name of one key.
+    /// Returns all keys with their contexts, such as `Left in the picture`. `key` formats the name
+    /// of one key.
     pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| Some(context.place()))
     }
 
-    /// Returns the keys that run the command in `zerkalo watch` while no overlay is open, as text.
-    /// `key` formats the name of one key.
+    /// Returns the keys that work in `zerkalo watch` while no overlay is open.
     pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| match context {
             Anywhere | Outline => Some(""),
@@ -337,8 +319,8 @@ impl Command {
         })
     }
 
-    /// Formats the keys of the command, grouped by context. `key` formats the name of one key.
-    /// `place` returns the text after the keys of a context, or `None` to leave out the context.
+    /// Formats the keys, grouped by context. `place` returns the text after the keys of a context,
+    /// or `None` to leave it out.
     fn formatted_keys(
         &self,
         key: impl Fn(&str) -> String,
@@ -353,8 +335,7 @@ impl Command {
     }
 }
 
-/// Returns the command that `key` runs in `context`. Returns `None` if the key has no command
-/// there.
+/// Returns the command that `key` runs in `context`.
 pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
     let name = key.to_string();
     let has_key = |(context, names): &(KeyContext, &str), wanted| {

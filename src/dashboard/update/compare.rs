@@ -1,15 +1,13 @@
-//! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison
-//! with a pinned picture (an earlier one that the user has stored).
+//! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison.
 
-use crate::dashboard::message::{DisplayChannel, Effect};
-use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
+use crate::dashboard::update::{Direction, StepSize, cycled};
+use crate::dashboard::{CompareView, DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::film::{LinearImage, Tone};
 
-/// Change of the displayed picture's exposure per step, in stops.
+/// Change of the exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;
-/// Largest absolute value of the exposure, in stops. Beyond it every picture is white or black.
+/// Largest exposure in stops. Beyond it every picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
 impl UpdateContext<'_> {
@@ -65,8 +63,7 @@ impl UpdateContext<'_> {
         self.show_view();
     }
 
-    /// Moves the pixel probe in `direction`. A coarse step is about one terminal cell, a fine step
-    /// one pixel of the film.
+    /// Moves the pixel probe by about one terminal cell, or by one pixel of the film.
     pub(super) fn move_probe(&mut self, direction: Direction, step_size: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
@@ -94,9 +91,8 @@ impl UpdateContext<'_> {
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Shows the pinned picture (stored by the user for comparison) or its difference to the live
-    /// picture; `what` selects one of the two. If the selected one is shown already, shows the live
-    /// picture again.
+    /// Shows the pinned picture or its difference to the live one, or the live picture if `what` is
+    /// shown already.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

@@ -1,10 +1,8 @@
-//! Commands on the properties in the inspector and in forms: moving the cursor, stepping and typing
-//! values.
+//! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{FieldLine, walk_fields};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::panel_lines::walk_fields;
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{Editor, FieldLine, Overlay, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget};
 
 impl UpdateContext<'_> {
@@ -21,18 +19,16 @@ impl UpdateContext<'_> {
         *cursor = walk_fields(&lines, *cursor, steps);
     }
 
-    /// Returns the line under the cursor of the open form, or of the inspector if no form is open.
-    /// Returns `None` if the line shows no property, such as a heading.
+    /// Returns the line under the cursor of the open form or inspector; `None` for a heading.
     pub(super) fn field(&self) -> Option<FieldLine> {
         let lines = self.model.field_lines();
         Some(*lines.get(self.model.field_list().cursor)?.entry()?.clone())
     }
 
-    /// Starts the input of a value for the property under the cursor. `typed` is the character that
-    /// the user has typed, if any. A text editor that contains this character opens. A space is an
-    /// exception: it changes a switch or a choice to its next value, and has no effect on other
-    /// properties. If `typed` is `None`, a switch is toggled, a choice outside of a form opens its
-    /// list, and any other property opens a text editor with the present value.
+    /// Starts the input of a value for the property under the cursor. The character `typed` opens a
+    /// text editor, except for a space, which changes a switch or a choice to its next value.
+    /// Without a character, a switch is toggled, a choice outside a form opens its list, and any
+    /// other property opens a text editor with the present value.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
         let Some(field) = self.field() else { return };
         let words = field.property.words;
@@ -56,8 +52,8 @@ impl UpdateContext<'_> {
         matches!(self.model.overlay, Some(Overlay::Form(_)))
     }
 
-    /// Applies the value that the user has typed and closes the text editor. Returns `false` if the
-    /// value is not valid; the editor then stays open and shows the reason.
+    /// Applies the typed value and closes the text editor. Returns `false` if the value is not
+    /// valid; the editor then shows the reason.
     pub(super) fn apply_field(&mut self) -> bool {
         let Some(field) = self.field() else {
             self.set_editor(None);
@@ -84,9 +80,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns the edit that sets the property or number in the line `field` to `text`. If the line
-    /// shows one number of a list, `text` may also be the whole list, or a colour in hexadecimal
-    /// digits.
+    /// Returns the edit that sets the property or number in the line `field`. For one number of a
+    /// list, `text` may also be the whole list, or a colour in hexadecimal digits.
     fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, EditError> {
         let scene = self.scene();
         let whole = text.contains(['#', ',', ';', ' ', '[']);
@@ -113,7 +108,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Sets the property under the cursor to `value`; an empty text stands for the default.
+    /// Sets the property under the cursor; an empty text stands for the default.
     pub(super) fn fill_field(&mut self, value: &str) {
         if let Some(field) = self.field() {
             let edit = edit::set(self.scene(), &field.subject, &field.property.key, value);

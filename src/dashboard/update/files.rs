@@ -1,10 +1,7 @@
-//! Commands on undo, saving, reloading and quitting. Handling of the results of saves, loads and
-//! exports.
+//! Commands on undo, saving, reloading and quitting, and results of saves, loads and exports.
 
-use crate::dashboard::message::{Effect, Exported};
-use crate::dashboard::model::{Tone, first_line, short_name};
-use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::model::{Tone, first_line};
+use crate::dashboard::{Answer, Effect, Exported, UpdateContext, short_name};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_scene::edit::{Target, outline};
@@ -53,9 +50,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests that the scene be written to the scene file, or to `path`, which then becomes the
-    /// scene file. `overwrite` permits replacing changes by other programs, or an existing file at
-    /// `path`.
+    /// Requests a write to the scene file, or to `path`, which then becomes the scene file.
+    /// `overwrite` permits replacing changes by other programs, or another file.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });
@@ -71,7 +67,7 @@ impl UpdateContext<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                // If the scene was edited while it was being saved, the program does not quit.
+                // The scene may have been edited while it was being saved.
                 if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
@@ -124,8 +120,7 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
-                // Indices of objects and lights may differ in the reloaded scene, so the selection
-                // is restored by name.
+                // Indices may differ in the reloaded scene, so the selection is restored by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
@@ -166,7 +161,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_levels, scp }) => {
-                // If the image has the size of the export in the background, this export has ended.
+                // An image of its size ends the export in the background.
                 self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
                 let noise = noise_levels.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(

@@ -1,15 +1,12 @@
-//! Focus (the panel that receives the keys) and modes (the effect of arrow keys and drags in the
-//! picture).
+//! Focus and modes.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{CompareView, Mode};
-use crate::dashboard::update::{UpdateContext, cycled};
+use crate::dashboard::update::cycled;
+use crate::dashboard::{CompareView, Focus, Mode, UpdateContext};
 use zerkalo_scene::edit;
 
 impl UpdateContext<'_> {
-    /// Enters `mode`, which determines the effect of the arrow keys, and gives the focus to the
-    /// picture. If the mode moves or rotates the selection and the selection cannot be moved or
-    /// rotated, reports an error instead.
+    /// Enters `mode` and gives the focus to the picture, or reports why the selection cannot be
+    /// moved or rotated.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let (scene, selection) = (self.scene(), &self.model.selection);
         let tried = match mode {
@@ -27,7 +24,7 @@ impl UpdateContext<'_> {
     }
 
     /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
-    /// another panel than the picture, full screen, comparison.
+    /// another panel, full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();
@@ -45,7 +42,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns to the default mode of the picture's panel, in which the keys orbit the camera.
+    /// Returns to the default mode.
     pub(super) fn end_mode(&mut self) {
         self.end_gesture();
         if self.model.mode == Mode::Probe {

@@ -1,9 +1,7 @@
-//! Creation of objects and lights: the user picks a kind from a list, then fills in a form. The
-//! picture previews the new object or light.
+//! Creation of objects and lights: the user picks a kind, then fills in a form.
 
-use crate::dashboard::model::FieldList;
-use crate::dashboard::overlay::{Form, Overlay, Pick};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{FieldList, Form, Overlay, Pick, UpdateContext};
 use std::sync::Arc;
 use zerkalo_scene::edit::{self, Edit, EditError, Word};
 
@@ -20,8 +18,7 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Opens a list of `words`, which are names with descriptions. The user picks one, which is
-    /// passed to `take`. The cursor starts on the word with index `cursor`.
+    /// Opens a list of `words`, of which the picked one is passed to `take`.
     pub(super) fn open_pick(
         &mut self,
         title: String,
@@ -33,8 +30,7 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(Overlay::Pick(Pick { title, entries, cursor, scroll: 0, take }));
     }
 
-    /// Opens the form for a new object or light of the kind `what`. `edit` is the edit that adds it
-    /// to the scene. If `edit` is an error, shows a notice instead.
+    /// Opens the form for a new object or light of the kind `what`, which `edit` adds.
     pub(super) fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
             Ok(Edit { scene, subject, label, .. }) => {
@@ -54,12 +50,12 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Adds the new object or light of the form to the scene, as one undo step.
+    /// Adds the new object or light, as one undo step.
     pub(super) fn confirm_form(&mut self) {
         let Some(Overlay::Form(form)) = self.model.overlay.take() else { return };
         let base = Arc::clone(self.model.history.scene());
         let mut scene = form.scene;
-        // Materials that were created while the form was open are removed if no object uses them.
+        // Materials created in the form are removed if no object uses them.
         let unused: Vec<_> = scene
             .materials
             .keys()
@@ -78,7 +74,7 @@ impl UpdateContext<'_> {
         self.say(format!("{label} added · m moves it · r rotates it · u undoes"));
     }
 
-    /// Closes the form and restores the scene and the selection from before it was opened.
+    /// Closes the form and restores scene and selection.
     pub(super) fn cancel_form(&mut self) {
         if let Some(Overlay::Form(form)) = self.model.overlay.take() {
             self.select(form.before);

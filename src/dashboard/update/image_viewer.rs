@@ -1,15 +1,11 @@
-//! Commands and messages of the viewer of exported images.
+//! Viewer of exported images.
 
-use crate::dashboard::message::Effect;
-use crate::dashboard::model::short_name;
-use crate::dashboard::overlay::{Overlay, ViewedImage};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{Effect, Overlay, UpdateContext, ViewedImage, short_name};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_terminal::image::ViewerImage;
 
 impl UpdateContext<'_> {
-    /// Shows the last exported image.
     pub(super) fn view_last_export(&mut self) {
         match self.model.last_export.clone() {
             Some(path) => self.view_image(path),
@@ -26,21 +22,20 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Requests that the viewed image be read again and encoded for the new screen size.
+    /// Requests the viewed image for the new screen size.
     pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
             self.view_image(viewed.path.clone());
         }
     }
 
-    /// Closes the viewer of exported images and shows the panels again.
     pub(super) fn close_viewer(&mut self) {
         self.model.overlay = None;
         self.repaint();
     }
 
-    /// Shows an image that was read and encoded for the viewer, or reports why it cannot be shown.
-    /// Ignores an image of another path or for another screen size.
+    /// Shows an encoded image, or reports why it cannot be shown. Ignores an image of another path
+    /// or screen size.
     pub(super) fn image_ready(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
         let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
@@ -52,7 +47,6 @@ impl UpdateContext<'_> {
                 viewed.image = Some(image);
                 self.repaint();
             }
-            // The image was encoded for the previous screen size. It is ignored.
             Ok(_) => {}
             Err(why) => {
                 let name = short_name(path);

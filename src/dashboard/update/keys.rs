@@ -1,15 +1,10 @@
-//! Key dispatch. An open text editor receives a key first; the command table receives the keys that
-//! the editor does not use.
+//! Key dispatch: an open text editor receives a key first, then the command table.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::{FieldList, Model};
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
+use crate::dashboard::{Editor, FieldList, KeyContext, Model, Overlay, UpdateContext};
 use zerkalo_terminal::event::{Code, Key};
 
-/// Returns the character that `key` types. Returns `None` if it types none.
+/// Returns the character that `key` types.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),
@@ -18,7 +13,7 @@ fn typed(key: Key) -> Option<char> {
 }
 
 impl Model {
-    /// Returns the text editor that receives the keys. Returns `None` if none is open.
+    /// Returns the text editor that receives the keys.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
             Some(Overlay::CommandPalette(palette)) => Some(&mut palette.editor),
@@ -29,8 +24,7 @@ impl Model {
         }
     }
 
-    /// Returns a mutable reference to the state of the open form's list of properties, or of the
-    /// inspector if no form is open.
+    /// Returns the state of the open form, or of the inspector.
     pub(super) fn field_list_mut(&mut self) -> &mut FieldList {
         match &mut self.overlay {
             Some(Overlay::Form(form)) => &mut form.fields,
@@ -67,8 +61,7 @@ impl UpdateContext<'_> {
             }
             return;
         };
-        // A value that is being typed is applied before another command runs. An invalid value
-        // prevents the command.
+        // An invalid value that is being typed prevents the command.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
             && !command.while_typing
@@ -80,8 +73,7 @@ impl UpdateContext<'_> {
         self.run(command);
     }
 
-    /// Runs a command if it is available. Otherwise shows the reason why it is not: there is no
-    /// scene, or `zerkalo watch` cannot edit or render.
+    /// Runs a command, or shows why it is not available.
     pub(super) fn run(&mut self, command: &Command) {
         if (command.available)(self.model) {
             (command.run)(self);
@@ -92,8 +84,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Inserts pasted text into the open text editor. Without an editor the text is ignored,
-    /// because as keys it would run commands.
+    /// Inserts pasted text into the open text editor. As keys it would run commands.
     pub(super) fn paste(&mut self, text: &str) {
         self.model.first_time = false;
         match self.model.editor_mut() {
@@ -105,15 +96,14 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Updates the command palette's list of commands after a change of the search text.
     fn text_changed(&mut self) {
         if let Some(Overlay::CommandPalette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// Applies the typed character `c` to the open list, form or question. Returns `true` if an
-    /// overlay is open; the character then runs no command.
+    /// Applies `c` to the open list, form or question. Returns `true` if an overlay is open: the
+    /// character then runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {

@@ -1,22 +1,22 @@
 //! Commands on focus and aperture of the camera.
 
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use crate::dashboard::update::mouse::first_hit;
-use crate::dashboard::update::{Coalesce, UpdateContext};
 use zerkalo_scene::camera::{Aperture, Camera};
 use zerkalo_scene::edit::{self, bounds};
 use zerkalo_scene::value::{number, round_significant};
 
 impl UpdateContext<'_> {
-    /// Opens the camera's aperture by `stops` stops; a negative number closes it.
+    /// Opens the aperture by `stops` stops; a negative number closes it.
     pub(super) fn aperture(&mut self, stops: f64) {
         let edit = edit::change_aperture(self.scene(), stops);
         self.commit(edit, Coalesce::Repeat);
         self.say_lens();
     }
 
-    /// Focuses the camera on the point at the pixel probe. Without a pixel probe, focuses on the
-    /// middle of the selection, or on the point at the centre of the picture if the selection has
-    /// no bounds.
+    /// Focuses on the pixel probe, else on the middle of the selection, else on the centre of the
+    /// picture.
     pub(super) fn focus(&mut self) {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let selection = bounds(self.scene(), &self.model.selection);
@@ -27,7 +27,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Focuses the camera on the object that is visible at the centre of film pixel `pixel`.
+    /// Focuses on the object that is visible at the centre of film pixel `pixel`.
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
         match first_hit(self.scene(), pixel) {
             Some((_, point)) => self.focus_on(point.to_array()),
@@ -50,7 +50,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns a description of the camera's aperture and focus for a notice.
+/// Describes aperture and focus for a notice.
 fn lens_text(camera: &Camera) -> String {
     let distance = number(round_significant(camera.focus_depth(), 4));
     match camera.aperture {

@@ -1,6 +1,7 @@
 //! Commands on lights.
 
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use zerkalo_scene::edit::{Edit, EditError, Target, step, toggle};
 use zerkalo_scene::value::number;
 
@@ -20,9 +21,8 @@ impl UpdateContext<'_> {
         self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
     }
 
-    /// Returns the part of the scene that a command on lights changes. This is the selection if it
-    /// is a light, the ambient light or the background; otherwise it is the first light. Fails if
-    /// there is no light.
+    /// Returns the light that commands change: the selection if it is a light, the ambient light or
+    /// the background, otherwise the first light.
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
@@ -53,8 +53,7 @@ impl UpdateContext<'_> {
         self.commit_light(edit, Coalesce::Single);
     }
 
-    /// Records the result of an edit of a light as the current scene. A notice then reports the
-    /// light's new state. `coalesce` decides if the edit joins the previous undo step.
+    /// Records an edit of a light and reports its new state.
     fn commit_light(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

@@ -1,27 +1,24 @@
-//! Commands that move the cursor and open the entry under it, in outline, inspector, command
-//! palette, lists, help and questions.
+//! Commands that move the cursor and open the entry under it, in panels and overlays.
 
-use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
-use crate::dashboard::layout::Focus;
-use crate::dashboard::message::Effect;
-use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
-use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::panel_lines::{outline, outline_position, scrolled};
 use crate::dashboard::update::commands::{COMMANDS, Command};
+use crate::dashboard::{
+    Answer, CommandPalette, Editor, Effect, Focus, OutlineLine, Overlay, Question, UpdateContext,
+};
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
 
-/// Returns `cursor` moved by `steps`, clamped to a list of `len` entries.
+/// Returns `cursor` moved within a list of `len` entries.
 fn moved(cursor: usize, steps: isize, len: usize) -> usize {
     cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
 }
 
 impl UpdateContext<'_> {
-    /// Moves the cursor of the open overlay by `steps` lines, or scrolls an overlay that has no
-    /// cursor. Without an overlay, moves the cursor of the focused panel.
+    /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines. Scrolls an
+    /// overlay without cursor.
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let list = self.model.overlay_layout().map(|layout| layout.list);
         let (width, rows) = list.map_or((1, 1), |list| (list.width, usize::from(list.height)));
@@ -52,8 +49,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor of the open overlay or the focused panel by `pages` pages. A page is the
-    /// number of visible rows minus 1.
+    /// Moves the cursor by `pages` pages, each the number of visible rows minus 1.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,
@@ -77,8 +73,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Confirms the entry under the cursor of the open overlay. Without an overlay, opens the entry
-    /// under the cursor of the focused panel.
+    /// Confirms or opens the entry under the cursor.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
@@ -143,14 +138,12 @@ impl UpdateContext<'_> {
         }));
     }
 
-    /// Returns the commands that the command palette offers, each with its index in the command
-    /// table.
+    /// Returns the commands of the command palette, each with its index in the table.
     fn offered(&self) -> Vec<(usize, &'static Command)> {
         COMMANDS.iter().enumerate().filter(|(_, command)| command.is_listed(self.model)).collect()
     }
 
-    /// Updates the command palette's list to the commands that match the search text, best match
-    /// first.
+    /// Updates the command palette to the commands that match the search text, best match first.
     pub(super) fn search(&mut self) {
         let offered = self.offered();
         let Some(Overlay::CommandPalette(palette)) = &mut self.model.overlay else { return };
@@ -166,15 +159,14 @@ impl UpdateContext<'_> {
                 Some((score, i))
             })
             .collect();
-        // Commands with equal scores stay in the order of the table.
         found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
         palette.found = found.into_iter().map(|(_, i)| i).collect();
         palette.cursor = 0;
         palette.scroll = 0;
     }
 
-    /// Moves the cursor of the open list to the next entry that starts with the letter `c`. After
-    /// the last entry, the search continues at the first one.
+    /// Moves the cursor to the next entry that starts with `c`, from the first one again after the
+    /// last.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -187,8 +179,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the question `text` to the user. `answers` holds the letter, text and effect of each
-    /// answer. `Esc` closes the question without an answer.
+    /// Opens a question. `answers` holds the letter, text and effect of each answer.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &'static str, Answer)]) {
         let question = Question { text, answers: answers.to_vec(), cursor: 0 };
         self.model.overlay = Some(Overlay::Question(question));

@@ -1,8 +1,7 @@
-//! Dashboard commands that change the roughness, reflection or lobe of the mirror. The mirror is a
-//! reflecting material of the selection if there is one, otherwise a reflecting material elsewhere
-//! in the scene.
+//! Commands on the mirror: a reflecting material of the selection, or else of the scene.
 
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
 use zerkalo_scene::edit::{self, Edit, EditError, Target};
 use zerkalo_scene::value::{number, truncated};
 
@@ -23,9 +22,7 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Records the result of an edit of the mirror (a reflecting material) as the current scene. A
-    /// notice then reports the material's new values. `coalesce` decides if the edit joins the
-    /// previous undo step.
+    /// Records an edit of the mirror and reports its new values.
     fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

@@ -1,5 +1,4 @@
-//! State transitions of the dashboard: [`update`] changes the model by a message and returns
-//! effects. It has no access to clock, files or terminal.
+//! State transitions of the dashboard, without access to clock, files or terminal.
 
 mod camera;
 pub mod commands;
@@ -22,10 +21,9 @@ mod render;
 mod undo_coalescing;
 mod watch;
 
-use crate::dashboard::message::{Effect, Message};
-use crate::dashboard::model::{FieldList, Model, Notice, Tone};
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::model::{Notice, Tone};
 use crate::dashboard::panel_lines::{nearest_field, outline, outline_position, scrolled};
+use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
 use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
@@ -36,8 +34,8 @@ use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Edit, EditError, Target};
 use zerkalo_scene::value::sanitized;
 
-/// Updates the model with a message and returns the effects. `now` is the current time since any
-/// fixed origin.
+/// Updates the model with a message and returns the effects. `now` is the time since any fixed
+/// origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext { model, now, effects: Vec::new(), follow: true, typed: None };
     context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
@@ -46,34 +44,32 @@ pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect>
     context.effects
 }
 
-/// Context of one call of [`update`]: the model, the time, and the effects so far.
+/// Context of one call of [`update`].
 pub(super) struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if lists in panels are scrolled until their cursors are visible. `false` if the
-    /// message must not change the scroll positions, for example because the user has scrolled.
+    /// `true` if lists are scrolled until their cursors are visible; `false` for messages that must
+    /// not scroll.
     follow: bool,
-    /// Character of the key that ran the current command; `None` if the key types no character.
+    /// Character of the key that ran the current command.
     typed: Option<char>,
 }
 
-/// Direction of a command on the screen or along the view direction.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Direction {
     Left,
     Right,
     Up,
     Down,
-    /// Direction forwards, away from the eye.
+    /// Forwards, away from the eye.
     In,
-    /// Direction backwards, towards the eye.
+    /// Backwards, towards the eye.
     Out,
 }
 
 impl Direction {
-    /// Returns the direction as a unit vector, with its components to the right, upwards and
-    /// forwards.
+    /// Returns the unit vector (right, up, forward).
     fn unit(self) -> [f64; 3] {
         match self {
             Self::Left => [-1.0, 0.0, 0.0],
@@ -86,7 +82,6 @@ impl Direction {
     }
 }
 
-/// Size of the step by which a command changes a value.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum StepSize {
     Coarse,
@@ -150,8 +145,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Adds `effect` to the results of the update. It replaces an earlier effect of the same kind
-    /// in these results, except for saves and exports.
+    /// Adds an effect. It replaces an earlier one of the same kind, except for saves and exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -159,20 +153,19 @@ impl UpdateContext<'_> {
         self.effects.push(effect);
     }
 
-    /// Marks the picture's cells as outdated, so that they are computed again.
+    /// Marks the picture's cells as outdated.
     fn repaint(&mut self) {
         self.model.picture_version += 1;
     }
 
-    /// Requests a render of the edited scene.
+    /// Requests a render of the scene.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
         self.repaint();
     }
 
-    /// Requests snapshots at the present size of the picture in half cells (upper and lower halves
-    /// of terminal cells), with the values at the pixel probe.
+    /// Requests snapshots of the present size, with the values at the pixel probe.
     fn show_view(&mut self) {
         let (raster, probe) = (self.model.raster, self.model.probe);
         self.emit(Effect::View(View { raster, probe }));
@@ -182,9 +175,8 @@ impl UpdateContext<'_> {
         self.model.scene()
     }
 
-    /// Records the result of an edit as the current scene. If `edit` is an error, shows the error
-    /// as a notice instead. `coalesce` decides if the edit joins the previous undo step. Returns
-    /// `true` if the scene has changed.
+    /// Records an edit, or shows its error. `coalesce` decides if the edit joins the previous undo
+    /// step. Returns `true` if the scene has changed.
     fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, coalesce),
@@ -195,8 +187,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Stores the result of `edit` in the open form. If no form is open, stores it in the undo
-    /// history as the current scene. Returns `true` if the scene has changed.
+    /// Stores the edited scene in the open form, or else in the undo history. Returns `true` if the
+    /// scene has changed.
     fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
@@ -224,15 +216,13 @@ impl UpdateContext<'_> {
         changed
     }
 
-    /// Ends the undo step of the latest edits, such as those of a drag: the next edit starts a new
-    /// one.
+    /// Lets the next edit start a new undo step.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;
     }
 
-    /// Records the result of an edit as the current scene, and selects the edited part. Returns
-    /// `true` if the scene has changed.
+    /// Records an edit and selects the edited part. Returns `true` if the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);
@@ -249,8 +239,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Shows the notice `text` for `seconds`, or longer if reading the text takes longer. If
-    /// `seconds` is `None`, shows it until the next key.
+    /// Shows a notice for `seconds`, or longer if reading it takes longer; `None` shows it until
+    /// the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
@@ -272,10 +262,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Restores three invariants of the model after an update. The selection exists in the scene.
-    /// Cursors are in range and visible. The renderer knows the present size of the picture in half
-    /// cells (upper and lower halves of terminal cells). If there are new unsaved edits, also
-    /// requests an autosave.
+    /// Restores the invariants of the model after an update: the selection exists, cursors are in
+    /// range and visible, the session knows the size of the picture, and new edits are autosaved.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
@@ -301,7 +289,7 @@ impl UpdateContext<'_> {
         self.autosave();
     }
 
-    /// Limits cursors and scroll positions of the lists in panels and forms to the existing lines.
+    /// Limits cursors and scroll positions to the existing lines.
     fn normalize_panels(&mut self) {
         let (lines, follow) = (self.model.field_lines(), self.follow);
         let area = match self.in_form() {
@@ -329,8 +317,8 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the item `by` positions after the current item, cyclically. The current item is the
-/// first one for which `is_current` is `true`, or the first of all if there is none.
+/// Returns the item `by` positions after the current one, cyclically. The current item is the first
+/// for which `is_current` is `true`, or else the first of all.
 fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
     let position = items.iter().position(is_current).unwrap_or(0) as isize;
     &items[(position + by).rem_euclid(items.len() as isize) as usize]

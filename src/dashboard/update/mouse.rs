@@ -1,28 +1,24 @@
-//! Mouse handling in the dashboard: clicks select or focus, drags orbit or move, the wheel dollies
-//! or scrolls.
+//! Mouse: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Drag, FieldList, Mode};
-use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::panel_lines::outline;
+use crate::dashboard::{
+    Drag, FieldList, Focus, Mode, OutlineLine, Overlay, PanelLine, UpdateContext,
+};
 use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::Target;
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
-/// Number of lines that a list scrolls per tick of the mouse wheel.
+/// Number of lines that a list scrolls per tick of the wheel.
 pub(super) const WHEEL_LINES: i32 = 3;
 
-/// Returns `true` if the mouse is in `area`. An area that is `None` belongs to a hidden panel, and
-/// never contains the mouse.
+/// Returns `true` if the mouse is in `area`; `None` is the area of a hidden panel.
 pub(super) fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
 
-/// Returns the index of the list line under the mouse. `rows` is the list's area, `scroll` the
-/// index of its first visible line. Returns `None` if the mouse is outside of the area.
+/// Returns the index of the line under the mouse in a list that `scroll` lines are scrolled off.
 pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
     is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }
@@ -78,8 +74,7 @@ impl UpdateContext<'_> {
     }
 
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
-        // `rows` is the area of the list at the time of the press. The change of focus below may
-        // change the layout.
+        // The change of focus below may change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
@@ -93,9 +88,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked property of the inspector or form if the cursor is on it already, otherwise
-    /// moves the cursor there. `rows` is the area of the list. `focused` is `true` if the list had
-    /// the focus before the click.
+    /// Opens the clicked property if the cursor is on it already and the list had the focus,
+    /// otherwise moves the cursor there.
     fn press_in_fields(&mut self, rows: Rect, focused: bool, mouse: Mouse) {
         let FieldList { cursor, scroll, editor } = self.model.field_list();
         let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
@@ -108,8 +102,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked line of the open overlay if the cursor is on it already, otherwise moves
-    /// the cursor there.
+    /// Opens the clicked line if the cursor is on it already, otherwise moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.overlay_layout() else { return };
         match &self.model.overlay {
@@ -164,8 +157,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns `true` if the current mode moves or rotates the selection. In such a mode, all edits
-    /// with the same label form one undo step.
+    /// Returns `true` in the modes in which all edits with the same label form one undo step.
     fn moves_or_rotates(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
@@ -190,8 +182,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns the pixel of the film (column, row) under the mouse. Returns `None` outside of the
-    /// picture.
+    /// Returns the pixel of the film (column, row) under the mouse.
     fn pixel_at(&self, mouse: Mouse) -> Option<[usize; 2]> {
         self.model.layout()?.film_pixel(self.scene().film.size, mouse.column, mouse.row)
     }
@@ -233,9 +224,8 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the first object that the camera ray through a film pixel (column, row) hits, as two
-/// values: the index of the object, and the hit point. The ray goes through the centre of the lens
-/// and the centre of the pixel. Returns `None` if the ray hits no object.
+/// Returns index and hit point of the first object on the ray through the centres of the lens and
+/// of a film pixel (column, row).
 pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);

@@ -1,33 +1,30 @@
-//! Commands that move, rotate, duplicate and delete the selected part of the scene.
+//! Commands on the selected part of the scene.
 
-use crate::dashboard::model::Mode;
-use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
+use crate::dashboard::update::{Coalesce, Direction, StepSize};
+use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
-/// Angle in degrees of one step of rotating the selection.
+/// Angle of one step of rotating.
 const ROTATE_DEGREES: f64 = 15.0;
 const ROTATE_DEGREES_FINE: f64 = 1.0;
-/// Largest factor by which a drag multiplies the movement of the selection in depth. The view
-/// direction meets the ground plane at an angle, so depth appears shortened by the sine of this
-/// angle. The selection stays under the mouse if its movement is divided by this sine. The quotient
-/// is unbounded at grazing angles. It is therefore limited to 4, its value at 14.5 degrees.
+/// Largest factor by which a drag multiplies the movement in depth. A drag is divided by the sine
+/// of the angle between view direction and ground, by which depth appears shortened. This is
+/// unbounded at grazing angles, and 4 at 14.5 degrees.
 const MOST_STRETCH: f64 = 4.0;
 
-/// Returns the coordinate axis in the ground plane, positive or negative, whose direction is
-/// nearest to that of `v`.
+/// Returns the coordinate axis in the ground plane, positive or negative, nearest to `v`.
 fn nearest_axis(v: DVec3) -> DVec3 {
     if v.x.abs() >= v.z.abs() { DVec3::X * v.x.signum() } else { DVec3::Z * v.z.signum() }
 }
 
 impl UpdateContext<'_> {
-    /// Returns two coordinate axes in the ground plane: the one that points most nearly to the
-    /// right in the picture, and the one that points most nearly away from the eye. Steps go along
-    /// coordinate axes so that round coordinates stay round.
+    /// Returns the axes in the ground plane that point most nearly to the right and away from the
+    /// eye. Along them, round coordinates stay round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // This is the view direction of an upright observer who has `right` on the right-hand side.
+        // View direction of an upright observer.
         [right, DVec3::Y.cross(right)]
     }
 
@@ -44,17 +41,15 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule by which the current edit joins an undo step. During a drag, and in a mode
-    /// that moves or rotates the selection, all edits with the same label form one step. Otherwise an
-    /// edit joins one with the same label that was made shortly before.
+    /// Returns the rule for edits by arrow keys and drags: in a drag or mode, all with the same
+    /// label form one undo step.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
-    /// Moves the selection by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). The movement is vertical if `upright` is `true`, otherwise in the ground
-    /// plane. The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
+    /// Moves the selection by a drag in half cells, vertically if `upright` is `true`, otherwise in
+    /// the ground plane. It stays under the mouse as far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();
@@ -81,8 +76,7 @@ impl UpdateContext<'_> {
     pub(super) fn rotate_selection(&mut self, direction: Direction, step_size: StepSize) {
         let degrees =
             if step_size == StepSize::Fine { ROTATE_DEGREES_FINE } else { ROTATE_DEGREES };
-        // A positive angle rotates counter-clockwise as seen from above. The side of the object that
-        // faces the viewer then moves to the right.
+        // Counter-clockwise as seen from above, the side that faces the viewer moves to the right.
         self.rotate_by(if direction == Direction::Right { degrees } else { -degrees });
     }
 

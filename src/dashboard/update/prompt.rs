@@ -1,10 +1,8 @@
-//! Prompts of the dashboard for names, paths, stop criteria and sizes.
+//! Prompts for names, paths, stop criteria and sizes.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::RunningExport;
-use crate::dashboard::overlay::{Overlay, Prompt};
-use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::{Editor, Effect, Format, Overlay, Prompt, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
@@ -12,7 +10,7 @@ use zerkalo_scene::edit::{self, Target};
 use zerkalo_scene::value::{number, truncated};
 
 impl UpdateContext<'_> {
-    /// Opens a prompt with `text`, which the user edits and which is then passed to `apply`.
+    /// Opens a prompt with `text`, which is then passed to `apply`.
     fn prompt(
         &mut self,
         title: &str,
@@ -80,14 +78,13 @@ impl UpdateContext<'_> {
         self.prompt("render at another size", help, text, |c, text| c.export_sized(text));
     }
 
-    /// Applies the text of the open prompt and closes it. If the text is not valid, the prompt
-    /// stays open and shows the reason.
+    /// Applies the text of the prompt and closes it, or shows why the text is not valid.
     pub(super) fn answer_prompt(&mut self) {
         let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
         let (apply, text) = (prompt.apply, prompt.editor.text().trim().to_string());
         match (apply(self, &text), &mut self.model.overlay) {
             (Err(problem), Some(Overlay::Prompt(prompt))) => prompt.editor.problem = Some(problem),
-            // The prompt is closed only if the answer has not replaced it by another overlay.
+            // The answer may have replaced the prompt by another overlay.
             (Ok(()), overlay @ Some(Overlay::Prompt(_))) => *overlay = None,
             _ => {}
         }
@@ -101,8 +98,7 @@ impl UpdateContext<'_> {
         if path.extension().is_none() {
             path.set_extension("toml");
         }
-        // If the user types the path of the scene's own file, this is an ordinary save, which
-        // checks for changes by other programs.
+        // A save to the scene's own file checks for changes by other programs.
         let is_own_file = self.model.file.path.as_ref() == Some(&path);
         self.write((!is_own_file).then_some(path), false);
         Ok(())
@@ -147,7 +143,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Formats stop criteria, such as `noise 0.5 time 60`. If there are none, returns `none`.
+/// Formats stop criteria, such as `noise 0.5 time 60`, or `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
         ("noise", stop.noise_levels),
@@ -160,8 +156,7 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     if text.is_empty() { "none".to_string() } else { text }
 }
 
-/// Parses stop criteria in the format of [`stop_text`]. Words may be separated by spaces, commas or
-/// equals signs.
+/// Parses the format of [`stop_text`]. Words are separated by spaces, commas or equals signs.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
     let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());

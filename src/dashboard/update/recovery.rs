@@ -1,15 +1,13 @@
 //! Recovery of unsaved edits after a crash, and requests for autosaves.
 
-use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
-use crate::dashboard::overlay::Answer;
-use crate::dashboard::update::UpdateContext;
+use crate::dashboard::{Answer, Effect, OrphanedEdits, UpdateContext};
 use std::sync::Arc;
 use std::time::Duration;
 
 impl UpdateContext<'_> {
-    /// Asks the user if the unsaved edits of a crashed run of the program are to be recovered.
-    /// Shows a notice instead while an overlay or text editor is open.
+    /// Asks if the edits of a crashed run are to be recovered, or shows a notice while the user is
+    /// busy.
     pub(super) fn orphaned_edits(&mut self, edits: OrphanedEdits) {
         self.follow = false;
         self.model.orphaned_edits = Some(edits);
@@ -52,7 +50,7 @@ impl UpdateContext<'_> {
         self.end_gesture();
         if std::mem::take(&mut self.model.file.unreadable) {
             self.model.history.restart(Arc::clone(&scene));
-            // The unreadable file contains no scene, so the recovered scene counts as unsaved.
+            // The recovered scene counts as unsaved.
             self.model.history.mark_saved(Arc::default());
             self.model.file.saved = scene;
         } else if !self.model.history.record(scene, "recovered edits", false) {
@@ -72,8 +70,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests a write of the recovery file if there are new unsaved edits. Requests its removal
-    /// if all edits are saved, or if the user quits, which discards unsaved edits.
+    /// Requests a write of the recovery file for new unsaved edits, or its removal if there are
+    /// none or the user quits.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();

@@ -1,11 +1,9 @@
-//! Commands on rendering (pause, restart, stop criteria, threads, exports) and on the colour depth
-//! of the terminal.
+//! Commands on rendering, exports and the colour depth of the terminal.
 
-use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
-use crate::dashboard::update::{UpdateContext, cycled};
+use crate::dashboard::{Effect, Format, Overlay, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
@@ -29,8 +27,7 @@ impl UpdateContext<'_> {
         self.say(format!("stops {when}"));
     }
 
-    /// Opens the list of noise targets (noise values at which rendering stops) with the cursor on
-    /// the current target.
+    /// Opens the list of noise targets with the cursor on the current one.
     pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_levels.unwrap_or(0.5);
         let cursor = QUALITIES.iter().position(|levels| *levels <= wanted);

@@ -1,28 +1,26 @@
-//! Undo coalescing: the rule that decides which successive edits form one undo step.
-//! [`History`](zerkalo_scene::History) merges such edits.
+//! Undo coalescing: which successive edits form one undo step of
+//! [`History`](zerkalo_scene::History).
 
 use std::time::Duration;
 
-/// Longest time between two edits with the same label that form one undo step, such as those of a
-/// held key. It is longer than the delay after which a held key starts to repeat.
+/// Longest time between edits that form one undo step, longer than the delay after which a held key
+/// repeats.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
-/// Rule that decides if an edit forms one undo step with the previous edit.
+/// Rule that decides if an edit with the same label joins the previous undo step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Coalesce {
-    /// Rule: the edit is an undo step of its own.
+    /// The edit is an undo step of its own.
     Single,
-    /// Rule: the edit is merged with the previous edit if both have the same label and the previous
-    /// edit is at most 0.7 seconds old.
+    /// The edit joins if it comes soon enough.
     Repeat,
-    /// Rule: the edit is merged with edits of the same label until the gesture (a drag or mode)
-    /// ends.
+    /// The edit joins until the gesture (a drag or mode) ends.
     Gesture,
 }
 
 impl Coalesce {
-    /// Returns `true` if an edit may form one undo step with the previous edit. `age` is the time
-    /// since the previous edit, or `None` if the rule for that edit was not [`Self::Repeat`].
+    /// Returns `true` if the edit joins. `age` is the time since the previous edit; `None` unless
+    /// its rule was [`Self::Repeat`].
     pub(super) fn joins(self, age: Option<Duration>) -> bool {
         match self {
             Self::Single => false,

@@ -1,10 +1,8 @@
-//! Table of watched film files in `zerkalo watch`: reports, cursor and mouse.
+//! Table of watched film files: reports, cursor and mouse.
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Mode, WatchTable, short_name};
 use crate::dashboard::panel_lines::scrolled;
-use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
+use crate::dashboard::{Focus, Mode, UpdateContext, WatchTable, short_name};
 use std::path::Path;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
@@ -14,9 +12,8 @@ use zerkalo_scene::value::sanitized;
 use zerkalo_terminal::event::{Mouse, MouseKind};
 
 impl UpdateContext<'_> {
-    /// Stores a report on the watched files. A cursor in the first row of the table stays in the
-    /// first row. Any other cursor follows its entry to the entry's new row. An entry is a film
-    /// file, or one or more shards (parts of a distributed render) without a file.
+    /// Stores a report. The cursor follows its entry to the entry's new row, except from the first
+    /// row.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {
@@ -39,15 +36,13 @@ impl UpdateContext<'_> {
         let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
         let same = report.shards.iter().position(|row| Some(key(row)) == at);
         let (cursor, scroll) = before.map_or((0, 0), |table| (table.cursor, table.scroll));
-        // The rows are sorted by urgency. A cursor in the first row stays on the most urgent entry
-        // until the user moves the cursor.
+        // The first row is the most urgent.
         let cursor = if cursor == 0 { 0 } else { same.unwrap_or(cursor) };
         self.model.watch = Some(WatchTable { report, cursor, scroll });
         self.move_watch_cursor(0);
     }
 
-    /// Moves the cursor of the table of watched files by `steps` rows, and scrolls the table to
-    /// make the cursor visible.
+    /// Moves the cursor of the table and makes it visible.
     pub(super) fn move_watch_cursor(&mut self, steps: isize) {
         let rows = self.model.watch_rows().map_or(1, |(rows, _)| usize::from(rows.height));
         let Some(table) = &mut self.model.watch else { return };
@@ -56,8 +51,7 @@ impl UpdateContext<'_> {
         table.scroll = scrolled(table.scroll, table.cursor, len, rows);
     }
 
-    /// Handles mouse events in `zerkalo watch` while no overlay is open. In the table of files they
-    /// select a row or scroll. In the picture, a click moves the pixel probe.
+    /// Handles mouse events while no overlay is open.
     pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.layout() else { return };
         let in_table = is_in(mouse, layout.outline);

@@ -1,12 +1,9 @@
-//! Drawing of properties and their values, in the inspector and in forms.
+//! Drawing of properties and their values.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{FieldList, Model};
-use crate::dashboard::panel_lines::{FieldLine, PanelLine};
 use crate::dashboard::text::{columns, skip};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
+use crate::dashboard::{Editor, FieldLine, FieldList, Focus, Layout, Model, PanelLine};
 use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
@@ -14,29 +11,21 @@ use zerkalo_render::film::Display;
 use zerkalo_scene::edit::{Property, Widget};
 use zerkalo_scene::value::{number, round_significant};
 
-/// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
-/// the property under the cursor.
+/// Unit of nearly all numbers, therefore shown only for the property under the cursor.
 const LENGTH: &str = "scene units";
 
-/// List of properties, and the areas in which it is drawn.
+/// List of properties, and its areas.
 pub struct Fields<'a> {
-    /// Headings and properties, as lines.
     pub lines: &'a [PanelLine],
-    /// Area of the lines of the property list.
     pub list: Rect,
-    /// Area of the help on the property under the cursor.
     pub help: Rect,
-    /// Cursor, scroll position and text editor of the property list.
     pub state: &'a FieldList,
-    /// Reason why the last change of a value by arrow keys was refused; `None` if it was accepted.
-    /// If the text editor has a reason of its own, the editor's reason is shown instead.
+    /// Reason why a change by arrow keys was refused. One of the text editor is shown instead.
     pub problem: Option<&'a str>,
-    /// `true` if the list receives the keys.
     pub active: bool,
 }
 
-/// Draws the inspector, or nothing if the panel is hidden. Returns the position of the text cursor,
-/// or `None` if the cursor is hidden.
+/// Draws the inspector. Returns the position of the text cursor.
 pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Option<Position> {
     let area = layout.inspector?;
     let (list, help) = model.inspector_rows()?;
@@ -49,8 +38,7 @@ pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Optio
 }
 
 impl Fields<'_> {
-    /// Draws the list of properties. Returns the position of the text cursor, or `None` if the
-    /// cursor is hidden.
+    /// Draws the list. Returns the position of the text cursor.
     pub fn draw(&self, painter: &mut Painter) -> Option<Position> {
         let label = |line: &PanelLine| {
             line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
@@ -121,9 +109,7 @@ impl Fields<'_> {
         None
     }
 
-    /// Draws help on the property under the cursor. If a new value of the property was refused, the
-    /// help is the reason. Otherwise it is the property's description and a description of its
-    /// valid values.
+    /// Draws help on the property under the cursor: why a value was refused, or what is valid.
     fn say(&self, painter: &mut Painter) {
         let theme = painter.theme;
         let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::entry) else {
@@ -143,8 +129,7 @@ impl Fields<'_> {
     }
 }
 
-/// Returns a description of a property's valid values. If the present value is not the default, the
-/// description includes the default.
+/// Describes valid values, with the default if the present value is another.
 fn expected(property: &Property) -> String {
     match &property.default {
         Some(default) if !default.is_empty() && !property.is_default => {
@@ -154,7 +139,7 @@ fn expected(property: &Property) -> String {
     }
 }
 
-/// Draws the heading `title` with a line up to the last column but one of the row `to`.
+/// Draws a heading with a line up to the last column but one.
 pub fn heading(mut to: Row, title: &str) {
     let theme = to.theme;
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
@@ -162,8 +147,8 @@ pub fn heading(mut to: Row, title: &str) {
     to.put(&"─".repeat(left), theme.border(false));
 }
 
-/// Draws the text of `editor` in the free columns of the row `to`. Returns the position of the text
-/// cursor, or `None` if there is no room.
+/// Draws the text of `editor` in the row. Returns the position of the text cursor, or `None` if
+/// there is no room.
 pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
@@ -180,11 +165,9 @@ pub fn typed(editor: &Editor, to: &mut Row) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Returns `value` as it is displayed outside of the text editor: a number with many digits is
-/// rounded to six significant ones, any other text is unchanged.
+/// Shortens a long number to six significant digits.
 fn brief(value: &str) -> Cow<'_, str> {
-    /// Largest length of a number, in characters, up to which it is shown with all its digits.
-    /// Longer numbers are rounded.
+    /// Largest length of a number that is shown with all its digits.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
         Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),

@@ -1,17 +1,13 @@
 //! Border of the picture's panel, with file name, mode and settings of the display.
 
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::text::{columns, cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{CompareView, DisplayChannel, Focus, Layout, Mode, Model};
 use ratatui::style::Modifier;
 use zerkalo_render::film::Tone;
 
-/// Draws the border of the picture's panel with file name, mode, channel, exposure, tone curve and
-/// legend. Draws nothing in full screen.
 pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &mut Painter) {
     let theme = painter.theme;
     let area = layout.picture;
@@ -54,9 +50,8 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
 }
 
-/// Returns short texts for the border of the picture: the channel or comparison that is shown, the
-/// exposure and the tone curve. Default settings have no text. The second value of each pair is
-/// `true` if the text is emphasised.
+/// Returns the channel or comparison, the exposure and the tone curve, unless they are the default,
+/// each with `true` if it is emphasised.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
@@ -79,8 +74,7 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     chips
 }
 
-/// Returns a description of the mode of the picture's panel. Returns `None` in the default mode, in
-/// which the arrow keys orbit.
+/// Describes the mode; `None` in the default mode.
 fn mode(model: &Model) -> Option<String> {
     let selected = || model.selection.title(model.scene());
     Some(match model.mode {

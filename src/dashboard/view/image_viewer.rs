@@ -1,18 +1,15 @@
-//! Drawing of the full-screen viewer of exported images.
+//! Drawing of the viewer of exported images.
 
-use crate::dashboard::model::{Model, short_name};
-use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::paint;
+use crate::dashboard::{Model, ViewedImage, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use zerkalo_terminal::cells::PictureCells;
 use zerkalo_terminal::image::{Protocol, ViewerImage};
 
-/// Draws the viewed image in half blocks (characters that show two pixels per cell) and returns
-/// these cells. If the terminal supports an image protocol, the uploaded image later replaces the
-/// half blocks. Returns `None` if the image is still being read, or if the upload has ended and
-/// placeholder characters of the protocol show the image.
+/// Draws the viewed image in half blocks and returns these cells. The uploaded image later replaces
+/// them. Returns `None` if the image is still being read, or placeholder characters show it.
 pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<PictureCells> {
     let theme = painter.theme;
     let [width, height] = model.screen;
@@ -43,9 +40,7 @@ pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Optio
     Some(cells)
 }
 
-/// Returns two texts: a description of the image (size and progress of the upload), and a hint. The
-/// hint names the command that lists what the terminal needs to show sharper images. The hint is
-/// empty if the terminal supports an image protocol.
+/// Returns size and progress of the image, and a hint if the terminal supports no image protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.layout.size;
     let whole = format!("{width}×{height}");

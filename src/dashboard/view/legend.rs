@@ -1,16 +1,16 @@
 //! Legend of pictures in false colour.
 
 use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::false_color::{Scale, difference, magnitude};
 use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
-use zerkalo_terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
+use zerkalo_terminal::cells::{PictureCells, Raster};
 
-/// Width of the legend's colour bar in columns.
 const BAR: usize = 12;
 
-/// Legend of a false-colour scale: the values at both ends, the unit and a colour bar.
+/// Legend of a scale: the values at both ends, the unit and a colour bar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
     low: String,
@@ -20,16 +20,14 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Creates the legend of a false-colour picture. `scale` gives the values at the ends of the
-    /// colour bar, and `unit` is their unit.
+    /// Creates the legend of `scale`.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
         Self { low, high, unit: unit.to_string(), bar }
     }
 
-    /// Creates the legend of false-colour differences from `-end` to `end` in 8-bit levels. `rms`
-    /// is the root mean square of the differences.
+    /// Creates the legend of differences from `-end` to `end`. `rms` is their root mean square.
     pub fn difference(end: f64, rms: f64) -> Self {
         Self {
             low: format!("-{end}"),
@@ -39,13 +37,11 @@ impl Legend {
         }
     }
 
-    /// Returns the width of the whole legend in columns.
     fn columns(&self) -> usize {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of the row `line`. Omits the unit if there is no
-    /// room for it. Draws nothing if even the legend without the unit does not fit.
+    /// Draws the legend at the right end of the row, without the unit if there is no room for it.
     pub fn draw(&self, mut line: Row) {
         let theme = line.theme;
         let words = columns(&self.unit) + 1;
@@ -66,8 +62,7 @@ impl Legend {
     }
 }
 
-/// Returns a colour bar: a row of cells with the colours that `color` assigns to values from 0 to
-/// 1.
+/// Returns a bar with the colours of values from 0 to 1.
 fn bar(color: impl Fn(f64) -> [u8; 3]) -> Raster {
     Raster::from_fn(BAR, 2, |i| color((i % BAR) as f64 / (BAR - 1) as f64))
 }

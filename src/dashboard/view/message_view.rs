@@ -1,24 +1,21 @@
-//! Messages in the picture's panel: errors of the scene file, and the reason why a scene cannot be
-//! rendered.
+//! Errors of the scene file, and the reason why a scene cannot be rendered, in the picture's panel.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::{Margin, Rect};
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::session::State;
 use zerkalo_scene::Diagnostic;
 use zerkalo_scene::value::sanitized;
 
-/// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {
     let inner = layout.picture.inner(BORDER);
     let (x, y) = if inner.width > 50 && inner.height > 12 { (3, 1) } else { (1, 0) };
     inner.inner(Margin::new(x, y))
 }
 
-/// Draws the errors of a scene file that has never been readable since the start of the dashboard.
+/// Draws the errors of a scene file that has never been readable.
 pub fn broken(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let Some(errors) = &model.file.broken else { return };
@@ -36,7 +33,7 @@ pub fn broken(model: &Model, layout: &Layout, painter: &mut Painter) {
     painter.paragraphs(text_area(layout), &texts);
 }
 
-/// Formats a diagnostic of a scene file as texts with their styles: location, problem, help.
+/// Formats location, problem and help.
 fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     if let Some((line, column)) = message.line_column {
@@ -53,8 +50,7 @@ fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     texts
 }
 
-/// Draws up to two messages over the last picture. The first is the reason why the current scene
-/// cannot be rendered. The second, on the lower border of the panel, is the first error of a scene
+/// Draws the reason why the scene cannot be rendered, and on the border the first error of a scene
 /// file that has become unreadable.
 pub fn failure(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;

@@ -1,8 +1,6 @@
-//! Drawing of the dashboard's model into a buffer of terminal cells.
-//!
-//! The cells of the picture are computed separately by [`View::picture`] and cached until one of
-//! their inputs changes.
+//! Drawing of the model into a buffer of terminal cells. The cells of the picture are cached.
 
+mod false_color;
 mod fields;
 mod frame;
 mod image_viewer;
@@ -20,10 +18,9 @@ mod tests;
 mod theme;
 mod watch;
 
-use crate::dashboard::layout::{Focus, Layout, SMALLEST};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::layout::SMALLEST;
 use crate::dashboard::text;
+use crate::dashboard::{Focus, Layout, Model, Overlay};
 use painter::Painter;
 use picture::PictureView;
 pub use picture::is_settled;
@@ -33,27 +30,23 @@ use ratatui::style::Style;
 use theme::Theme;
 use zerkalo_terminal::cells::{Colors, PictureCells};
 
-/// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Inputs for which the cells of the picture were computed; `None` before the first picture.
+    /// Inputs of `picture`.
     made_for: Option<Version>,
     picture: PictureCells,
-    /// Rectangle of the screen in which the picture was last drawn.
+    /// Rectangle in which the picture was last drawn.
     pub place: Rect,
-    /// Row-major mask of the cells of `place`: `true` if no overlay or mark covers the cell.
+    /// Row-major mask of the cells of `place`: `true` if nothing covers the cell.
     pub uncovered: Vec<bool>,
 }
 
-/// Inputs of the picture's cells: the model's counter of changes of the picture, the columns and
-/// rows of half cells (upper or lower halves of cells), and the set of colours.
+/// Version of the picture, columns and rows of half cells, and set of colours.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
-    /// Returns the terminal cells of the rendered picture for the area in `layout`. They are
-    /// cached, and computed again only if an input has changed: the model's counter of changes of
-    /// the picture, the size of the area, or the set of colours.
+    /// Returns the cells of the picture for the area in `layout`.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
@@ -65,8 +58,8 @@ impl View {
         &self.picture
     }
 
-    /// Draws `model` into `buffer`, which must be empty and have the size of the model's screen.
-    /// Returns the position of the text cursor, or `None` if the cursor is hidden.
+    /// Draws `model` into `buffer`, which must be empty and have the size of the screen. Returns
+    /// the position of the text cursor.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme { colors: model.colors };
         let painter = &mut Painter { theme, buffer };
@@ -96,7 +89,7 @@ impl View {
         }
         status::draw(model, layout.status, painter);
         status::hints_line(model, layout.hints, painter);
-        // An open form replaces the panels: outline, inspector and plot are not drawn then.
+        // An open form replaces the panels.
         let mut cursor = None;
         if model.watch.is_some() {
             watch::draw(model, &layout, painter);
@@ -117,13 +110,11 @@ impl View {
     }
 }
 
-/// Returns `true` if key presses go to the panel `focus`: it has the keyboard focus, and no overlay
-/// is open.
+/// Returns `true` if keys go to the panel `focus`.
 fn is_active(model: &Model, focus: Focus) -> bool {
     model.focus == focus && model.overlay.is_none()
 }
 
-/// Draws a message on a terminal that is too small.
 fn too_small([width, height]: [u16; 2], painter: &mut Painter) {
     let [columns, rows] = SMALLEST;
     let message = format!(

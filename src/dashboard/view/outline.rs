@@ -1,16 +1,15 @@
-//! Panel of the outline, a list of everything in the scene that can be selected and edited.
+//! Panel of the outline.
 
-use crate::dashboard::layout::{BORDER, Focus, Layout};
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Model};
-use crate::dashboard::panel_lines::{OutlineEntry, OutlineLine, outline};
+use crate::dashboard::panel_lines::outline;
 use crate::dashboard::text::columns;
+use crate::dashboard::view::false_color::object_color;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, VisibleLine};
+use crate::dashboard::{
+    BORDER, CompareView, DisplayChannel, Focus, Layout, Model, OutlineEntry, OutlineLine,
+};
 use zerkalo_scene::edit::Target;
-use zerkalo_terminal::cells::object_color;
 
-/// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let Some(area) = layout.outline else { return };
@@ -18,7 +17,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     painter.panel(area, "outline", active);
     let inner = area.inner(BORDER);
     let lines = outline(model.scene());
-    // If the picture shows object ids, the outline shows the colour of each object.
+    // The picture then has the same colours.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
@@ -45,8 +44,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
                     None => to.put(if selected { " ▸ " } else { "   " }, name),
                 };
-                // The note, at the right end of the line, is omitted if there is no room for the
-                // whole name beside it.
+                // The name has precedence over the note.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
                 to.put(label, name);
             }

@@ -1,21 +1,19 @@
-//! Drawing of overlays: help, lists, forms, prompts, questions.
+//! Drawing of overlays.
 
 use crate::dashboard::hints::{HelpLine, help};
-use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
-use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut, duration, durations};
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{CommandPalette, Form, Model, Overlay, Pick, Prompt, Question};
 use ratatui::layout::Position;
 use ratatui::style::Style;
 use zerkalo_render::session::QUALITIES;
 
-/// Draws the open overlay. Returns the position of the text cursor, or `None` if the cursor is
-/// hidden.
+/// Draws the open overlay. Returns the position of the text cursor.
 pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
     let theme = painter.theme;
     let mut overlay = OverlayPainter { place: model.overlay_layout()?, theme, painter };
@@ -27,21 +25,19 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
         Overlay::Pick(pick) => overlay.pick(pick),
         Overlay::Form(form) => return overlay.form(model, form),
         Overlay::Prompt(prompt) => return overlay.prompt(prompt),
-        // The image viewer has the whole screen and is drawn by `View::draw`.
+        // `View::draw` draws it on the whole screen.
         Overlay::ViewerImage(_) => {}
         Overlay::Question(question) => overlay.question(question),
     }
     None
 }
 
-/// Painter of an overlay, with the areas of the overlay.
 struct OverlayPainter<'a, 'b> {
     place: OverlayLayout,
     theme: Theme,
     painter: &'a mut Painter<'b>,
 }
 
-/// Line of a list of choices, with the styles of its parts.
 struct Choice<'a> {
     to: Row<'a>,
     name: Style,
@@ -62,12 +58,11 @@ impl OverlayPainter<'_, '_> {
         self.painter.row(self.place.list, row)
     }
 
-    /// Draws `text` in the overlay's area for help.
     fn say(&mut self, text: &str, style: Style) {
         self.painter.paragraphs(self.place.help, &[(text.to_string(), style)]);
     }
 
-    /// Starts row `row` of the overlay's list. `is_chosen` is `true` for the row under the cursor.
+    /// Starts a row of the list. `is_chosen` is `true` for the row under the cursor.
     fn choice(&mut self, row: u16, is_chosen: bool) -> Choice<'_> {
         let theme = self.theme;
         let mut to = self.row(row);
@@ -90,7 +85,7 @@ impl OverlayPainter<'_, '_> {
             match &lines[index] {
                 HelpLine::Heading(title) => heading(to, title),
                 HelpLine::Keys(keys, label) => {
-                    // A long list of keys is truncated so that it does not shorten the label.
+                    // A long list of keys must not shorten the label.
                     let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
                     to.put_right(" ", 0, theme.text());
                     to.put_right(&cut(keys, room), 0, theme.accent());

@@ -9,7 +9,6 @@ use ratatui::widgets::{Block, Clear, Widget};
 use std::borrow::Cow;
 use zerkalo_scene::value::sanitized;
 
-/// Buffer of cells, and the theme in which it is drawn.
 pub struct Painter<'a> {
     pub theme: Theme,
     pub buffer: &'a mut Buffer,
@@ -22,7 +21,7 @@ pub struct VisibleLine {
 }
 
 impl Painter<'_> {
-    /// Returns a writer of row `row` of `area`, counted from 0. It draws nothing outside `area`.
+    /// Returns a writer of row `row` of `area`, counted from 0.
     pub fn row(&mut self, area: Rect, row: u16) -> Row<'_> {
         let bounds = area.intersection(self.buffer.area);
         let y = area.y.saturating_add(row);
@@ -31,7 +30,7 @@ impl Painter<'_> {
         Row { buffer: self.buffer, theme: self.theme, x, end, y }
     }
 
-    /// Draws the border of a panel with its title. `focused` is `true` if the panel has the focus.
+    /// Draws the border of a panel with its title.
     pub fn panel(&mut self, area: Rect, title: &str, focused: bool) {
         let theme = self.theme;
         Block::bordered()
@@ -47,21 +46,19 @@ impl Painter<'_> {
         }
     }
 
-    /// Returns a writer of row `row` of a panel without the outer two columns on both sides, for
-    /// texts on its border.
+    /// Returns a writer of row `row` of a panel's border, without the outer two columns.
     pub fn edge(&mut self, area: Rect, row: u16) -> Row<'_> {
         self.row(Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area }, row)
     }
 
-    /// Draws an empty box with a border and a title over the panels.
+    /// Draws an empty box over the panels.
     pub fn overlay(&mut self, area: Rect, title: &str) {
         Clear.render(area.intersection(self.buffer.area), self.buffer);
         self.panel(area, title, true);
     }
 
-    /// Draws the scroll bar of a list on the border to the right of `area`, unless all of its `len`
-    /// lines are visible. `scroll` is the index of the first visible line; it is reduced if lines
-    /// below the end of the list would be visible.
+    /// Draws the scroll bar of a list to the right of `area`, unless all `len` lines are visible.
+    /// Returns the lines from `scroll` on, or from a smaller index that fills `area`.
     pub fn window(
         &mut self,
         area: Rect,
@@ -83,8 +80,7 @@ impl Painter<'_> {
         (0..area.height).zip(first..len).map(|(row, index)| VisibleLine { row, index })
     }
 
-    /// Draws texts below each other, each wrapped at the width of `area`. An empty text is an empty
-    /// line.
+    /// Draws texts below each other, wrapped. An empty text is an empty line.
     pub fn paragraphs(&mut self, area: Rect, texts: &[(String, Style)]) {
         let lines = texts.iter().flat_map(|(text, style)| {
             wrapped(text, area.width).into_iter().map(move |line| (line, *style))
@@ -95,25 +91,21 @@ impl Painter<'_> {
     }
 }
 
-/// Writer of a row of cells, which is filled from left to right.
+/// Writer of a row of cells, from left to right.
 pub struct Row<'a> {
     pub buffer: &'a mut Buffer,
     pub theme: Theme,
-    /// Column of the screen at which the next text begins.
+    /// Column of the next text.
     pub x: u16,
-    /// Column of the screen that follows the last free column of the row.
     end: u16,
-    /// Position of the row on the screen, counted from 0.
     pub y: u16,
 }
 
 impl Row<'_> {
-    /// Returns the number of free columns of the row.
     pub fn left(&self) -> usize {
         usize::from(self.end.saturating_sub(self.x))
     }
 
-    /// Draws `text` in the free columns of the row, truncated if necessary.
     pub fn put(&mut self, text: &str, style: Style) -> &mut Self {
         let left = self.left();
         if left > 0 {
@@ -124,8 +116,7 @@ impl Row<'_> {
         self
     }
 
-    /// Draws `text`, truncated or padded to `width` columns, or to the free columns of the row if
-    /// those are fewer.
+    /// Draws `text`, truncated or padded to `width` columns, if there are as many.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);
@@ -134,8 +125,7 @@ impl Row<'_> {
         self.put(&visible, style).skip(gap)
     }
 
-    /// Draws `text` at the right end of the row's free columns. Draws nothing if there is no room
-    /// for `text` and `gap` free columns before it.
+    /// Draws `text` at the right end, if there is room for it and `gap` columns before it.
     pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
         let text = safe(text);
         let width = columns(&text);
@@ -146,13 +136,11 @@ impl Row<'_> {
         self
     }
 
-    /// Skips `columns` columns of the row, which stay unchanged.
     pub fn skip(&mut self, columns: usize) -> &mut Self {
         self.x += columns.min(self.left()) as u16;
         self
     }
 
-    /// Sets the style of the row's free columns.
     pub fn fill(&mut self, style: Style) -> &mut Self {
         let area = Rect { x: self.x, y: self.y, width: self.end - self.x, height: 1 };
         if area.width > 0 {
@@ -162,7 +150,7 @@ impl Row<'_> {
     }
 }
 
-/// Escapes control characters in `text`, because the buffer would drop them without notice.
+/// Escapes control characters, which the buffer would drop.
 fn safe(text: &str) -> Cow<'_, str> {
     if text.chars().any(char::is_control) {
         Cow::Owned(sanitized(text))

@@ -1,49 +1,35 @@
-//! Conversion of snapshots to rasters (images of half cells), and drawing of the picture's cells. A
-//! half cell is the upper or lower half of a terminal cell.
+//! Conversion of snapshots to rasters, and drawing of the picture's cells.
 
-use crate::dashboard::message::DisplayChannel;
-use crate::dashboard::model::{CompareView, Model};
-use crate::dashboard::overlay::Overlay;
+use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
 use crate::dashboard::view::legend::Legend;
+use crate::dashboard::{CompareView, DisplayChannel, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::sync::Arc;
 use zerkalo_render::film::{Display, LinearImage, TILE};
 use zerkalo_render::session::{Snapshot, State};
-use zerkalo_terminal::cells::{
-    NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
-};
+use zerkalo_terminal::cells::{PictureCells, Raster};
 use zerkalo_world::FirstHit;
 
-/// Converter of the dashboard's model to rasters: images whose pixels are half cells of the
-/// terminal. It caches the pinned picture (an earlier picture that the user has stored for
-/// comparison) at the size of the raster.
+/// Converter of the model to rasters, images of half cells.
 #[derive(Debug, Default)]
 pub struct PictureView {
-    /// Legend of the last raster (image of half cells). `None` if it has no colour scale.
+    /// Legend of the last raster.
     pub legend: Option<Legend>,
     pinned: Option<PinnedCache>,
 }
 
-/// Cache of the pinned picture, which the user has stored for comparison, at the size of the image
-/// on the screen.
+/// Pinned picture at the size on the screen.
 #[derive(Debug)]
 struct PinnedCache {
-    /// Pinned picture (stored by the user for comparison) in pixels of the film, before it is
-    /// resampled to the size on the screen.
     picture: Arc<LinearImage>,
-    /// Width and height of the image on the screen, in half cells (upper or lower halves of
-    /// terminal cells).
     size: [usize; 2],
-    /// Linear radiance of the pinned (stored) picture in each half cell (upper or lower half of a
-    /// terminal cell), row-major.
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes rarely or only by user input. This is the case if
-/// rendering has ended or is paused, if the dashboard watches the film files of other processes, or
-/// if the pinned (stored) picture or an exported image is visible.
+/// Returns `true` if the picture changes rarely or only by user input: if the render rests, films
+/// are watched, or a stored picture is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -55,9 +41,8 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns an image that shows the selected channel or comparison. `size` is the width and
-    /// height of the image in half cells (upper or lower halves of terminal cells). The image is
-    /// empty if its data are missing.
+    /// Returns the selected channel or comparison in `size` half cells, or an empty raster if its
+    /// data are missing.
     pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
         self.legend = None;
         let raster = match (model.comparison.shown, model.channel) {
@@ -98,10 +83,8 @@ impl PictureView {
         }
     }
 
-    /// Returns a raster (image of half cells) that shows one value for each tile of the film in
-    /// false colour, on a logarithmic scale. A tile is a square block of pixels. `values` are the
-    /// values of the tiles, row by row, and `unit` is their unit for the legend. Returns `None` if
-    /// tiles or values are missing.
+    /// Returns one value for each tile of the film in false colour, on a logarithmic scale.
+    /// `values` are row by row.
     fn tiles<T: Copy + Into<f64>>(
         &mut self,
         model: &Model,
@@ -114,8 +97,7 @@ impl PictureView {
         let all = tiles.columns * tiles.rows;
         let values: Vec<f64> = values.get(..all)?.iter().map(|value| (*value).into()).collect();
         let mut scale = Scale::logarithmic(values.iter().copied());
-        // The scale spans at most a factor of 1000. Smaller values have the colour of its lower
-        // end.
+        // The scale spans at most a factor of 1000.
         scale.low = scale.low.max(1e-3 * scale.high);
         self.legend = Some(Legend::magnitude(scale, unit));
         let film = model.scene().film.size.map(|n| n as usize);
@@ -142,10 +124,8 @@ impl PictureView {
         self.pinned.as_ref().map(|cached| &*cached.radiance)
     }
 
-    /// Returns a false-colour raster (image of half cells) of the difference in luma between the
-    /// live picture and the pinned (stored) one, in 8-bit levels: live minus pinned. The scale ends
-    /// at the largest absolute difference, rounded up to 1, 2, 5, 10, 20, 50, … Returns `None` if
-    /// one of the pictures is missing.
+    /// Returns the difference in luma, live minus pinned, in 8-bit levels. The scale ends at the
+    /// largest difference, rounded up by [`round_up`].
     fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
@@ -169,16 +149,14 @@ impl PictureView {
     }
 }
 
-/// Rounds `value` up to one of 1, 2, 5, 10, 20, 50, …
+/// Rounds up to one of 1, 2, 5, 10, 20, 50, …
 fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// Returns two values: the linear radiance of the renderer's latest picture, and the width and
-/// height of the picture. The film stores the contribution of each light group (a set of lights)
-/// separately. The radiance is the sum of these contributions, each multiplied by the current
-/// weight of its group. Returns `None` before the first picture.
+/// Returns linear radiance and size of the latest picture, with the present weights of the light
+/// groups.
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
@@ -186,9 +164,8 @@ fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [
     Some((mixed, [picture.cols, picture.rows]))
 }
 
-/// Returns a raster (image of half cells) with `size` columns and rows. `color` gives the colour of
-/// a first hit, the point at which a camera ray meets an object. Rays without a hit have the colour
-/// [`NO_HIT`]. Returns `None` if the renderer has not reported first hits.
+/// Returns a raster of the first hits in the colours `color`, and [`NO_HIT`] for rays without a
+/// hit.
 fn hit_colors(
     snapshot: &Snapshot,
     size: [usize; 2],
@@ -202,15 +179,12 @@ fn hit_colors(
     Some(resized(Raster::from_fn(hits.columns, hits.rows, pixel), size))
 }
 
-/// Converts linear radiance, row-major, to an image for the terminal (raster) by the display
-/// transform `display`.
 fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
     let to_8 = display.to_8();
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales an image to the given width and height without interpolation. After a change of the
-/// terminal's size, the last picture is scaled until the renderer returns one of the new size.
+/// Scales an image without interpolation, until the session returns one of the new size.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;
@@ -221,7 +195,7 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     })
 }
 
-/// Draws `cells` into `area` from its upper left corner. Cells outside of `area` are omitted.
+/// Draws `cells` into `area` from its upper left corner.
 pub fn paint(cells: &PictureCells, area: Rect, buffer: &mut Buffer) {
     for at in area.intersection(buffer.area).positions() {
         if let Some(cell) = cells.cell(at.x - area.x, at.y - area.y) {
@@ -230,9 +204,8 @@ pub fn paint(cells: &PictureCells, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// Returns two values: the rectangle of the screen that [`paint`] drew `cells` into, and a
-/// row-major mask of its cells. The mask is `true` for a cell that still shows the picture, because
-/// nothing was drawn over it.
+/// Returns the rectangle into which [`paint`] drew `cells`, and a row-major mask that is `true`
+/// where nothing was drawn over them.
 pub fn visible_mask(cells: &PictureCells, area: Rect, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Rect { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));

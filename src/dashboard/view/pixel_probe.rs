@@ -1,18 +1,16 @@
-//! Drawing of the pixel probe: a mark on the picture, and a box with the values of the probed pixel.
+//! Drawing of the pixel probe: a mark on the picture, and a box with values.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use zerkalo_render::film::quantised_8;
 use zerkalo_scene::edit::Target;
 
-/// Width in columns of the box with the values of the probed pixel, with its border.
+/// Width of the box with its border.
 const WIDTH: u16 = 36;
 
-/// Draws the pixel probe: a mark and a box with values. Draws nothing if no pixel is probed.
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let Some([x, y]) = model.probe else { return };
@@ -35,7 +33,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         }
         return;
     }
-    // The box is in the corner farthest from the mark.
+    // The box is farthest from the mark.
     let left = area.x + 2;
     let right = area.x + area.width - WIDTH - 2;
     let x_box = if column < area.x + area.width / 2 { right } else { left };
@@ -58,7 +56,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     }
 }
 
-/// Returns the lines of the pixel probe's box, each as a label and a formatted value.
+/// Returns the lines of the box, each a label and a value.
 fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let Some(probe) = model.probed() else {
         return vec![("samples", "none yet".to_string())];
@@ -82,8 +80,7 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// Returns the label of the object that is visible at a film pixel (column, row). Returns `None` if
-/// there is none, or if the renderer has not reported the objects.
+/// Returns the label of the object that is visible at a film pixel (column, row).
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);

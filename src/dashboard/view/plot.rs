@@ -1,18 +1,16 @@
-//! Convergence plot: noise (estimated error of the picture) over seconds of tracing on logarithmic
-//! axes, with the noise target and the estimated time at which the target is reached.
+//! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
+//! the estimated time at which it is reached.
 
-use crate::dashboard::layout::{BORDER, Layout};
-use crate::dashboard::model::Model;
 use crate::dashboard::text::{columns, number};
 use crate::dashboard::view::painter::Painter;
+use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
 
-/// Logarithmic axis of the convergence plot: the smallest and the largest value on it, both greater
-/// than 0.
+/// Logarithmic axis from `low` to `high`, both greater than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     low: f64,
@@ -20,31 +18,26 @@ struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis that contains all positive finite `values`. The lower end is at most the
-    /// smallest value divided by 1.1, the upper end at least the largest value times 1.1, and they
-    /// differ by at least a factor of 2. Returns `None` if no value is positive and finite.
+    /// Creates an axis that contains all positive finite `values`.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
             low = low.min(value);
             high = high.max(value);
         }
-        // The axis spans at least a factor of 2 before both ends get a margin of 10 %.
+        // The axis spans at least a factor of 2, and both ends get a margin of 10 %.
         (low <= high).then(|| {
             let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
             Self { low: low / stretch, high: high * stretch }
         })
     }
 
-    /// Returns the relative position of `value` on the axis: 0 at the lower end, 1 at the upper
-    /// end. Positions beyond the ends are not clamped.
+    /// Returns the position of `value`: 0 at the lower end, 1 at the upper end.
     fn part(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Returns the values of the axis's ticks. These are powers of ten. If the ends of the axis
-    /// differ by less than a factor of 50, two times and five times each power of ten have ticks,
-    /// too.
+    /// Returns powers of ten, and on a short axis also two and five times these.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;
@@ -54,18 +47,16 @@ impl Axis {
     }
 }
 
-/// Formats the value of an axis's tick without trailing zeros, such as `0.5` or `20`.
+/// Formats the value of a tick, such as `0.5` or `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
-        // A tick below 1 is a product with a negative power of ten, which has a rounding error.
-        // Rounding to six decimals removes it.
+        // Rounding removes the error of a product with a negative power of ten.
         format!("{}", (value * 1e6).round() / 1e6)
     } else {
         format!("{value:.0e}")
     }
 }
 
-/// Draws the convergence plot. Draws nothing if the layout has no area for it.
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let Some(area) = layout.plot else { return };
@@ -73,18 +64,16 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let inner = area.inner(BORDER);
     let points = &model.convergence.points;
     let Some(last) = points.last() else {
-        let middle = inner.height / 2;
         let text = "no estimate of the noise yet";
         let indent = usize::from(inner.width).saturating_sub(columns(text)) / 2;
-        painter.row(inner, middle).skip(indent).put(text, theme.dim());
+        painter.row(inner, inner.height / 2).skip(indent).put(text, theme.dim());
         return;
     };
     let mut title = painter.edge(area, 0);
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_levels)), 0, theme.text());
     let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // Point at which the noise is expected to reach its target. Its time is the mean of the lower
-    // and the upper estimate.
+    // The expected time is the mean of its bounds.
     let reached = match (target, eta) {
         (Some(target), Some((from, to))) if target < last.noise_levels => {
             Some((last.seconds + 0.5 * (from + to), target))
@@ -96,51 +85,48 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
     let Some(plot) = axes(inner, &x, &y, painter) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
-    // A ratatui canvas supports colours, but no other style.
-    let color = |style: Style| style.fg.unwrap_or(Color::Reset);
-    let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
-        x1,
-        y1,
-        x2,
-        y2,
-        color: color(style),
-    };
     Canvas::default()
         .marker(Marker::Braille)
         .x_bounds([0.0, 1.0])
         .y_bounds([0.0, 1.0])
         .paint(|canvas| {
-            let mut dashed = |from: (f64, f64), to: (f64, f64), dash: f64, style| {
-                let at =
-                    |part: f64| (from.0 + (to.0 - from.0) * part, from.1 + (to.1 - from.1) * part);
-                for i in 0..DASHES {
-                    let part = i as f64 / DASHES as f64;
-                    canvas.draw(&line(at(part), at(part + dash / DASHES as f64), style));
-                }
-            };
             if let Some(target) = target {
-                dashed((0.0, y.part(target)), (1.0, y.part(target)), 0.5, theme.good());
+                let ends = [0.0, 1.0].map(|x| (x, y.part(target)));
+                dashes(ends, 0.5, theme.good()).for_each(|dash| canvas.draw(&dash));
             }
             if let Some((seconds, noise)) = reached {
-                let from = place(last.seconds, last.noise_levels);
-                dashed(from, place(seconds, noise), 0.4, theme.dim());
+                let ends = [place(last.seconds, last.noise_levels), place(seconds, noise)];
+                dashes(ends, 0.4, theme.dim()).for_each(|dash| canvas.draw(&dash));
             }
             canvas.layer();
             for pair in points.windows(2) {
-                let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_levels));
-                canvas.draw(&line(a, b, theme.accent()));
+                let ends = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_levels));
+                canvas.draw(&line(ends, theme.accent()));
             }
             let point = place(last.seconds, last.noise_levels);
-            canvas.draw(&line(point, point, theme.accent()));
+            canvas.draw(&line([point; 2], theme.accent()));
         })
         .render(plot, painter.buffer);
 }
 
-/// Number of dashes of a dashed line in the convergence plot.
+/// Returns a line between two points. A canvas supports colours, but no other style.
+fn line([(x1, y1), (x2, y2)]: [(f64, f64); 2], style: Style) -> Line {
+    Line { x1, y1, x2, y2, color: style.fg.unwrap_or(Color::Reset) }
+}
+
+/// Returns the dashes between two points, which cover the share `covered` of the line.
+fn dashes([a, b]: [(f64, f64); 2], covered: f64, style: Style) -> impl Iterator<Item = Line> {
+    let at = move |part: f64| (a.0 + (b.0 - a.0) * part, a.1 + (b.1 - a.1) * part);
+    (0..DASHES).map(move |i| {
+        let start = i as f64 / DASHES as f64;
+        line([start, start + covered / DASHES as f64].map(at), style)
+    })
+}
+
+/// Number of dashes of a dashed line.
 const DASHES: usize = 16;
 
-/// Draws both axes of the convergence plot inside of `area`. Returns the area between them for the
-/// plot. Returns `None` if there is no room.
+/// Draws both axes. Returns the area between them, or `None` if there is no room.
 fn axes(area: Rect, x: &Axis, y: &Axis, painter: &mut Painter) -> Option<Rect> {
     let theme = painter.theme;
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
@@ -160,8 +146,7 @@ fn axes(area: Rect, x: &Axis, y: &Axis, painter: &mut Painter) -> Option<Rect> {
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
-        // The values of the ticks increase, so their rows go from the bottom to the top. A row gets
-        // at most one label.
+        // Ticks go from the bottom to the top. A row gets at most one label.
         if row < free {
             let indent = usize::from(labels) - columns(text);
             painter.row(area, row).skip(indent).put(text, theme.dim());

@@ -1,7 +1,8 @@
-//! Drawing of the status line and the hint line, the last two rows of the screen.
+//! Status line and hint line, the last two rows of the screen.
 
+use crate::dashboard::Model;
 use crate::dashboard::hints::hints;
-use crate::dashboard::model::{Model, Tone};
+use crate::dashboard::model::Tone;
 use crate::dashboard::text::{columns, duration, durations, number};
 use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::painter::Painter;
@@ -14,17 +15,13 @@ use zerkalo_render::session::{Report, State};
 use zerkalo_terminal::Multiplexer;
 use zerkalo_terminal::flow::PacingMode;
 
-/// Part of the status line, such as the noise or the sample count. A part is shown or omitted as a
-/// whole.
+/// Part of the status line, shown or omitted as a whole.
 struct Part {
-    /// Order in which parts are omitted if the status line is too long: the part with the largest
-    /// number first.
+    /// Order in which parts are omitted, the largest number first.
     expendable: u8,
-    /// Pieces of the part's text, each with the style in which it is drawn.
     text: Vec<(String, Style)>,
 }
 
-/// Draws the status line. If it is too long, omits whole parts until the others fit.
 pub fn draw(model: &Model, area: Rect, painter: &mut Painter) {
     let mut parts = parts(model, &painter.theme);
     let width = |parts: &[Part]| -> usize {
@@ -95,22 +92,28 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     if let Some(link) = &model.link {
         parts.push(part(6, vec![plain(rate(link.rate)), dim(" "), dim(mode(link.mode))]));
     }
-    if watching {
-        return parts;
+    if !watching {
+        parts.extend(machine(model, report, theme));
     }
+    parts
+}
+
+/// Returns the precision and the threads of the render.
+fn machine(model: &Model, report: &Report, theme: &Theme) -> [Part; 2] {
+    let dim = |text: &str| (text.to_string(), theme.dim());
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
-    parts.push(part(7, vec![dim(precision)]));
     let threads = match report.threads {
         1 => "1 thread".to_string(),
         n => format!("{n} threads"),
     };
     let priority = if model.low_priority { ", low priority" } else { "" };
-    parts.push(part(5, vec![dim(&threads), dim(priority)]));
-    parts
+    [
+        Part { expendable: 7, text: vec![dim(precision)] },
+        Part { expendable: 5, text: vec![dim(&threads), dim(priority)] },
+    ]
 }
 
-/// Formats the rate of the connection with two or three digits, such as `118 KB/s`. More digits
-/// would change too often to read.
+/// Formats a rate, such as `118 KB/s`. More digits would change too often to read.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -120,8 +123,6 @@ fn rate(bytes_per_second: f64) -> String {
     }
 }
 
-/// Returns the name of a pacing mode (the way in which output is limited to the rate of the
-/// connection).
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
         PacingMode::Unlimited => "local",
@@ -162,8 +163,7 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the picture's noise `levels` in 8-bit levels, the noise target, and the estimated time
-/// until the target is reached, such as `noise 0.84 → 0.5 levels in 3–5 s`.
+/// Formats noise, noise target and remaining time, such as `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(levels), theme.text())];
@@ -181,8 +181,7 @@ fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec
     text
 }
 
-/// Draws the hint line. It shows the current notice (a message to the user) if there is one,
-/// otherwise the key hints.
+/// Draws the notice if there is one, otherwise the key hints.
 pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
     let theme = painter.theme;
     let mut row = painter.row(area, 0);
@@ -202,9 +201,8 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
     }
 }
 
-/// Removes key hints until the others fit in `width` columns. Hints in the middle are removed
-/// first. The last two hints, which lead to all commands, are removed next, and the first hint
-/// last.
+/// Removes hints until the others fit: first those in the middle, then the last two, which lead to
+/// all commands.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

@@ -1,4 +1,4 @@
-//! Colours and text attributes of the user interface, at each colour depth.
+//! Colours and text attributes at each colour depth.
 //!
 //! The tones are readable on both dark and light backgrounds. The most important text has the
 //! terminal's default colour.
@@ -7,16 +7,13 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
 use zerkalo_terminal::cells::{Colors, nearest_xterm};
 
-/// Styles of the user interface for a set of terminal colours, with one method for each kind of
-/// text or border.
+/// Styles for a set of terminal colours.
 #[derive(Clone, Copy, Debug)]
 pub struct Theme {
-    /// Set of terminal colours that the theme uses.
     pub colors: Colors,
 }
 
-/// Colour of the user interface at three colour depths: 24 bits, index of xterm's 256 colours, one
-/// of 16 colours.
+/// Colour at three depths: 24 bits, index of xterm's 256 colours, one of 16 colours.
 type Tone = ([u8; 3], u8, Color);
 
 const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
@@ -38,8 +35,7 @@ impl Theme {
         }
     }
 
-    /// Returns the style with the colour `tone`, or with the text attributes `plain` on terminals
-    /// without colours.
+    /// Returns the style with the colour `tone`, or with `plain` on terminals without colours.
     fn toned(&self, tone: Tone, plain: Modifier) -> Style {
         match self.color(tone) {
             Some(color) => Style::new().fg(color),
@@ -47,17 +43,15 @@ impl Theme {
         }
     }
 
-    /// Returns the style of values, names and titles.
     pub fn text(&self) -> Style {
         Style::new().fg(Color::Reset).remove_modifier(Modifier::DIM)
     }
 
-    /// Returns the style of secondary text: labels, units, default values.
+    /// Returns the style of labels, units and default values.
     pub fn dim(&self) -> Style {
         self.toned(DIM, Modifier::DIM)
     }
 
-    /// Returns the style of headings in lists.
     pub fn heading(&self) -> Style {
         self.dim().remove_modifier(Modifier::DIM).add_modifier(Modifier::BOLD)
     }
@@ -67,23 +61,19 @@ impl Theme {
         self.toned(ACCENT, Modifier::BOLD)
     }
 
-    /// Returns the style of messages about success.
     pub fn good(&self) -> Style {
         self.toned(GOOD, Modifier::BOLD)
     }
 
-    /// Returns the text style of warnings.
     pub fn warn(&self) -> Style {
         self.toned(WARN, Modifier::BOLD)
     }
 
-    /// Returns the style of messages about refusals and failures.
     pub fn bad(&self) -> Style {
         self.toned(BAD, Modifier::BOLD)
     }
 
-    /// Returns the style of the row under the cursor. `active` is `true` if the list that contains
-    /// the row has the keyboard focus.
+    /// Returns the style of the row under the cursor. `active` is `true` if its list has the focus.
     pub fn selected(&self, active: bool) -> Style {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),
@@ -95,13 +85,11 @@ impl Theme {
         }
     }
 
-    /// Returns the style of the border of a panel. `focused` is `true` if the panel has the focus.
     pub fn border(&self, focused: bool) -> Style {
         if focused { self.accent() } else { self.toned(BORDER, Modifier::DIM) }
     }
 
-    /// Returns the border type of a panel. On terminals with few or no colours a thick border marks
-    /// the panel with the focus.
+    /// Returns the border type. With few or no colours, a thick border marks the focus.
     pub fn border_type(&self, focused: bool) -> BorderType {
         match (focused, self.colors) {
             (true, Colors::Sixteen | Colors::Mono) => BorderType::Thick,
@@ -109,8 +97,7 @@ impl Theme {
         }
     }
 
-    /// Returns the style of a colour sample in the 8-bit colour [r, g, b]. Returns `None` if the
-    /// terminal cannot show the colour.
+    /// Returns the style of a colour sample; `None` if the terminal cannot show it.
     pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
         match self.colors {
             Colors::True => Some(Style::new().fg(Color::Rgb(r, g, b))),

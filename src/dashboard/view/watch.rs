@@ -1,26 +1,23 @@
-//! Drawing of the table of watched film files, which other processes write, and of their summary in
-//! the status line.
+//! Drawing of the table of watched film files, and of their summary in the status line.
 
-use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::text::wrapped;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::{Focus, Layout, Model, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
 use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
 use zerkalo_scene::value::sanitized;
 
-/// Width, in terminal columns, of the table column with the time since each file was written.
+/// Width of the column with the time since each file was written.
 const AGE: usize = 7;
-/// Width, in terminal columns, of the table column with the progress of each file in percent.
+/// Width of the column with the progress in percent.
 const SHARE: usize = 5;
-/// Width, in terminal columns, of the table column with the number of samples in each file.
+/// Width of the column with the number of samples.
 const SAMPLES: usize = 12;
 
-/// Draws the table of watched files. Draws nothing if the panel is hidden.
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let theme = painter.theme;
     let (Some(table), Some(area)) = (&model.watch, layout.outline) else { return };
@@ -67,16 +64,14 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     }
 }
 
-/// Draws `texts` into a table row from right to left: the first text is at the right end. Each
-/// element is a text and the width in columns in which the text is right-aligned.
+/// Draws texts with their widths from right to left, each right-aligned.
 fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) {
     for (text, width) in texts {
         to.put_right(&format!("{text:>width$}"), 0, style);
     }
 }
 
-/// Draws details below the table of watched files: the path and the state of one file, or the state
-/// of shards (parts of the render) that have no file.
+/// Draws path and state below the table.
 fn explain(shard: &WatchedShards, area: Rect, painter: &mut Painter) {
     let theme = painter.theme;
     if area.height == 0 {
@@ -107,8 +102,7 @@ fn title(report: &WatchReport) -> String {
     }
 }
 
-/// Returns the name of a row in the table of watched files: the numbers of the shards (parts of a
-/// render) in the file, or the name of the file if these numbers are unknown.
+/// Returns the numbers of the shards in the file, or else its name.
 fn label(shard: &WatchedShards) -> String {
     match (&shard.path, shard.shards.as_str()) {
         (Some(path), "") => short_name(path),
@@ -126,9 +120,7 @@ fn mark(state: &WatchedState, theme: &Theme) -> (&'static str, Style) {
     }
 }
 
-/// Formats the progress of a watched film file in percent, rounded down. 100 % is the number of
-/// samples that its shards (parts of the render) have when they are complete. Empty if this number
-/// is unknown.
+/// Formats the progress in percent, rounded down.
 fn share(shard: &WatchedShards) -> String {
     match shard.total {
         Some(total) if total > 0 => {
@@ -139,8 +131,7 @@ fn share(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats two numbers of samples, such as `1.2/4.8M`: those in a watched film file, and those of
-/// its shards (parts of a render) when they are complete. The second is omitted if it is unknown.
+/// Formats the samples of a file and of its complete shards, such as `1.2/4.8M`.
 fn samples(shard: &WatchedShards) -> String {
     let most = shard.total.unwrap_or(shard.samples).max(1) as f64;
     let units = [(1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k")];
@@ -155,8 +146,7 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats `age`, the time that has passed since a watched film file was written, as a whole number
-/// of one unit, such as `40 s`, `12 min`, `3 h` or `2 d`.
+/// Formats the time since a file was written, such as `40 s`, `12 min`, `3 h` or `2 d`.
 fn age(age: Duration) -> String {
     let seconds = age.as_secs();
     match seconds {
@@ -167,8 +157,8 @@ fn age(age: Duration) -> String {
     }
 }
 
-/// Returns the summary of the watched files for the status line, as texts with their styles: state,
-/// progress of the render in percent, and numbers of files that are late, missing or refused.
+/// Returns state and progress of the render, and the numbers of files that are late, missing or
+/// refused.
 pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     match report.complete {

@@ -1,5 +1,4 @@
-//! Binary BVH: the tree that clustering builds and reinsertion optimises, before its nodes are
-//! collapsed into wide ones.
+//! Binary BVH, which clustering builds and reinsertion optimises.
 
 use glam::Vec3A;
 
@@ -23,11 +22,11 @@ impl Aabb {
     }
 }
 
-/// Node of a binary BVH: a leaf, or an inner node with two children.
+/// Leaf, or inner node with two children.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BinaryNode {
     pub aabb: Aabb,
-    /// Number of primitives of a leaf. It is 0 for an inner node.
+    /// Number of primitives of a leaf; 0 for an inner node.
     pub primitives: u32,
     /// Position of a leaf's first primitive in [`BinaryBvh::order`]. For an inner node, the index
     /// of its first child; the second child is the next node.
@@ -35,27 +34,24 @@ pub struct BinaryNode {
 }
 
 impl BinaryNode {
-    /// Returns `true` for a leaf and `false` for an inner node.
     pub fn is_leaf(&self) -> bool {
         self.primitives > 0
     }
 
-    /// Returns the indices of the two children of an inner node.
+    /// Returns the indices of the children of an inner node.
     pub fn children(&self) -> [usize; 2] {
         [self.first as usize, self.first as usize + 1]
     }
 }
 
-/// Returns the index of the sibling of the node with index `node`, which must not be the root.
-/// Siblings are neighbours in the list of nodes. The first of them has an odd index, because the
-/// root has index 0.
+/// Returns the index of the sibling of `node`, which must not be the root. Siblings are neighbours in
+/// the list of nodes; the first has an odd index, because the root has index 0.
 pub fn sibling(node: usize) -> usize {
     ((node - 1) ^ 1) + 1
 }
 
-/// Binary bounding volume hierarchy.
 pub struct BinaryBvh {
-    /// Nodes of the tree. The root is the first node; the nodes near the root follow it.
+    /// The root is the first node; the nodes near the root follow it.
     pub nodes: Vec<BinaryNode>,
     /// Indices of the primitives, sorted by leaf.
     pub order: Vec<u32>,
@@ -77,8 +73,7 @@ impl BinaryBvh {
     }
 
     /// Merges the leaves of each subtree with at most `in_leaf` primitives into one leaf, unless
-    /// this increases the cost of the tree by the surface area heuristic. `traversal_cost` is the
-    /// cost of a node visit, divided by the cost of a primitive's intersection test.
+    /// this increases the cost of the tree by the surface area heuristic.
     pub fn merge_leaves(&mut self, in_leaf: u32, traversal_cost: f32) {
         let mut counts = vec![0; self.nodes.len()];
         let mut costs = vec![0.0; self.nodes.len()];

@@ -1,30 +1,25 @@
-//! Eight-wide BVH (BVH8): node layout and build.
-//!
-//! A node stores the bounds of its eight children as a structure of arrays. A single ray, or the
-//! interval bounds of a packet, is tested against all eight boxes at once. The build clusters the
-//! primitives into a binary BVH and optimises this BVH by reinsertion. It then collapses the binary
-//! BVH into wide nodes with up to eight children.
+//! Eight-wide BVH (BVH8): node layout and build. A node stores the bounds of its eight children as a
+//! structure of arrays. The build clusters the primitives into a binary BVH, optimises it by
+//! reinsertion, and collapses it into wide nodes.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
 use crate::bvh::clustering::{SearchWindow, cluster};
 use crate::bvh::reinsertion::optimize;
 use glam::Vec3A;
 
-/// Number of children of a node of the BVH.
+/// Number of children of a node.
 pub const BVH_WIDTH: usize = 8;
 
 /// Bit of a child index that marks a leaf.
 pub const LEAF_FLAG: u32 = 1 << 31;
 
-/// Inner node of a BVH8: bounds of up to eight children. Unused slots hold empty boxes, which no
-/// ray intersects.
+/// Inner node of a BVH8. Unused slots hold empty boxes, which no ray intersects.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
-    /// Bounds of the eight children: smallest x, y and z of their boxes, then largest x, y and z.
+    /// Smallest x, y and z of the children's boxes, then largest x, y and z.
     pub bounds: [[f32; BVH_WIDTH]; 6],
-    /// Index of each child in the node array. If [`LEAF_FLAG`] is set, the other bits are the index
-    /// of a leaf.
+    /// Index of each child in the node array, or [`LEAF_FLAG`] and the index of a leaf.
     pub child: [u32; BVH_WIDTH],
 }
 
@@ -41,7 +36,7 @@ const EMPTY_NODE: Bvh8Node = Bvh8Node {
 };
 
 impl Bvh8Node {
-    /// Iterates over the slots of this node that hold a child, 0 to 7.
+    /// Iterates over the slots that hold a child.
     pub fn children(&self) -> impl Iterator<Item = usize> {
         (0..BVH_WIDTH).filter(|i| self.bounds[0][*i] <= self.bounds[3][*i])
     }
@@ -54,16 +49,14 @@ pub struct Bvh8 {
     depth: usize,
 }
 
-/// Effort of a BVH build. A higher effort takes longer and gives a tree with faster traversal.
+/// Effort of a BVH build.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Window in which the bottom-up clustering searches for the nearest node of each node.
+    /// Window of the clustering.
     pub window: SearchWindow,
-    /// Share of the binary BVH's nodes, 0 to 1, that reinsertion may move before small leaves are
-    /// merged.
+    /// Share of the nodes, 0 to 1, that reinsertion may move before small leaves are merged.
     pub reinsertion: f32,
-    /// Share of the binary BVH's nodes, 0 to 1, that reinsertion may move after small leaves are
-    /// merged.
+    /// Share of the nodes that reinsertion may move afterwards.
     pub second_reinsertion: f32,
     /// Cost of a node visit divided by the cost of a primitive's intersection test, in the surface
     /// area heuristic. A higher cost gives larger leaves.
@@ -88,13 +81,13 @@ impl BuildQuality {
     };
 }
 
-/// Result of a BVH build: the hierarchy, and the primitives of its leaves.
+/// Result of a BVH build.
 pub struct Bvh8Build {
-    /// Eight-wide hierarchy. Its leaf indices refer to `leaves`.
+    /// Hierarchy, whose leaf indices refer to `leaves`.
     pub bvh: Bvh8,
-    /// Indices of all primitives of the BVH, sorted by leaf.
+    /// Indices of all primitives, sorted by leaf.
     pub order: Vec<u32>,
-    /// Range of each leaf's primitives in `order`: first position, and number of primitives.
+    /// First position and number of each leaf's primitives in `order`.
     pub leaves: Vec<(u32, u32)>,
 }
 
@@ -127,7 +120,7 @@ impl Bvh8 {
         built
     }
 
-    /// Returns the inner nodes of the hierarchy; the first one is the root.
+    /// Returns the inner nodes; the first one is the root.
     pub fn nodes(&self) -> &[Bvh8Node] {
         &self.nodes
     }
@@ -137,15 +130,14 @@ impl Bvh8 {
         self.depth
     }
 
-    /// Returns the memory size of the inner nodes in bytes.
+    /// Returns the memory of the inner nodes in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Bvh8Node>() * self.nodes.len()
     }
 }
 
 impl Bvh8Build {
-    /// Collapses the binary BVH `binary` into eight-wide nodes and leaves, which it appends to
-    /// `self`.
+    /// Appends the eight-wide nodes and leaves that replace `binary`.
     fn collapse(&mut self, binary: &BinaryBvh) {
         let binary_nodes = &binary.nodes;
         let plan = CollapsePlan::new(binary);
@@ -181,14 +173,12 @@ impl Bvh8Build {
 
 /// Optimal collapse of a binary BVH into wide nodes. It minimises the sum of the surface areas of
 /// the nodes, and thereby the expected number of nodes that a random ray visits (Ylitie, Karras and
-/// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*). Unlike
-/// in that paper, the leaves are those of the binary BVH.
+/// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*).
 struct CollapsePlan {
-    /// Best use of the eight child slots of wide nodes. `splits[i][n - 1]` is for the case that the
-    /// subtree of the binary node `i` may take `n` slots, 2 to 8, of a wide node. The entry has the
-    /// numbers of slots for the two children of node `i`, or `[0, 0]` if node `i` itself takes one
-    /// slot. `splits[i][0]` is for the case that node `i` becomes a wide node; it divides the eight
-    /// slots between the two children.
+    /// Division of the child slots of wide nodes. `splits[i][n - 1]`, n from 2 to 8, has the numbers
+    /// of slots for the two children of the binary node i if its subtree takes n slots of a wide
+    /// node; `[0, 0]` if the node itself takes one slot. `splits[i][0]` divides eight slots, for the
+    /// case that the node becomes a wide node.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
@@ -196,11 +186,9 @@ impl CollapsePlan {
     fn new(binary: &BinaryBvh) -> Self {
         let nodes = &binary.nodes;
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
-        // For each binary node and each number of slots that its subtree may take: the smallest sum
-        // of the areas of the wide nodes in this subtree.
+        // Smallest sum of the areas of the wide nodes in a subtree, by the slots that it may take.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
-        // This area is added to the area of each wide node, because otherwise a flat node without
-        // area would have no cost.
+        // Without this area, a node without area would have no cost.
         let least_area = 1e-7 * nodes[0].aabb.half_area() + f32::MIN_POSITIVE;
         for number in binary.parents_first().into_iter().rev() {
             let node = &nodes[number];
@@ -230,8 +218,7 @@ impl CollapsePlan {
         Self { splits }
     }
 
-    /// Appends indices of binary nodes to `out`: the children of a wide node that replaces the
-    /// binary node `node`.
+    /// Appends to `out` the binary nodes that are the children of the wide node that replaces `node`.
     fn children(&self, nodes: &[BinaryNode], node: usize, out: &mut Vec<usize>) {
         let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {

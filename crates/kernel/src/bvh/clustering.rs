@@ -3,43 +3,38 @@
 //!
 //! A pass over the nodes, in the order of the Morton curve, merges every pair of nodes that are
 //! nearest to each other. If many distances are equal, such as between coincident boxes, boxes in a
-//! row or the triangles of a fan, a pass may find a single such pair. The number of passes would
-//! then be proportional to the number of boxes. Such slow passes therefore merge neighbours on the
-//! curve instead.
+//! row or the triangles of a fan, a pass may find a single such pair. Such slow passes merge
+//! neighbours on the curve instead.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
 use crate::bvh::morton::morton_code;
 use glam::{DVec3, Vec3A};
 
-/// Number of node visits per primitive, over all passes so far, after which slow clustering passes
-/// (see [`SLOW`]) no longer merge nearest nodes. Instead they merge the 1st and 2nd node on the
-/// Morton curve, the 3rd and 4th, and so on. Boxes at random positions need 3 visits per primitive
-/// altogether.
+/// Number of node visits per primitive, over all passes so far, after which slow passes merge the
+/// 1st and 2nd node on the Morton curve, the 3rd and 4th, and so on. Boxes at random positions need
+/// 3 visits per primitive altogether.
 const PATIENT_VISITS: usize = 8;
 
-/// Number of nodes per merged pair above which a clustering pass counts as slow.
+/// Number of nodes per merged pair above which a pass counts as slow.
 const SLOW: usize = 16;
 
 /// Index in [`Nearest`] that means "no nearest node found".
 const NONE: u32 = u32::MAX;
 
-/// Window in which a clustering pass searches for the nearest node of each node: the nodes before
-/// and after it on the Morton curve.
+/// Window on the Morton curve in which a pass searches for the nearest node of each node.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchWindow {
-    /// Number of initial passes that search only the previous and the next node of each node.
+    /// Number of initial passes that search only the previous and the next node.
     pub narrow_passes: usize,
     /// Number of nodes before and after each node that the other passes search.
     pub distance: usize,
 }
 
-/// Search result for one node: half the surface area of the box around this node and its nearest
-/// node, and the index of the nearest node.
+/// Index of the nearest node of a node, and half the surface area of the box around both.
 type Nearest = (f32, u32);
 
-/// Builds a binary BVH by clustering, and returns it with the number of clustering passes. `bounds`
-/// are the bounding boxes of the primitives, at least one. Each leaf has one primitive. `window`
-/// limits the search for the nearest node.
+/// Builds a binary BVH of the boxes `bounds`, at least one, with one primitive in each leaf. Returns
+/// it with the number of passes.
 pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> (BinaryBvh, usize) {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);
@@ -91,9 +86,9 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<BinaryNode> {
     codes.iter().map(|(_, i)| leaf(*i)).collect()
 }
 
-/// Finds the nearest node of each node among the `distance` nodes before and after it, and writes
-/// it to `nearest`. The nearest node is the one for which the box around both nodes has the
-/// smallest surface area. If several nodes give the same area, the last of them is the nearest.
+/// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after it:
+/// the one for which the box around both has the smallest surface area. Of equal areas, the last
+/// counts.
 fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {
@@ -112,7 +107,6 @@ fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) 
     }
 }
 
-/// Counts the pairs of nodes that are nearest to each other.
 fn mutual_pairs(nearest: &[Nearest]) -> usize {
     let ends_pair = |(i, (_, j)): &(usize, &Nearest)| {
         (*j as usize) < *i && nearest[*j as usize].1 as usize == *i
@@ -120,8 +114,7 @@ fn mutual_pairs(nearest: &[Nearest]) -> usize {
     nearest.iter().enumerate().filter(ends_pair).count()
 }
 
-/// Overwrites `nearest` with pairs of successive nodes: 0 and 1, 2 and 3, and so on. The last of an
-/// odd number of nodes has no partner.
+/// Pairs successive nodes: 0 and 1, 2 and 3, and so on. The last of an odd number has no partner.
 fn pair_neighbours(nearest: &mut [Nearest]) {
     let paired = nearest.len() & !1;
     for (i, (_, partner)) in nearest.iter_mut().enumerate() {

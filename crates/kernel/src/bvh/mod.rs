@@ -1,5 +1,7 @@
 //! Eight-wide bounding volume hierarchies: build, packet traversal, single-ray traversal.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod binary;
 pub mod build;
 mod clustering;

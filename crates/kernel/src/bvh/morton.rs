@@ -3,9 +3,8 @@
 /// Number of bits of each coordinate in a Morton code.
 const BITS: u32 = 20;
 
-/// Returns the Morton code of a point in the unit cube. Each coordinate, from 0 to 1, is rounded
-/// down to a whole number of 20 bits. Bit k of x is bit 3k of the code, bit k of y is the next bit,
-/// and bit k of z the one after that. A coordinate that is NaN counts as 0.
+/// Returns the Morton code of a point in the unit cube. Bit k of x, rounded down to 20 bits, is bit
+/// 3k of the code; those of y and z follow it. A coordinate that is NaN counts as 0.
 pub fn morton_code(point: [f64; 3]) -> u64 {
     let [x, y, z] = point.map(|x| spread((x * f64::from((1u32 << BITS) - 1)) as u64));
     x | y << 1 | z << 2

@@ -1,10 +1,7 @@
-//! Packet BVH traversal with interval culling.
-//!
-//! A coherent packet is tested against the eight boxes of a node at once, by interval bounds: the
-//! smallest and the largest origin and inverse direction of its rays on each axis (Boulos, Wald and
-//! Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). The individual
-//! rays are tested only against the boxes that pass this first test. Single-ray traversal
-//! (`single.rs`) uses the same test, with bounds that contain one ray.
+//! Packet BVH traversal with interval culling: a coherent packet is tested against the eight boxes
+//! of a node at once, by interval bounds of its rays (Boulos, Wald and Shirley 2006, *Geometric and
+//! Arithmetic Culling Methods for Entire Ray Packets*). The individual rays are tested only against
+//! the boxes that pass. Single-ray traversal uses the same test, with bounds of one ray.
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -15,16 +12,15 @@ use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 pub struct SlabPacket<L> {
     /// Ray origins plus the padding by which boxes are enlarged.
     pub above: Vec3<L>,
-    /// Ray origins minus the padding by which boxes are enlarged.
+    /// Ray origins minus the padding.
     pub below: Vec3<L>,
     /// Reciprocals of the ray directions. They are finite even if a component is 0.
     pub inverse: Vec3<L>,
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares the packet `ray` for slab tests. The tests enlarge boxes by `pad` in both
-    /// directions of each axis, to cover the rounding errors of the primitives' own intersection
-    /// tests.
+    /// Prepares slab tests that enlarge boxes by `pad` on each side, to cover the rounding errors of
+    /// the primitives' own intersection tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
@@ -33,8 +29,6 @@ impl<L: SimdFloat> SlabPacket<L> {
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
-    /// Returns the mask of rays that enter the box of child `i` of `node` at a distance of at most
-    /// `limit`.
     #[inline(always)]
     fn enters_child(&self, node: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
@@ -44,35 +38,33 @@ impl<L: SimdFloat> SlabPacket<L> {
         self.enters(corner(0), corner(3), limit)
     }
 
-    /// Returns the mask of rays that enter the box between the corners `low` and `high` at a
-    /// distance of at most `limit`.
+    /// Returns the mask of rays that enter the box from `low` to `high` at a distance of at most
+    /// `limit`.
     #[inline(always)]
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
         let a = (low - self.above).component_mul(self.inverse);
         let b = (high - self.below).component_mul(self.inverse);
-        let near = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(L::zero());
-        let far = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z)) * far_scale();
+        let near = a.min(b).max_element().max(L::zero());
+        let far = a.max(b);
+        let far = far.x.min(far.y).min(far.z) * far_scale();
         near.le(far) & near.le(limit)
     }
 }
 
-/// Interval bounds of the origins and inverse directions of one or several rays. The directions of
-/// all rays have equal signs on each axis.
+/// Interval bounds of the origins and inverse directions of rays whose directions have equal signs
+/// on each axis.
 #[derive(Clone, Copy, Default)]
 pub struct PacketBounds<S> {
-    /// For each axis, the row of [`Bvh8Node::bounds`] with the box sides that the rays pass first.
+    /// Rows of [`Bvh8Node::bounds`] with the box sides that the rays pass first, for each axis.
     pub near: [usize; 3],
-    /// For each axis, the row of [`Bvh8Node::bounds`] with the box sides that the rays pass last.
+    /// Rows with the box sides that the rays pass last.
     pub far: [usize; 3],
-    /// For each axis, the number that is subtracted from the near sides of boxes. If the ray
-    /// directions are positive on this axis, it is the largest ray origin plus the padding;
-    /// otherwise it is the smallest ray origin minus the padding.
+    /// Number that is subtracted from the near sides: the largest ray origin plus the padding if the
+    /// directions are positive on the axis, otherwise the smallest ray origin minus the padding.
     pub near_origin: [S; 3],
-    /// For each axis, the number that is subtracted from the far sides of boxes. If the ray
-    /// directions are positive on this axis, it is the smallest ray origin minus the padding;
-    /// otherwise it is the largest ray origin plus the padding.
+    /// Number that is subtracted from the far sides: the other one of these two.
     pub far_origin: [S; 3],
-    /// Smallest and largest reciprocals of the ray directions, for each axis.
+    /// Smallest and largest reciprocals of the ray directions.
     pub inverse: [[S; 3]; 2],
 }
 
@@ -105,10 +97,9 @@ impl<S: Float> PacketBounds<S> {
         })
     }
 
-    /// Tests one child box of a node per lane. Returns two values for each box: the smallest
-    /// distance at which a ray may enter it, and `true` if a ray may enter it within the distance
-    /// `limit`. `side(k)` returns, for each tested box, its side in row k of [`Bvh8Node::bounds`].
-    /// `ONE` is `true` if the bounds contain a single ray.
+    /// Tests one box per lane: returns the smallest distance at which a ray may enter it, and the
+    /// boxes that a ray may enter within the distance `limit`. `side(k)` is row k of
+    /// [`Bvh8Node::bounds`]. `ONE` is `true` if the bounds contain a single ray.
     ///
     /// If [`SlabPacket::enters`] accepts a box for a ray within the bounds, this function accepts
     /// the box, too, because rounded differences and products are monotonic in their operands.
@@ -124,18 +115,17 @@ impl<S: Float> PacketBounds<S> {
         let far = sides(self.far) - Vec3::splat(self.far_origin);
         let (mut first, mut last) = (near.component_mul(low), far.component_mul(low));
         if !ONE {
-            let (a, b) = (near.component_mul(high), far.component_mul(high));
-            first = Vec3::new(first.x.min(a.x), first.y.min(a.y), first.z.min(a.z));
-            last = Vec3::new(last.x.max(b.x), last.y.max(b.y), last.z.max(b.z));
+            first = first.min(near.component_mul(high));
+            last = last.max(far.component_mul(high));
         }
-        let first = first.x.max(first.y).max(first.z).max(L::zero());
+        let first = first.max_element().max(L::zero());
         let last = last.x.min(last.y).min(last.z) * far_scale();
         (first, first.le(last) & first.le(limit))
     }
 }
 
-/// Returns the smallest and the largest coordinate of `v` on each axis, over the lanes of `mask`.
-/// `first` is the index of one of these lanes.
+/// Returns the smallest and the largest coordinates of `v` in the lanes of `mask`, one of which is
+/// `first`.
 #[inline(always)]
 fn min_max<L: SimdFloat>(
     v: Vec3<L>,
@@ -147,21 +137,20 @@ fn min_max<L: SimdFloat>(
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
-/// Returns the factor, slightly above 1, by which the slab test enlarges exit distances of boxes to
-/// cover rounding, so that no hit is lost (Ize 2013, *Robust BVH Ray Traversal*).
+/// Returns the factor by which the slab test enlarges exit distances to cover rounding, so that no
+/// hit is lost (Ize 2013, *Robust BVH Ray Traversal*).
 #[inline(always)]
 fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
-/// Returns a SIMD vector with `x` in all lanes.
+/// Returns `x` in every lane.
 #[inline(always)]
 pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children, one for each child.
-/// The number at position `part * WIDTH` is loaded into the first lane. If `WIDTH` is greater than
+/// Loads `WIDTH` of eight numbers, beginning with number `part * WIDTH`. If `WIDTH` is greater than
 /// 8, the numbers are repeated from the start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
@@ -174,17 +163,16 @@ pub const fn valid_lanes() -> u32 {
     (1 << BVH_WIDTH) - 1
 }
 
-/// Entry of the packet traversal stack: the index of a child, and the smallest distance at which
-/// rays may enter its box.
+/// Entry of the packet traversal stack: a child, and the smallest distance at which rays may enter
+/// its box.
 #[derive(Clone, Copy, Default)]
 pub struct StackEntry<S> {
     child: u32,
     near: S,
 }
 
-/// Calls `traverse` with a traversal stack of at least `per_level` entries for each level of the
-/// hierarchy. The stack is an array of `SMALL` or `LARGE` entries, or on the heap if `LARGE`
-/// entries do not suffice.
+/// Calls `traverse` with a stack of at least `per_level` entries for each level of the hierarchy: an
+/// array of `SMALL` or `LARGE` entries, or on the heap if these do not suffice.
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     per_level: usize,
@@ -201,9 +189,8 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Pushes `entry` to the traversal stack, which has `top` entries. The entries from index `base`
-/// on, which are children of the same node, stay sorted by descending distance. The nearest child
-/// is thus visited first.
+/// Pushes `entry` to the stack of `top` entries. Those from index `base` on, children of the same
+/// node, stay sorted by descending distance, so that the nearest child is visited first.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],
@@ -221,10 +208,9 @@ fn push_sorted<S: Float>(
 }
 
 /// Traverses the hierarchy with a ray packet. Calls `leaf(index, limit)` for each leaf whose box a
-/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits of the
-/// rays. A ray with a negative limit is inactive. `bounds` are the interval bounds of the active
-/// rays; `None` if the directions of two rays have different signs on an axis. With bounds, the
-/// children of a node are visited in the order of their smallest possible entry distances.
+/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits. A ray with
+/// a negative limit is inactive. `bounds` are those of the active rays; with them, the children of a
+/// node are visited in the order of their smallest possible entry distances.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,

@@ -2,31 +2,28 @@
 //! Bounding Volume Hierarchy Optimization*), with a bound on the number of node visits.
 //!
 //! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
-//! this place skips subtrees that cannot improve the sum. If boxes are nested, the search cannot
-//! skip any subtree and would visit all other nodes for each node. In this case the optimisation
-//! ends when the number of node visits reaches its bound.
+//! this place skips subtrees that cannot improve the sum. If boxes are nested, it cannot skip any
+//! and would visit all other nodes for each node, hence the bound.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode, sibling};
 
-/// Largest total number of node visits of the optimisation by reinsertion, per node of the tree.
-/// The optimisation ends when this number is reached. Boxes at random positions need 1 to 3 visits
-/// per node, boxes that overlap heavily up to 50.
+/// Largest total number of node visits per node of the tree. Boxes at random positions need 1 to 3
+/// visits per node, boxes that overlap heavily up to 50.
 const MAX_VISITS: usize = 64;
 
-/// Move of a subtree in a binary BVH: the subtree `from` becomes the sibling of the node `to`.
+/// Move of the subtree `from`, which becomes the sibling of the node `to`.
 struct Reinsertion {
     from: u32,
     to: u32,
-    /// Decrease of the sum of all nodes' surface areas by this move, divided by 2; greater than 0.
+    /// Half of the surface area that the move saves, greater than 0.
     saved: f32,
 }
 
-/// Search for the best new position of a BVH subtree, with a limited number of node visits.
+/// Search for the best new position of a subtree.
 struct Search {
-    /// Number of node visits left, over all searches, before the optimisation ends.
+    /// Number of node visits left, over all searches.
     visits_left: usize,
-    /// Nodes to visit, the last one first: candidates for the sibling of the moved subtree. The
-    /// number with each node is half of the surface area saved so far. This is the area that the
+    /// Candidates for the sibling of the moved subtree. The number is half of the area that the
     /// removal of the subtree saves, minus the area by which its insertion enlarges the candidate's
     /// ancestors.
     stack: Vec<(f32, u32)>,
@@ -48,7 +45,7 @@ impl<'a> LinkedTree<'a> {
         Self { nodes: &mut tree.nodes, parents }
     }
 
-    /// Stores `node` as the node with the index `index`.
+    /// Stores `node` at `index`.
     fn put(&mut self, index: usize, node: BinaryNode) {
         self.nodes[index] = node;
         if !node.is_leaf() {
@@ -72,8 +69,7 @@ impl<'a> LinkedTree<'a> {
         }
     }
 
-    /// Computes the boxes of the inner node `node` and of its ancestors from those of their
-    /// children.
+    /// Computes the boxes of the inner node `node` and of its ancestors.
     fn refit(&mut self, mut node: usize) {
         loop {
             let [left, right] = self.nodes[node].children().map(|child| self.nodes[child].aabb);
@@ -86,9 +82,8 @@ impl<'a> LinkedTree<'a> {
     }
 }
 
-/// Optimises a binary BVH by moving subtrees in 16 rounds. The first round considers the share
-/// `ratio` (0 to 1) of all nodes: large ones near the root. Round n considers 1/(2n - 1) times as
-/// many nodes as the first.
+/// Moves subtrees in 16 rounds. The first round considers the share `ratio` (0 to 1) of all nodes:
+/// large ones near the root. Round n considers 1/(2n - 1) times as many.
 pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -121,8 +116,7 @@ pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     }
 }
 
-/// Returns the indices of the `count` nodes with the largest surface areas among nodes 1 to `2 *
-/// count + 1`. Node 0 is the root; the nodes near it have the next indices.
+/// Returns the `count` nodes with the largest surface areas among nodes 1 to `2 * count + 1`.
 fn largest_nodes(nodes: &[BinaryNode], count: usize) -> Vec<usize> {
     let end = nodes.len().min(2 * (count + 1));
     let area = |node: usize| nodes[node].aabb.half_area();
@@ -138,8 +132,8 @@ impl Search {
         self.visits_left > 0
     }
 
-    /// Returns the best move of the subtree `node`, which must not be the root. Returns `None` if
-    /// no move saves surface area, or if the limit of node visits is reached.
+    /// Returns the best move of the subtree `node`, which must not be the root; `None` if no move
+    /// saves surface area, or if the limit of visits is reached.
     fn best_reinsertion(&mut self, tree: &LinkedTree, node: usize) -> Option<Reinsertion> {
         let nodes = &*tree.nodes;
         let area = |aabb: &Aabb| aabb.half_area();

@@ -2,24 +2,23 @@
 //! leaf from memory, the others advance.
 //!
 //! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
-//! The other children wait in a stack frame, unsorted. When the ray returns to the frame, the
-//! nearest of these children is selected without branches. Besides memory latency, mispredicted
-//! branches are the main cost of incoherent rays.
+//! The other children wait in a stack frame, unsorted; the nearest of them is selected without
+//! branches when the ray returns. Besides memory latency, mispredicted branches are the main cost of
+//! incoherent rays.
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefetch};
 
-/// Stack frame of single-ray BVH traversal: children of a node that the ray enters and has not
-/// visited yet.
+/// Children of a node that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Sort keys of the node's eight children. A key is the bits of the distance at which the ray
-    /// enters the child, with the slot number in the last three bits. The smallest key belongs to
-    /// the nearest child. Slots without a child to visit have [`NO_KEY`] or a larger key.
+    /// Sort keys of the node's children: the bits of the distance at which the ray enters the child,
+    /// with the slot number in the last three bits. Slots without a child to visit have [`NO_KEY`]
+    /// or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
-    /// Number of children in this frame that have not been visited.
+    /// Number of children that have not been visited.
     remaining: u32,
 }
 
@@ -29,23 +28,22 @@ const NO_KEY: u32 = 0x7f80_0000;
 /// Mask of the low bits of a sort key, which hold the slot number of the child.
 const SLOT_MASK: u32 = BVH_WIDTH as u32 - 1;
 
-/// State of one ray in single-ray BVH traversal.
+/// State of one ray.
 #[derive(Clone, Copy, Default)]
 struct RayTraversal<S> {
     bounds: PacketBounds<S>,
     limit: S,
     /// Index of the node or leaf to visit next, as in [`Bvh8Node::child`].
     child: u32,
-    /// Number of frames on the ray's traversal stack. A frame holds the children of one node that
-    /// wait for a visit.
+    /// Number of frames on the ray's stack.
     frames: usize,
 }
 
 /// Traverses the hierarchy with each ray separately. Rays whose limit is not positive are inactive.
-/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
-/// limit. The children of a node are visited from near to far. `leaf` returns the new limit of the
-/// ray. Calls `prefetch_leaf(index)` one step before it visits the leaf, so that the other rays
-/// advance in between. `frames` has memory for one stack frame for each lane and level.
+/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of
+/// at most its limit, from near to far. `leaf` returns the new limit of the ray. Calls
+/// `prefetch_leaf(index)` one step before, so that the other rays advance in between. `frames` has
+/// memory for one stack frame for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -100,7 +98,7 @@ fn prefetch_node(node: &Bvh8Node) {
     prefetch(&node.child);
 }
 
-/// Removes the smallest sort key, which is that of the nearest child, and returns it.
+/// Removes and returns the smallest sort key.
 #[inline(always)]
 fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
     let least = keys.iter().fold(u32::MAX, |least, key| least.min(*key));
@@ -109,7 +107,7 @@ fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
 }
 
 impl<S: Float> RayTraversal<S> {
-    /// Returns the initial traversal states of all lanes of `packet`, at the root.
+    /// Returns the initial states of all lanes, at the root.
     #[inline(always)]
     fn each<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, limit: L) -> [Self; MAX_WIDTH] {
         let d = packet.inverse;
@@ -135,9 +133,8 @@ impl<S: Float> RayTraversal<S> {
         each
     }
 
-    /// Visits the current node of the ray. The ray continues with the nearest child that it enters,
-    /// and a stack frame with its other entered children is pushed. Returns `false` if the ray
-    /// enters no child.
+    /// Visits the current node: continues with the nearest child that the ray enters, and pushes a
+    /// frame with the others. Returns `false` if the ray enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
@@ -148,8 +145,7 @@ impl<S: Float> RayTraversal<S> {
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
             // The distance is reduced by more than the rounding error of the conversion to single
-            // precision. The sort key therefore never exceeds the true distance, and no child
-            // within the limit is skipped.
+            // precision, so that no child within the limit is skipped.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
@@ -161,8 +157,8 @@ impl<S: Float> RayTraversal<S> {
             return false;
         }
         let slot = pop_least(&mut keys) & SLOT_MASK;
-        // The frame is always written, which saves a branch. If no child remains, `frames` is not
-        // increased, and the next frame overwrites this one.
+        // The frame is always written, which saves a branch. If no child remains, the next frame
+        // overwrites this one.
         let remaining = entered.count_ones() - 1;
         frames[self.frames] = StackFrame { keys, node: self.child, remaining };
         self.frames += usize::from(remaining != 0);
@@ -170,8 +166,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest unvisited child in the topmost stack frame that has such a child
-    /// within the ray's distance limit. Returns `false` if no frame has one.
+    /// Continues with the nearest unvisited child within the limit, in the topmost frame that has
+    /// one. Returns `false` if no frame has one.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

@@ -11,10 +11,9 @@
 //! | `wide::f64x8` | double | 8 | production when built for AVX-512 |
 //! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
-//! The arithmetic operations, comparisons and square root of [`SimdFloat`] are IEEE operations. All
-//! instances of one precision therefore return identical bits. [`SimdFloat::mul_add`] is fused on
-//! all instances or on none. Only `sin_cos`, `atan2`, `ln` and `exp` may differ by a few ulps
-//! between the vector instances and those of width 1.
+//! All instances of one precision return identical bits, because arithmetic operations, comparisons
+//! and square root are IEEE operations, and [`SimdFloat::mul_add`] is fused on all instances or on
+//! none. Only `sin_cos`, `atan2`, `ln` and `exp` may differ by a few ulps at width 1.
 
 mod scalar;
 mod vec3;
@@ -27,27 +26,24 @@ use std::ops::{
     Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Shl, Shr, Sub, SubAssign,
 };
 
-/// Single-precision SIMD vector that the renderer uses: eight lanes.
+/// Single-precision SIMD vector that the renderer uses.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Single = wide::f32x8;
-/// Double-precision SIMD vector that the renderer uses: four lanes.
+/// Double-precision SIMD vector that the renderer uses.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Double = wide::f64x4;
-/// Single-precision SIMD vector that the renderer uses with AVX-512: 16 lanes.
+/// Single-precision SIMD vector that the renderer uses with AVX-512.
 #[cfg(target_feature = "avx512f")]
 pub type Single = wide::f32x16;
-/// Double-precision SIMD vector that the renderer uses with AVX-512: eight lanes.
+/// Double-precision SIMD vector that the renderer uses with AVX-512.
 #[cfg(target_feature = "avx512f")]
 pub type Double = wide::f64x8;
 
-/// Number of lanes of the widest SIMD type of this build. Arrays that are indexed by lane have this
-/// length.
+/// Number of lanes of the widest SIMD type of this build, and length of arrays indexed by lane.
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
-/// Returns the array whose element `i` is `f(i)`.
-///
-/// This is `std::array::from_fn` as a plain loop. The standard function compiles to four nested
-/// calls per closure, which the compiler does not always inline into a kernel.
+/// Returns the array whose element `i` is `f(i)`: `std::array::from_fn` as a plain loop, which the
+/// compiler always inlines into a kernel.
 #[inline(always)]
 pub fn array_from_fn<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [T; N] {
     const { assert!(N > 0) };
@@ -60,14 +56,13 @@ pub fn array_from_fn<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> 
 
 /// Type of one lane: `f32` or `f64`.
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
-    /// Distance from 1 to the next larger number of this floating-point type.
+    /// Distance from 1 to the next larger number.
     const EPSILON: f64;
-    /// Rounds `x` to the nearest value of this floating-point type.
+    /// Rounds `x` to the nearest value.
     fn from_f64(x: f64) -> Self;
     /// Converts to double precision without rounding.
     fn to_f64(self) -> f64;
-    /// Converts to an integer, rounded towards zero. Negative numbers become 0; numbers above the
-    /// largest `u32` become the largest `u32`.
+    /// Converts to an integer, rounded towards zero and clamped to the range of `u32`.
     fn to_u32(self) -> u32;
 }
 
@@ -96,8 +91,7 @@ macro_rules! float {
 float!(f32);
 float!(f64);
 
-/// Implements methods of [`SimdFloat`] for the type `$type` by calling the inherent methods of this
-/// type with the same names.
+/// Implements methods of [`SimdFloat`] by the inherent methods of `$type` with the same names.
 macro_rules! by_own_methods {
     ($type:ident: $($name:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
         #[inline(always)]
@@ -108,7 +102,7 @@ macro_rules! by_own_methods {
 }
 use by_own_methods;
 
-/// Result of a lane-wise comparison: one truth value for each lane.
+/// Result of a lane-wise comparison.
 pub trait Mask:
     Copy
     + Debug
@@ -123,9 +117,9 @@ pub trait Mask:
     fn any(self) -> bool;
     /// Returns `true` if every lane is true.
     fn all(self) -> bool;
-    /// Returns the truth values as bits; bit `i` is lane `i`.
+    /// Returns lane `i` as bit `i`.
     fn bits(self) -> u32;
-    /// Returns the truth value of lane `i`.
+    /// Returns lane `i`.
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
         self.bits() >> i & 1 != 0
@@ -135,7 +129,7 @@ pub trait Mask:
     fn none(self) -> bool {
         !self.any()
     }
-    /// Returns the mask of lanes that are true in `self` and false in `other`.
+    /// Returns the lanes that are true in `self` and false in `other`.
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
         self & !other
@@ -161,14 +155,13 @@ pub trait SimdU32:
     fn splat(x: u32) -> Self;
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> u32) -> Self;
-    /// Returns the integer in lane `i`.
+    /// Returns lane `i`.
     fn lane(self, i: usize) -> u32;
     /// Reverses the order of the bits in each lane.
     fn reverse(self) -> Self;
 }
 
-/// SIMD vector of `WIDTH` floats, the number type in which kernels are written; see the
-/// [module](self).
+/// SIMD vector of `WIDTH` floats; see the [module](self).
 pub trait SimdFloat:
     Copy
     + Debug
@@ -188,27 +181,26 @@ pub trait SimdFloat:
     const WIDTH: usize;
     /// Name of the vector type for statistics and reports, such as `f32x8`.
     const NAME: &'static str;
-    /// Distance from 1 to the next larger number of the lanes' floating-point type.
+    /// See [`Float::EPSILON`].
     const EPSILON: f64 = Self::Scalar::EPSILON;
-    /// Largest finite number of the lanes' floating-point type.
+    /// Largest finite number of the lanes.
     const MAX: f64;
-    /// Type of one lane: `f32` or `f64`.
+    /// Type of one lane.
     type Scalar: Float;
-    /// Type of lane-wise comparison results.
+    /// Type of comparison results.
     type Mask: Mask;
-    /// Vector of 32-bit integers with the same number of lanes.
+    /// Integers with the same number of lanes.
     type SimdU32: SimdU32;
 
     /// Returns `x` in every lane.
     fn splat(x: Self::Scalar) -> Self;
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
-    /// Returns `table[indices[i]]` in each lane `i`. Each index must be less than the length of
-    /// `table`.
+    /// Returns `table[indices[i]]` in each lane `i`.
     fn gather(table: &[Self::Scalar], indices: &[u32; MAX_WIDTH]) -> Self;
-    /// Returns the number in lane `i`.
+    /// Returns lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
-    /// Returns `x`, rounded to the lanes' floating-point type, in every lane.
+    /// Returns `x`, rounded, in every lane.
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         Self::splat(Self::Scalar::from_f64(x))
@@ -229,38 +221,36 @@ pub trait SimdFloat:
     /// Lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN have
     /// an unspecified value.
     fn min(self, other: Self) -> Self;
-    /// Lane-wise maximum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN have
-    /// an unspecified value.
+    /// Lane-wise maximum, with NaN as for [`SimdFloat::min`].
     fn max(self, other: Self) -> Self;
-    /// Returns the minimum and the maximum over all lanes. NaN lanes are ignored. If all lanes are
-    /// NaN, the results are [`SimdFloat::MAX`] and its negative.
+    /// Returns the minimum and the maximum over all lanes except NaN; without others,
+    /// [`SimdFloat::MAX`] and its negative.
     fn min_max(self) -> (Self::Scalar, Self::Scalar);
-    /// Returns the absolute value of each lane.
+    /// Absolute value.
     fn abs(self) -> Self;
-    /// Returns the square root of each lane; NaN for negative numbers.
+    /// Square root; NaN for negative numbers.
     fn sqrt(self) -> Self;
-    /// Returns the sine and the cosine of the angle in each lane, in radians.
+    /// Sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
-    /// Returns the angle of the point (`x`, `self`) from the x axis in each lane, in radians from
-    /// -pi to pi.
+    /// Angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
     fn atan2(self, x: Self) -> Self;
-    /// Returns the natural logarithm of each lane.
+    /// Natural logarithm.
     fn ln(self) -> Self;
-    /// Returns e to the power of each lane.
+    /// e to the power of each lane.
     fn exp(self) -> Self;
-    /// Returns the magnitude of `self` with the sign of `sign`, lane by lane.
+    /// Magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// Returns the mask of lanes where `self < other`; false for NaN.
+    /// Lanes where `self < other`; false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Returns the mask of lanes where `self <= other`; false for NaN.
+    /// Lanes where `self <= other`; false for NaN.
     fn le(self, other: Self) -> Self::Mask;
-    /// Returns the mask of lanes where `self > other`; false for NaN.
+    /// Lanes where `self > other`; false for NaN.
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
         other.lt(self)
     }
-    /// Returns the mask of lanes where `self >= other`; false for NaN.
+    /// Lanes where `self >= other`; false for NaN.
     #[inline(always)]
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
@@ -275,31 +265,28 @@ pub trait SimdFloat:
         Self::select(mask, self, Self::zero())
     }
 
-    /// Stores the bits of a 32-bit id in every lane, reinterpreted as a float. Ids can be selected
-    /// by [`SimdFloat::select`], but arithmetic on them is meaningless. [`SimdFloat::lt`] and
-    /// [`SimdFloat::le`] order ids below 2^31 - 2^23 like integers, because positive floats have
+    /// Stores the bits of a 32-bit id in every lane. Ids can be selected and compared, but not
+    /// computed with: ids below 2^31 - 2^23 have the order of integers, because positive floats have
     /// the order of their bits.
     fn from_id(id: u32) -> Self;
     /// Returns the id that [`SimdFloat::from_id`] has stored in lane `i`.
     fn id_lane(self, i: usize) -> u32;
-    /// Returns the mask of lanes in which [`SimdFloat::from_id`] has stored `id`.
+    /// Returns the lanes in which [`SimdFloat::from_id`] has stored `id`.
     fn id_eq(self, id: u32) -> Self::Mask;
 
-    /// Maps 32 random bits per lane to a number in [0, 1). Single precision uses 24 of the bits.
-    /// Double precision uses all bits, and returns the middle of one of 2^32 equal intervals.
+    /// Maps 32 random bits per lane to a number in [0, 1). Single precision uses 24 of the bits;
+    /// double precision returns the middle of one of 2^32 equal intervals.
     fn to_unit(bits: Self::SimdU32) -> Self;
 
-    /// Returns the sum of `round(lane * scale)` over all lanes. Each lane is rounded separately, so
-    /// that the sum is the same for every number of lanes in a vector. `scale` must be a power of
-    /// two, and `|lane * scale|` at most 2^49.
+    /// Returns the sum of [`SimdFloat::fixed`] over all lanes.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// Returns `round(lane * scale)` of each lane as an integer; array elements beyond the last
-    /// lane are zero. `|lane * scale|` must be at most 2^49.
+    /// Returns `round(lane * scale)` of each lane; array elements beyond the last lane are zero.
+    /// `scale` must be a power of two, and `|lane * scale|` at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
-/// Returns two values: the id in the first lane of `mask`, and the mask of all lanes of `mask` that
-/// have this id. Returns `None` if `mask` is empty.
+/// Returns the id in the first lane of `mask`, and all lanes of `mask` that have this id; `None` if
+/// `mask` is empty.
 #[inline(always)]
 pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
@@ -310,9 +297,19 @@ pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mas
     Some((id, mask & ids.id_eq(id)))
 }
 
-/// Constant 1.5 x 2^52. Adding it to a double `x` with |x| below 2^51 rounds `x` to the nearest
-/// integer, because the sum has no fraction bits. This integer is the difference between the bits
-/// of the sum and the bits of the constant.
+/// Iterates over the distinct ids in the lanes of `mask`: each id, and the lanes that have it.
+#[inline(always)]
+pub fn distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> impl Iterator<Item = (u32, L::Mask)> {
+    let mut remaining = mask;
+    std::iter::from_fn(move || {
+        let (id, lanes) = next_distinct(ids, remaining)?;
+        remaining = remaining.and_not(lanes);
+        Some((id, lanes))
+    })
+}
+
+/// Constant 1.5 x 2^52. Adding it to a double with a magnitude below 2^51 rounds to the nearest
+/// integer, which is the difference between the bits of the sum and those of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Rounds `x` to the nearest integer, ties to even. `|x|` must be below 2^51.

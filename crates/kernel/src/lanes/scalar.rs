@@ -1,6 +1,5 @@
-//! Implementations of the SIMD traits with one lane: `f32` and `f64`. A method of several
-//! floating-point operations executes them in the same order as the implementations with several
-//! lanes do. The results therefore have identical bits.
+//! Implementations of the SIMD traits with one lane: `f32` and `f64`. Operations have the same order
+//! as with several lanes, so that results have identical bits.
 
 use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i64};
 
@@ -107,9 +106,7 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                // The vector types use fused multiply-add on these targets only. On other targets a
-                // fused call would be slow, and its result would differ from that of the vector
-                // types.
+                // The vector types use fused multiply-add on these targets only.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
                     <$float>::mul_add(self, a, b)
                 } else {

@@ -30,12 +30,12 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn splat(v: [L::Scalar; 3]) -> Self {
         Self::new(L::splat(v[0]), L::splat(v[1]), L::splat(v[2]))
     }
-    /// Returns `v`, rounded to the lanes' floating-point type, in every lane.
+    /// Returns `v`, rounded, in every lane.
     #[inline(always)]
     pub fn of(v: [f64; 3]) -> Self {
         Self::splat(v.map(L::Scalar::from_f64))
     }
-    /// Returns the vectors whose lane `i` is `f(i)`.
+    /// Returns the vector whose lane `i` is `f(i)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
         let [mut x, mut y, mut z] = [[L::Scalar::default(); MAX_WIDTH]; 3];
@@ -56,12 +56,12 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
     }
-    /// Returns the dot product with `other`, lane by lane.
+    /// Dot product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
     }
-    /// Returns the cross product `self x o`, lane by lane.
+    /// Cross product `self x o`.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self::new(
@@ -70,7 +70,7 @@ impl<L: SimdFloat> Vec3<L> {
             self.x.mul_add(o.y, -(self.y * o.x)),
         )
     }
-    /// Returns the squared length of the vector in each lane.
+    /// Squared length.
     #[inline(always)]
     pub fn length_squared(self) -> L {
         self.dot(self)
@@ -80,13 +80,13 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn normalize(self) -> Self {
         self * (L::one() / self.length_squared().sqrt())
     }
-    /// Normalises a vector whose length differs from 1 by a few rounding errors. One step of
-    /// Newton's method replaces the square root.
+    /// Normalises a vector whose length differs from 1 by a few rounding errors, by one step of
+    /// Newton's method.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
         self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
     }
-    /// Computes `self * t + b`, with the scalar `t`, lane by lane.
+    /// Computes `self * t + b`.
     #[inline(always)]
     pub fn mul_add(self, t: L, b: Self) -> Self {
         Self::new(self.x.mul_add(t, b.x), self.y.mul_add(t, b.y), self.z.mul_add(t, b.z))
@@ -96,17 +96,27 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
-    /// Returns the largest of the three coordinates in each lane.
+    /// Coordinate-wise minimum.
+    #[inline(always)]
+    pub fn min(self, o: Self) -> Self {
+        Self::new(self.x.min(o.x), self.y.min(o.y), self.z.min(o.z))
+    }
+    /// Coordinate-wise maximum.
+    #[inline(always)]
+    pub fn max(self, o: Self) -> Self {
+        Self::new(self.x.max(o.x), self.y.max(o.y), self.z.max(o.z))
+    }
+    /// Largest coordinate.
     #[inline(always)]
     pub fn max_element(self) -> L {
         self.x.max(self.y).max(self.z)
     }
-    /// Returns the largest absolute value of the three coordinates in each lane.
+    /// Largest absolute value of a coordinate.
     #[inline(always)]
     pub fn max_abs(self) -> L {
         self.x.abs().max(self.y.abs()).max(self.z.abs())
     }
-    /// Returns the vector `yes` in lanes where `mask` is true, `no` elsewhere.
+    /// Returns `yes` in lanes where `mask` is true, `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: Self, no: Self) -> Self {
         Self::new(
@@ -179,12 +189,10 @@ pub struct Frame<L> {
 }
 
 impl<L: SimdFloat> Frame<L> {
-    /// Builds a frame around the unit vector `n` without branches. The frame is continuous in `n`
-    /// except where `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is
-    /// horizontal and the second vertical. A reflection lobe with a square cross-section has sides
-    /// along the tangents; around such a vector they are horizontal and vertical.
-    ///
-    /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
+    /// Builds a frame around the unit vector `n`, continuous in `n` except where `n.z` is 0. Around a
+    /// horizontal vector (`n.y` is 0) the first tangent is horizontal and the second vertical, and so
+    /// are the sides of a reflection lobe with a square cross-section (Duff et al. 2017, *Building an
+    /// Orthonormal Basis, Revisited*, JCGT 6(1)).
     #[inline(always)]
     pub fn around(n: Vec3<L>) -> Self {
         let sign = L::one().copysign(n.z);
@@ -194,12 +202,12 @@ impl<L: SimdFloat> Frame<L> {
         let b = Vec3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
         Self { t, b, n }
     }
-    /// Transforms `v` from the coordinates (t, b, n) of this frame to world coordinates.
+    /// Transforms `v` from the coordinates (t, b, n) to world coordinates.
     #[inline(always)]
     pub fn to_world(&self, v: Vec3<L>) -> Vec3<L> {
         self.t.mul_add(v.x, self.b.mul_add(v.y, self.n * v.z))
     }
-    /// Transforms `v` from world coordinates to the coordinates (t, b, n) of this frame.
+    /// Transforms `v` from world coordinates to the coordinates (t, b, n).
     #[inline(always)]
     pub fn to_local(&self, v: Vec3<L>) -> Vec3<L> {
         Vec3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))

@@ -42,8 +42,7 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// Returns a table for byte shuffles: entry i holds the four bits of i in reverse order, shifted
-/// left by `SHIFT`.
+/// Table for byte shuffles: the four bits of each index in reverse order, shifted left by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -54,8 +53,8 @@ const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     table
 }
 
-/// Reverses the bits of each 32-bit lane by byte shuffles. A table lookup reverses each nibble;
-/// then the bytes of each word are reversed.
+/// Reverses the bits of each lane: a table lookup reverses each nibble, then the bytes of each word
+/// are reversed.
 #[inline(always)]
 fn reverse8(x: u32x8) -> u32x8 {
     use wide::i8x32;
@@ -101,8 +100,7 @@ fn gather_by_lane<L: SimdFloat>(table: &[L::Scalar], indices: &[u32; MAX_WIDTH])
     L::from_fn(|i| table[indices[i] as usize])
 }
 
-/// Returns the same result as [`gather_by_lane`]. A table of 16 elements fits into one register; a
-/// single permutation instruction then looks up all lanes.
+/// Looks up all lanes by one permutation instruction, if the table fits into one register.
 #[cfg(target_feature = "avx512f")]
 #[inline(always)]
 fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
@@ -114,8 +112,7 @@ fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
     f32x16::new(cast(lanes))
 }
 
-/// Adds the two halves of `sums` element by element if it has eight elements. Returns `sums` itself
-/// if it has four.
+/// Adds the halves of `sums` if it has eight elements.
 #[inline(always)]
 fn fold_to_four(sums: &[i64]) -> i64x4 {
     sums.chunks_exact(4)
@@ -180,8 +177,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn min_max(self) -> ($scalar, $scalar) {
-                // The two halves of the vector are compared lane by lane. Then the lanes of the
-                // result are compared one by one.
+                // First the halves of the vector are compared, then the lanes of the result.
                 let max = $vector::splat($scalar::MAX);
                 let [a, b]: [$half; 2] = cast(SimdFloat::min(self, max));
                 let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -max));
@@ -243,9 +239,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                // Each rounded integer is the difference between the bits of `x + ROUNDER` and
-                // those of `ROUNDER`. The sum of all lanes is taken first; the bits of `ROUNDER`
-                // are then subtracted once for each lane.
+                // The bits of `ROUNDER` are subtracted from the sum once for each lane.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut sum = $long::splat(0);
                 for part in self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH) {
@@ -258,8 +252,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Lanes are converted in groups that fill a vector of doubles. If they were
-                // converted one by one, the compiler would emit scattered stores.
+                // Converted one by one, the lanes would be stored separately.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);

@@ -27,31 +27,28 @@ pub enum LightTarget {
     Direction(DVec3),
 }
 
-/// Frustum: all rays from one point (the apex) through a convex quadrilateral. With a lens, also
-/// the rays from all points of the lens around the apex.
+/// All rays from one point (the apex) through a convex quadrilateral, and from all points of a lens
+/// around the apex.
 ///
-/// Each ray from the apex has a direction d, whose component along `forward` is 1. A lens point
-/// apex + o has the ray with the direction d - o / f, where f is `focus`: the two rays meet at the
-/// depth f. At the depth z the distance between them is |o (1 - z / f)|. Within an interval of
-/// depths this distance is largest at one end.
+/// A ray from the apex with the direction d (component along `forward`: 1) and the ray from the lens
+/// point apex + o with the direction d - o / f meet at the depth f, `focus`. At the depth z the
+/// distance between them is |o (1 - z / f)|, which is largest at one end of an interval of depths.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     /// Centre of the lens.
     pub apex: DVec3,
     /// Unit vector perpendicular to the lens.
     pub forward: DVec3,
-    /// Vectors from the apex to the corners of the quadrilateral, with a component of 1 along
-    /// `forward`.
+    /// Vectors from the apex to the corners, with a component of 1 along `forward`.
     pub corners: [DVec3; 4],
     /// Radius of the lens; 0 if all rays start at the apex.
     pub lens_radius: f64,
-    /// Depth f, greater than 0, at which rays from different points of the lens meet.
+    /// Depth f, greater than 0, at which rays through different points of the lens meet.
     pub focus: f64,
 }
 
 impl Frustum {
-    /// Returns the largest distance between a ray from the edge of the lens and the ray from the
-    /// apex that it meets at the depth `focus`, for depths from `near` to `far`.
+    /// Returns the largest distance between two such rays for depths from `near` to `far`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -116,8 +113,8 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Returns `true` if the spheres `self` and `other` may overlap. The test has a margin for the
-    /// rounding errors of rays that start in `other`.
+    /// Returns `true` if the spheres may overlap, with a margin for the rounding errors of rays that
+    /// start in `other`.
     pub fn overlaps(&self, other: &Self) -> bool {
         let errors = ray_error(self.center) + ray_error(other.center);
         self.center.distance(other.center)
@@ -135,7 +132,7 @@ fn ray_error(point: DVec3) -> f64 {
 }
 
 impl BoundingVolume {
-    /// Creates the bounding volume of the canonical form `form`.
+    /// Creates the bounding volume of `form`.
     pub fn new(form: &Form) -> Self {
         let (ball, convex) = (form.bounding_sphere(), form.is_convex());
         Self { ball, plane: form.plane(), convex, slack: 0.0 }
@@ -274,9 +271,8 @@ fn grown(ball: &BoundingSphere) -> BoundingSphere {
     BoundingSphere { radius, ..*ball }
 }
 
-/// Returns the distance between `point` and the convex hull of the spheres `a` and `b`; negative
-/// inside. The hull is the union of all spheres whose centres and radii are interpolated between
-/// those of `a` and `b`.
+/// Returns the distance between `point` and the convex hull of the spheres `a` and `b`, the union of
+/// all spheres interpolated between them; negative inside.
 fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64 {
     let axis = b.center - a.center;
     let length = axis.length().max(f64::MIN_POSITIVE);

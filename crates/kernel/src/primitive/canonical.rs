@@ -214,6 +214,16 @@ pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     point.distance(a + along * t)
 }
 
+/// Returns the rows of a matrix.
+pub fn rows(m: &DMat3) -> [DVec3; 3] {
+    m.transpose().to_cols_array_2d().map(DVec3::from)
+}
+
+/// Returns the Frobenius norm of a matrix, an upper bound of the factor by which it scales lengths.
+pub fn frobenius_norm(m: &DMat3) -> f64 {
+    m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
 /// Returns the factor by which a linear map scales lengths; `None` if the factor depends on the
 /// direction by more than rounding errors.
 pub fn similarity(linear: &DMat3) -> Option<f64> {

@@ -6,11 +6,11 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
-    normals_of_solid, segment_distance,
+    normals_of_solid, rows, segment_distance,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rows, times, transposed_times};
+use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
@@ -45,8 +45,7 @@ impl Form {
 pub const AROUND_TIP: u32 = 64;
 
 impl ConicalFrustumForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_unit: *map * self.scene_from_unit, ..self }
     }
 }
@@ -56,12 +55,7 @@ impl CanonicalShape for ConicalFrustumForm {
         // The first two columns of the matrix map the unit disc to the base. The lengths of their
         // rows are the half-widths of the base's bounding box.
         let m = &self.scene_from_unit;
-        let rows = m.matrix3.transpose();
-        let half = DVec3::new(
-            rows.x_axis.truncate().length(),
-            rows.y_axis.truncate().length(),
-            rows.z_axis.truncate().length(),
-        );
+        let half = DVec3::from(rows(&m.matrix3).map(|row| row.truncate().length()));
         let (base, cap) = (m.translation, m.translation + m.matrix3.z_axis);
         let narrow = half * self.top_radius;
         bounds_of_points(&[base - half, base + half, cap - narrow, cap + narrow])
@@ -74,9 +68,8 @@ impl CanonicalShape for ConicalFrustumForm {
     fn thickness(&self) -> f64 {
         // Smallest distance in the scene between opposite faces of the box around the canonical
         // solid, 2 by 2 by 1.
-        let rows = self.scene_from_unit.matrix3.inverse().transpose();
-        let across = rows.x_axis.length().max(rows.y_axis.length());
-        (2.0 / across).min(rows.z_axis.length().recip())
+        let [x, y, z] = rows(&self.scene_from_unit.matrix3.inverse()).map(DVec3::length);
+        (2.0 / x.max(y)).min(z.recip())
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
@@ -158,7 +151,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
 /// Conical frustum compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
-    /// Position in the scene of the middle of the frustum's axis.
+    /// Middle of the axis in the scene.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
     /// Slope k, from -1 (a cone) to 0 (a cylinder).
@@ -177,7 +170,6 @@ pub struct ConicalFrustum<S> {
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// Compiles a conical frustum.
     pub fn new(form: &ConicalFrustumForm) -> Self {
         let ConicalFrustumForm { scene_from_unit: m, top_radius } = form;
         let inverse = m.matrix3.inverse();
@@ -185,7 +177,7 @@ impl<S: Float> ConicalFrustum<S> {
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
         Self {
             center: center.to_array().map(S::from_f64),
-            unit_from_scene: rows(inverse),
+            unit_from_scene: rounded_rows(inverse),
             slope: S::from_f64(top_radius - 1.0),
             mid_radius: S::from_f64(0.5 * (1.0 + top_radius)),
             cap_normal: up.normalize().to_array().map(S::from_f64),
@@ -197,9 +189,9 @@ impl<S: Float> ConicalFrustum<S> {
 
 /// Segment of a ray's line inside a frustum.
 struct Chord<L: SimdFloat> {
-    /// Point of the line closest to the middle of the frustum's axis, in canonical space.
+    /// Point of the line closest to the middle of the axis, in canonical space.
     point: Vec3<L>,
-    /// Direction of the line, of unit length in canonical space.
+    /// Unit direction in canonical space.
     direction: Vec3<L>,
     /// Distance in the scene from the ray's origin to `point`.
     start: L,
@@ -207,7 +199,6 @@ struct Chord<L: SimdFloat> {
     scale: L,
     /// Distance in canonical space from `point` to the chord's entry.
     enter: L,
-    /// Distance in canonical space from `point` to the chord's exit.
     leave: L,
     /// Lanes whose ray enters through the lateral surface, not through base or cap.
     enters_side: L::Mask,
@@ -222,10 +213,8 @@ impl<L: SimdFloat> Chord<L> {
     }
 }
 
-/// Returns the chord of each ray's line in the frustum; `None` if no line hits it.
-///
-/// Distances are counted from the line's point closest to the solid's middle, so that a distant
-/// origin costs no precision.
+/// Returns the chord of each ray's line; `None` if no line hits the frustum. Distances are counted
+/// from the line's point closest to the middle, so that a distant origin costs no precision.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let half = L::from_f64(0.5);
@@ -233,8 +222,7 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
     let d = d * scale;
-    // The first step along the direction leads from `f` to the point closest to the middle. The
-    // second step removes the rounding error of the first.
+    // The second step removes the rounding error of the first step along the direction.
     let back = -f.dot(d);
     let p = d.mul_add(back, f);
     let again = -p.dot(d);

@@ -21,8 +21,7 @@ pub struct ConvexPolyhedronForm {
 }
 
 impl ConvexPolyhedronForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self {
             faces: self.faces.iter().map(|face| face.transformed(map)).collect(),
             corners: self.corners.iter().map(|c| map.transform_point3(*c)).collect(),
@@ -98,7 +97,6 @@ pub struct ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Compiles a convex polyhedron.
     pub fn new(form: &ConvexPolyhedronForm) -> Self {
         let ConvexPolyhedronForm { faces, corners } = form;
         let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);

@@ -4,7 +4,8 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
+    rows,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -19,8 +20,7 @@ pub struct EllipsoidForm {
 }
 
 impl EllipsoidForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_unit: *map * self.scene_from_unit }
     }
 }
@@ -29,8 +29,7 @@ impl CanonicalShape for EllipsoidForm {
     fn bounds(&self) -> Option<Bounds> {
         // The half-widths of the box are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
-        let rows = m.matrix3.transpose();
-        let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        let half = DVec3::from(rows(&m.matrix3).map(DVec3::length));
         Some((m.translation - half, m.translation + half))
     }
 
@@ -82,12 +81,11 @@ impl CanonicalShape for EllipsoidForm {
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
-    let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+    let size = frobenius_norm(&q);
     // The offset selects one of several nearest points if `point` is the centre or on an axis.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
-    // `size` is the Frobenius norm of Q. The smallest half-axis is therefore at least 1 /
-    // sqrt(size) and at most 3^(1/4) times this length.
+    // The smallest half-axis is at least 1 / sqrt(size) and at most 3^(1/4) times this length.
     let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
     let mut nearest = p;
     for _ in 0..160 {
@@ -117,7 +115,7 @@ pub struct Ellipsoid<S> {
 }
 
 /// Returns the rows of a matrix, rounded to the precision `S`.
-pub fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
+pub fn rounded_rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
@@ -135,13 +133,12 @@ pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Ve
 }
 
 impl<S: Float> Ellipsoid<S> {
-    /// Compiles an ellipsoid.
     pub fn new(form: &EllipsoidForm) -> Self {
         let DAffine3 { matrix3, translation } = form.scene_from_unit;
         Self {
             center: translation.to_array().map(S::from_f64),
-            unit_from_scene: rows(matrix3.inverse()),
-            scene_from_unit: rows(matrix3),
+            unit_from_scene: rounded_rows(matrix3.inverse()),
+            scene_from_unit: rounded_rows(matrix3),
             reach: S::from_f64(form.max_coordinate()),
         }
     }

@@ -23,8 +23,7 @@ pub struct ParallelogramForm {
 }
 
 impl ParallelogramForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
@@ -109,7 +108,6 @@ pub struct Parallelogram<S> {
 }
 
 impl<S: Float> Parallelogram<S> {
-    /// Compiles a parallelogram.
     pub fn new(form: &ParallelogramForm) -> Self {
         let ParallelogramForm { corner, u, v } = *form;
         let n = u.cross(v);

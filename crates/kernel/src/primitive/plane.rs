@@ -19,8 +19,7 @@ pub struct PlaneForm {
 }
 
 impl PlaneForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         let HalfSpace { normal, offset } = self.half_space().transformed(map);
         Self { normal, offset }
     }
@@ -80,7 +79,6 @@ pub struct Plane<S> {
 }
 
 impl<S: Float> Plane<S> {
-    /// Rounds the plane to the precision of the lanes.
     pub fn new(form: &PlaneForm) -> Self {
         let normal = form.normal.to_array().map(S::from_f64);
         Self { normal, offset: S::from_f64(form.offset) }

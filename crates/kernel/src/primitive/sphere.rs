@@ -21,9 +21,8 @@ pub struct SphereForm {
 }
 
 impl SphereForm {
-    /// Returns the image under the invertible affine map `map`: a sphere if the map is a similarity,
-    /// otherwise an ellipsoid.
-    pub fn transformed(self, map: &DAffine3) -> Solid {
+    /// A similarity maps a sphere to a sphere, any other map to an ellipsoid.
+    pub(super) fn transformed(self, map: &DAffine3) -> Solid {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
             Some(scale) => {
@@ -86,7 +85,6 @@ pub struct Sphere<S> {
 }
 
 impl<S: Float> Sphere<S> {
-    /// Rounds the sphere to the precision of the lanes.
     pub fn new(form: &SphereForm) -> Self {
         Self {
             center: form.center.to_array().map(S::from_f64),

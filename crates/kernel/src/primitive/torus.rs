@@ -3,28 +3,26 @@
 //! = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
-//! These zeros of h are found by Newton's method in brackets, one zero in each bracket. Let s be
-//! the distance along the line from its point closest to the centre. Half the derivative of h is s
-//! minus rho'(s). The graph of the distance rho(s) from the axis is a hyperbola. The second
-//! derivative of rho is largest at the point closest to the axis, and exceeds 1 between two known
-//! positions. These two positions divide the line into three pieces on which the derivative of h is
-//! monotone. The derivative therefore has one or three zeros. Between them h is monotone; the zeros
-//! of the derivative bracket the zeros of h (after Yuksel 2022, *High-Performance Polynomial Root
-//! Finding for Graphics*).
+//! Newton's method finds these zeros of h in brackets. Let s be the distance along the line from its
+//! point closest to the centre. Half the derivative of h is s - rho'(s). The graph of rho(s) is a
+//! hyperbola; its second derivative exceeds 1 between two known positions. They divide the line into
+//! three pieces on which the derivative of h is monotone, so that it has one or three zeros, which
+//! bracket the zeros of h (after Yuksel 2022, *High-Performance Polynomial Root Finding for
+//! Graphics*).
 //!
-//! The zeros of h are also the roots of a quartic polynomial. Its coefficients are not used,
-//! because their terms would cancel for thin tubes; h is evaluated from the distance to the ring.
+//! The coefficients of the quartic polynomial with the same zeros are not used, because their terms
+//! would cancel for thin tubes.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid, similarity,
-    sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
+    rows, similarity, sphere_around_box,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use crate::primitive::ellipsoid::{rows, times, transposed_times};
+use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
@@ -40,8 +38,7 @@ pub struct TorusForm {
 }
 
 impl TorusForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(super) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_torus: *map * self.scene_from_torus, ..self }
     }
 
@@ -64,10 +61,8 @@ impl CanonicalShape for TorusForm {
         // The torus is the Minkowski sum of its ring and of a ball with the radius of the tube. So
         // is its box.
         let m = &self.scene_from_torus;
-        let rows = m.matrix3.transpose();
-        let half = [rows.x_axis, rows.y_axis, rows.z_axis]
-            .map(|row| self.ring * row.x.hypot(row.z) + self.tube * row.length());
-        let half = DVec3::from(half);
+        let half = |row: DVec3| self.ring * row.x.hypot(row.z) + self.tube * row.length();
+        let half = DVec3::from(rows(&m.matrix3).map(half));
         Some((m.translation - half, m.translation + half))
     }
 
@@ -90,8 +85,7 @@ impl CanonicalShape for TorusForm {
     /// Returns the smallest distance between opposite faces of the parallelepiped that is the image
     /// of a cube around a ball with the radius of the tube.
     fn thickness(&self) -> f64 {
-        let rows = self.scene_from_torus.matrix3.inverse().transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let rows = rows(&self.scene_from_torus.matrix3.inverse());
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
@@ -105,8 +99,7 @@ impl CanonicalShape for TorusForm {
         if let Some(scale) = similarity(&self.scene_from_torus.matrix3) {
             return Some(distance * scale);
         }
-        let columns = inverse.matrix3.to_cols_array();
-        let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+        let shrinks = frobenius_norm(&inverse.matrix3).recip();
         Some(box_distance(self.bounds()?, point).max(distance * shrinks))
     }
 
@@ -136,21 +129,19 @@ pub struct Torus<S> {
     /// Linear map from the scene to the space in which the ring has radius 1.
     unit_from_scene: [[S; 3]; 3],
     scene_from_unit: [[S; 3]; 3],
-    /// Radius of the tube in the space in which the ring has radius 1.
+    /// Radius of the tube in this space.
     tube: S,
-    /// Reciprocal of the ring's radius.
     inverse_ring: S,
     reach: S,
 }
 
 impl<S: Float> Torus<S> {
-    /// Compiles a torus.
     pub fn new(form: &TorusForm) -> Self {
         let DAffine3 { matrix3, translation } = form.scene_from_unit();
         Self {
             center: translation.to_array().map(S::from_f64),
-            unit_from_scene: rows(matrix3.inverse()),
-            scene_from_unit: rows(matrix3),
+            unit_from_scene: rounded_rows(matrix3.inverse()),
+            scene_from_unit: rounded_rows(matrix3),
             tube: S::from_f64(form.tube / form.ring),
             inverse_ring: S::from_f64(form.ring.recip()),
             reach: S::from_f64(form.max_coordinate()),
@@ -162,23 +153,21 @@ impl<S: Float> Torus<S> {
 /// the machine epsilon, where the ring has radius 1.
 const ROOM: f64 = 64.0;
 
-/// Largest number of steps of the search for one intersection. Bisection alone needs 54 steps in
-/// double precision.
+/// Largest number of steps of the search for one zero. Bisection alone needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
-/// Line of a ray in the space in which the torus's ring has radius 1. A position on the line is a
-/// signed distance from `point`.
+/// Line of a ray in the space in which the ring has radius 1. A position on it is a signed distance
+/// from `point`.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
-    /// Point of the line closest to the torus's centre.
+    /// Point of the line closest to the centre.
     point: Vec3<L>,
-    /// Unit direction of the line.
     direction: Vec3<L>,
-    /// Squared length of the part of the direction that is perpendicular to the torus's axis.
+    /// Squared length of the part of the direction perpendicular to the axis.
     across2: L,
-    /// Position of the ray's origin on the line, relative to `point`.
+    /// Position of the ray's origin.
     origin: L,
-    /// Length in the scene of a step of length 1 in the space of the torus.
+    /// Length in the scene of a step of length 1.
     scale: L,
     tube: L,
     /// Position at which the line enters the region of the torus.
@@ -382,7 +371,6 @@ impl<L: SimdFloat> UnitLine<L> {
         Separators { places, inside }
     }
 
-    /// Converts position `s` of the line to the distance along the ray.
     #[inline(always)]
     fn distance(&self, s: L) -> L {
         (s - self.origin) * self.scale
@@ -463,8 +451,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// Returns the spans of each line; the second one or both may be empty. Returns `None` if no line
-/// crosses the region of the torus.
+/// Returns the spans of each line; the second one or both may be empty.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

@@ -34,21 +34,19 @@ pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// Computes the first part of [`owen`], which does not depend on the seed. The result can be reused
-/// for the same `x` with other seeds.
+/// Computes the first part of [`owen`], which does not depend on the seed.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
-/// Returns the factor of the multiplication in [`owen`]. It is odd and depends only on the seed.
+/// Returns the odd factor of the multiplication in [`owen`].
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)
 }
 
-/// Computes the second part of [`owen`]. `prefix` is the result of [`owen_scramble_prefix`], and
-/// `factor` that of [`owen_factor`].
+/// Computes the second part of [`owen`].
 #[inline(always)]
 pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
     let x = (prefix + seed) * factor;

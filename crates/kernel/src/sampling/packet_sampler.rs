@@ -7,14 +7,14 @@ use crate::sampling::hash::{
 use crate::sampling::sobol;
 use crate::sampling::sobol::DIMENSIONS;
 
-/// Kind of the random numbers: Sobol points or independent numbers.
+/// Kind of the random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplerKind {
-    /// Owen-scrambled Sobol points. The first eight dimensions come from one set of points (the
-    /// joint set). Further dimensions come from further sets of the same points with shuffled
-    /// indices (the padded sets).
+    /// Owen-scrambled Sobol points. The first eight dimensions of a sample, the *joint set*, are
+    /// stratified together. Further dimensions come from *padded sets*: the same points with
+    /// shuffled indices.
     Sobol,
-    /// Independent random numbers for all dimensions.
+    /// Independent random numbers.
     Random,
 }
 
@@ -33,32 +33,26 @@ impl SamplerKind {
     }
 }
 
-/// Settings that determine the random numbers of all samples of a picture. A sample depends only on
-/// these settings, its pixel, its replicate (half of the samples, A or B) and its index.
+/// Settings that determine the random numbers of all samples of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleSettings {
     /// Random seed. The errors of pictures with different seeds are independent.
     pub seed: u64,
-    /// Kind of the random numbers: Sobol points or independent ones.
+    /// Kind of the random numbers.
     pub kind: SamplerKind,
 }
 
-/// Number of Sobol dimensions for a path's first choices between reflection and transmission, one
-/// dimension for each choice. They are the last two dimensions of the joint set, which consists of
-/// the first eight dimensions of a sample, stratified together. With indirect diffuse light, the
-/// direction of the first diffuse bounce uses them instead.
+/// Number of dimensions for a path's first choices between reflection and transmission: the last
+/// ones of the joint set. With indirect diffuse light, the first diffuse bounce uses them instead.
 const CHOICES: u32 = 2;
 
-/// Largest number of surfaces on a path at which the sampled direction uses the joint set (the
-/// first eight Sobol dimensions of a sample).
+/// Largest number of surfaces on a path at which the sampled direction uses the joint set.
 const MAX_JOINT_LOBES: u32 = 2;
 
-/// Number of ways in which a packet can be divided among pixels. A packet has 2^k samples of each
-/// of its pixels, with k from 0 to log2 of the widest packet.
+/// Number of ways in which a packet can be divided among pixels, with 2^k samples of each.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Flags for the random positions that the camera rays of a picture use: in the pixel and on the
-/// lens. Each position takes two dimensions of a sample's Sobol point, starting with dimension 0.
+/// Random positions that camera rays use. Each takes two dimensions, starting with dimension 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraDimensions {
     /// `true` if samples are distributed over the area of their pixel.
@@ -70,39 +64,34 @@ pub struct CameraDimensions {
 /// Sampler of a picture: tables and constants for the random numbers that all packets share.
 pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
-    /// Hash words derived from the random seed: `seeds[replicate]` has two words for replicate 0
-    /// (A) or 1 (B), the two halves of the samples.
+    /// Two hash words of the random seed for each replicate.
     seeds: [[u32; 2]; 2],
-    /// First Sobol dimension of the position on the lens. If samples are distributed over the
-    /// pixel, the two dimensions before it are the position in the pixel.
+    /// First dimension of the position on the lens.
     lens: usize,
-    /// First Sobol dimension of the direction sampled at a path's first surface.
+    /// First dimension of the direction sampled at a path's first surface.
     first_lobe: usize,
-    /// Number of surfaces on a path at which the sampled direction uses the joint set (the first
-    /// eight Sobol dimensions). At later surfaces it uses the padded sets.
+    /// Number of surfaces on a path at which the sampled direction uses the joint set.
     joint_lobes: u32,
-    /// Sobol points of the first indices: `low_bits[k][d]` holds the points 0..2^k in dimension d,
-    /// repeated over the lanes. A packet with 2^k samples of each pixel uses them.
+    /// `low_bits[k][d]` holds the points 0..2^k in dimension d, repeated over the lanes, for packets
+    /// with 2^k samples of each pixel.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Hash constant of each Sobol dimension, by which each dimension is scrambled independently.
+    /// Hash constant of each dimension.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// Sobol points of a block of successive sample indices. They do not depend on pixels; all packets
-/// with these indices therefore share them.
+/// Sobol points of successive sample indices, which the packets of all pixels share.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index of each lane, within the sequence of its pixel.
     index: L::SimdU32,
-    /// Sobol points before scrambling by pixel: `owen_prefix[d]` holds the points of the lanes'
-    /// sample indices in dimension d, after [`owen_scramble_prefix`].
+    /// Points in each dimension after [`owen_scramble_prefix`].
     owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
 impl<L: SimdFloat> Sampler<L> {
-    /// Creates the sampler of a picture. `camera` states which dimensions the camera rays use.
+    /// Creates the sampler of a picture.
     pub fn new(settings: SampleSettings, camera: CameraDimensions) -> Self {
         let lens = if camera.pixel { 2 } else { 0 };
         let first_lobe = lens + if camera.lens { 2 } else { 0 };
@@ -140,9 +129,9 @@ impl<L: SimdFloat> Sampler<L> {
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
-    /// Returns the scrambling key of the samples of pixel (`x`, `y`) in one replicate (half of the
-    /// samples; 0: A, 1: B). Keys are distinct for all pixels of a picture up to 65536 x 65536,
-    /// because every step is a bijection of the packed coordinates.
+    /// Returns the scrambling key of the samples of a pixel in `replicate` 0 (A) or 1 (B). Keys are
+    /// distinct for all pixels of a picture up to 65536 x 65536, because every step is a bijection
+    /// of the packed coordinates.
     #[inline(always)]
     pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
@@ -151,8 +140,7 @@ impl<L: SimdFloat> Sampler<L> {
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
-    /// Creates the sampler of a packet with samples of one pixel. `key` is the [`Sampler::key`] of
-    /// this pixel.
+    /// Creates the sampler of a packet with samples of the pixel with the [`Sampler::key`] `key`.
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
         PacketSampler {
@@ -164,52 +152,45 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
         }
     }
 
-    /// Creates the sampler of a packet with samples of several pixels. `keys` holds the
-    /// [`Sampler::key`] of the pixel in each lane.
+    /// Creates the sampler of a packet with samples of several pixels, with the key of each lane.
     #[inline(always)]
     pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: keys, single_key: None, first_lobe: 0, first_choice: 0 }
     }
 }
 
-/// Largest number of sampled directions in a segment of a path, and largest number of its choices
-/// between reflection and transmission. Up to these numbers, each segment has random numbers of its
-/// own. Diffuse bounces divide a path into segments.
+/// Largest number of sampled directions, and of choices, in a *segment* of a path for which each
+/// segment has random numbers of its own. Diffuse bounces divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
-/// Number of the first random choice for reservoir sampling, which selects the hit at which a
-/// diffuse bounce starts. Smaller numbers belong to choices between reflection and transmission.
+/// Number of the first choice of a reservoir. Smaller numbers belong to choices between reflection
+/// and transmission.
 const RESERVOIR: u32 = 1 << 31;
 
 /// Random numbers of the samples in one packet. Each method returns those for one purpose.
 #[derive(Clone, Copy)]
 pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
-    /// Scrambling key of each lane's pixel, by which pixels get different random numbers.
+    /// Scrambling key of each lane's pixel.
     key: L::SimdU32,
-    /// Scrambling key of the pixel if all lanes belong to the same pixel; otherwise `None`.
+    /// Scrambling key if all lanes belong to the same pixel.
     single_key: Option<u32>,
-    /// Number of the first sampled direction in the current path segment. Diffuse bounces divide a
-    /// path into segments; directions are numbered through all segments.
+    /// Number of the first sampled direction in the segment.
     first_lobe: u32,
-    /// Number of the first choice between reflection and transmission in the current path segment.
-    /// Diffuse bounces divide a path into segments; choices are numbered through all segments.
+    /// Number of the first choice between reflection and transmission in the segment.
     first_choice: u32,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
-    /// Each segment has numbers of its own for sampled directions and choices. The choices use only
-    /// padded sets (Sobol points with shuffled indices), because the direction of the first diffuse
-    /// bounce uses the two Sobol dimensions for choices.
+    /// Its choices use only padded sets.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;
         Self { first_lobe, first_choice: first_lobe + CHOICES, ..*self }
     }
 
-    /// Returns two numbers in [0, 1) for the direction of a path's diffuse bounce `number`, counted
-    /// from 0.
+    /// Returns two numbers in [0, 1) for the direction of diffuse bounce `number`, counted from 0.
     #[inline(always)]
     pub fn diffuse_2d(&self, number: u32) -> (L, L) {
         if number == 0 {
@@ -220,8 +201,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a random number in [0, 1) for the candidate with the number `number` of a reservoir.
-    /// The reservoir selects the hit at which the path continues with a diffuse bounce.
+    /// Returns a random number in [0, 1) for candidate `number` of a reservoir.
     #[inline(always)]
     pub fn reservoir_1d(&self, number: u32) -> L {
         self.padded_choice(RESERVOIR + self.first_choice + number)
@@ -233,7 +213,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (self.joint(0, 0), self.joint(1, 0))
     }
 
-    /// Returns two random numbers in [0, 1) for the position of each sample on the camera's lens.
+    /// Returns two random numbers in [0, 1) for the position on the camera's lens.
     #[inline(always)]
     pub fn lens(&self) -> (L, L) {
         let d = self.points.sampler.lens;
@@ -250,10 +230,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns two random numbers in [0, 1) for a point on emitter `light`, as seen from the
     /// surface that a path hits after `bounce` reflections.
     ///
-    /// They use the dimensions of [`Self::lobe_2d`] at this surface, with another scrambling. Like
-    /// the numbers for the lobe they are stratified together with the position in the pixel and
-    /// with the directions sampled at earlier surfaces. Lobe and emitter may share dimensions,
-    /// because reflected light and light from an emitter are added, never multiplied.
+    /// They use the dimensions of [`Self::lobe_2d`] with another scrambling. Lobe and emitter may
+    /// share dimensions, because their light is added, never multiplied.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
@@ -267,8 +245,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         self.light_2d(bounce, u32::MAX - 1).0
     }
 
-    /// Returns two random numbers in [0, 1) for the surface that a path hits after `bounce`
-    /// reflections. They use the dimensions of [`Self::lobe_2d`], scrambled with `salt`.
+    /// Returns the two dimensions of the surface after `bounce` reflections, scrambled with `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;
@@ -280,8 +257,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a random number in [0, 1) for a path's choice `number` between reflection and
-    /// transmission. Choices are numbered from 0.
+    /// Returns a random number in [0, 1) for choice `number` between reflection and transmission,
+    /// counted from 0.
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
         let number = number + self.first_choice;
@@ -292,8 +269,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns dimension `d` of the joint Sobol set, the first eight dimensions of a sample, in [0,
-    /// 1). Different values of `salt` give independent scramblings.
+    /// Returns dimension `d` of the joint set, scrambled with `salt`.
     #[inline(always)]
     fn joint(&self, d: usize, salt: u32) -> L {
         let points = self.points;
@@ -310,9 +286,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns two random numbers in [0, 1) for the sampled direction with the number `pair`,
-    /// scrambled with `salt`. They come from a padded set: Sobol points with shuffled indices. Four
-    /// directions share a set.
+    /// Returns two dimensions of a padded set for the sampled direction with the number `pair`,
+    /// scrambled with `salt`. Four directions share a set.
     #[cold]
     fn padded(&self, pair: u32, salt: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;
@@ -320,9 +295,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (a, b)
     }
 
-    /// Returns a random number in [0, 1) for the choice with the number `number` between reflection
-    /// and transmission. It comes from a padded set: Sobol points with shuffled indices. Eight
-    /// choices share a set.
+    /// Returns a dimension of a padded set for choice `number`. Eight choices share a set.
     #[cold]
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
@@ -331,9 +304,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         x
     }
 
-    /// Returns the dimensions `dimensions` of the padded set with the number `set`, in [0, 1),
-    /// scrambled with `salt`. A padded set consists of the Sobol points in an order of its own: a
-    /// hash shuffles their indices.
+    /// Returns `dimensions` of the padded set with the number `set`, scrambled with `salt`.
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N], salt: u32) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;

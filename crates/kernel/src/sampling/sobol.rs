@@ -21,17 +21,14 @@ use crate::sampling::hash::hash_scalar;
 /// Number of dimensions of the Sobol points.
 pub const DIMENSIONS: usize = 8;
 
-/// First columns of the bit matrices `M_1`, `M_2` and `M_3`, which permute the indices of the Sobol
-/// points in dimensions 2 to 7, one matrix for each pair of dimensions. They were found by a
-/// search. Each number is a column; its bit r is row r.
+/// First columns of the bit matrices `M_1`, `M_2` and `M_3`. Bit r of a column is row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
     &[1, 2, 7, 12, 22, 39, 88, 191, 277],
 ];
 
-/// Returns column `bit` of the bit matrix `M_k` with k = `pair`, which permutes the indices of the
-/// Sobol points in dimensions 2k and 2k + 1. Bit r of the result is row r.
+/// Returns column `bit` of the bit matrix `M_k` with k = `pair`.
 const fn column(pair: usize, bit: usize) -> u32 {
     let diagonal = 1 << bit;
     if pair == 0 {
@@ -44,8 +41,7 @@ const fn column(pair: usize, bit: usize) -> u32 {
     diagonal | (hash_scalar((32 * (pair - 1) + bit) as u32) & (diagonal - 1))
 }
 
-/// Returns direction number `bit` of the Sobol sequence in dimension 0 or 1. The first binary digit
-/// is in bit 0.
+/// Returns direction number `bit` of the Sobol sequence in dimension 0 or 1.
 const fn direction(dimension: usize, bit: usize) -> u32 {
     let mut row = 1 << bit;
     if dimension == 1 {
@@ -60,7 +56,7 @@ const fn direction(dimension: usize, bit: usize) -> u32 {
     row
 }
 
-/// Returns all 32 direction numbers of a dimension, 0 to 7. The first binary digit is in bit 0.
+/// Returns the direction numbers of a dimension, 0 to 7.
 const fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0; 32];
     let mut bit = 0;
@@ -78,7 +74,7 @@ const fn directions(dimension: usize) -> [u32; 32] {
 type Tables = [[[u32; 256]; 4]; DIMENSIONS];
 
 /// Lookup tables of Sobol points: `TABLES[d][k][byte]` is the contribution (XOR) of byte k of the
-/// index to dimension d. The first binary digit is in bit 0.
+/// index to dimension d.
 static TABLES: Tables = {
     let mut tables = [[[0u32; 256]; 4]; DIMENSIONS];
     let mut d = 0;
@@ -99,8 +95,7 @@ static TABLES: Tables = {
     tables
 };
 
-/// Returns Sobol point `index` in `dimension` (below [`DIMENSIONS`]), as a binary fraction of 32
-/// digits. The first binary digit is in bit 0.
+/// Returns Sobol point `index` in `dimension`, as a binary fraction of 32 digits.
 #[inline(always)]
 pub fn point(dimension: usize, index: u32) -> u32 {
     let t = &TABLES[dimension];

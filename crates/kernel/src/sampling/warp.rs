@@ -1,19 +1,12 @@
-//! Sample warps: maps from the unit square to directions, with their densities. They sample
-//! reflected directions and microfacet normals.
-//!
-//! Directions are in a local frame. Its z axis is the mirror direction for cone and square lobes,
-//! and the surface normal for microfacets.
+//! Sample warps: maps from the unit square to directions in a local frame, with their densities.
+//! The z axis is that of the lobe for cones and squares, and the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
 
 /// Maps the unit square to the unit disk with uniform density. Returns `(x, y, x^2 + y^2)`.
 ///
-/// Concentric squares become concentric circles, so that neighbouring points stay neighbours. If
-/// the integrand has an edge (a jump) along a line through the disk, the same accuracy therefore
-/// needs no more samples than with such an edge in the square. An edge parallel to an axis needs
-/// fewer samples than other edges.
-///
+/// Concentric squares become concentric circles, so that neighbouring points stay neighbours.
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
 pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
@@ -26,11 +19,8 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Returns the coefficients `c` of one of two power series. The first is for `first` = 1, the
-/// second for `first` = 0:
-///
-/// - sin(pi x / 4) = x (`c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...),
-/// - cos(pi x / 4) = `c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...
+/// Returns the coefficients of sin(pi x / 4) / x for `first` = 1, and of cos(pi x / 4) for `first` =
+/// 0, as power series in x^2.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -61,10 +51,8 @@ fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
     k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
 }
 
-/// Samples a direction uniformly in the cone with half-angle theta around z.
-///
-/// `one_minus_cos` is 1 - cos(theta), in [0, 2]. For narrow cones, callers compute it as 2
-/// sin^2(theta / 2), which has less cancellation.
+/// Samples a direction uniformly in the cone with half-angle theta around z. `one_minus_cos` is 1 -
+/// cos(theta), in [0, 2].
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
@@ -124,11 +112,10 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 /// that of V-cavities if `v_cavity` is `true`, otherwise Smith's.
 ///
 /// First, the slopes of a microfacet along x and y are sampled, in units of `alpha`, whether it is
-/// visible or not. They are independent normal deviates with the variance 1/2: the slope along x is
-/// computed from `u`, the slope along y from `v`. Then the component of the slope along the azimuth
-/// of the view is replaced by the slope that has the same quantile among the visible microfacets.
-/// For views near the normal, the replacement changes the slope little. The reflection of an edge
-/// along x or y then depends almost only on one of the two numbers, and is stratified as well.
+/// visible or not: independent normal deviates with the variance 1/2, from `u` and `v`. Then the
+/// component of the slope along the azimuth of the view is replaced by the slope that has the same
+/// quantile among the visible microfacets. For views near the normal this changes the slope little;
+/// the reflection of an edge along x or y is then stratified like one of the two numbers.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,
@@ -179,15 +166,13 @@ fn scaled_erfc<L: SimdFloat>(x: L) -> L {
     polynomial(&K, at) / x.mul_add(L::from_f64(1.5), L::one())
 }
 
-/// Largest value of r = alpha tan(theta) for which [`small_r_shift`] computes the slope of a
-/// visible microfacet. Here alpha is the roughness, and theta is the angle between view and surface
-/// normal.
+/// Largest r = alpha tan(theta) for which [`small_r_shift`] computes the slope of a visible
+/// microfacet; theta is the angle between view and surface normal.
 const SMALL_R: f64 = 0.25;
 
 /// Returns (t - x) / r for a given slope t of microfacets and the slope x that has the same
 /// quantile among the visible microfacets as t has among all. Both are in units of alpha. `rt` is r
-/// times t, and `r2` is r^2. Here r = alpha tan(theta), at most [`SMALL_R`], and theta is the angle
-/// between view and surface normal. [`visible_slope`] computes x for larger r.
+/// times t, and `r2` is r^2, for r up to [`SMALL_R`]. [`visible_slope`] computes x for larger r.
 ///
 /// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked
 /// microfacets, 1e-9 of all, are neglected.
@@ -203,9 +188,8 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
 /// Returns the slope x that has the same quantile among the visible microfacets as `t` has among
 /// all microfacets. The quantiles of x and t differ by 3e-5 at most.
 ///
-/// Slopes are along the view's azimuth, away from the view, in units of alpha. `r` is alpha
-/// tan(theta), where theta is the angle between view and surface normal. `r` is at most 1e6; values
-/// below [`SMALL_R`] count as [`SMALL_R`].
+/// Slopes are along the view's azimuth, away from the view, in units of alpha. `r` is at most 1e6;
+/// values below [`SMALL_R`] count as [`SMALL_R`].
 ///
 /// Among all microfacets, slopes have the density exp(-t^2) / sqrt(pi). Among the visible ones,
 /// with Smith's masking, the density is in proportion to (1 - r x) exp(-x^2), for x < 1 / r (Heitz

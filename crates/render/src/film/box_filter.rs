@@ -1,18 +1,14 @@
 //! Box filter: means of an image's pixels over the cells of a coarser grid, weighted by covered
-//! area. Cells without samples get the value of a neighbour.
+//! area.
 
-/// Pixels of an image that one cell of a smaller image overlaps along one axis, fully or in part. A
-/// cell is a pixel of the smaller image.
+/// Pixels of an image that one cell overlaps along one axis, fully or in part.
 pub(super) struct Coverage {
-    /// Index of the first pixel that the cell overlaps.
     pub first: usize,
-    /// Fraction of each overlapped pixel that the cell covers, 0..=1; the first element is for the
-    /// pixel `first`.
+    /// Fraction of each pixel from `first` that the cell covers, 0..=1.
     pub parts: Vec<f64>,
 }
 
-/// Divides a row of `pixels` pixels into `cells` cells (pixels of a smaller image) of equal width.
-/// Returns the pixels that each cell covers.
+/// Divides a row of `pixels` pixels into equal `cells`.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
@@ -25,10 +21,8 @@ pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     (0..cells).map(cover).collect()
 }
 
-/// Returns the mean of an image over each cell of a coarser grid, `[row][column]`, weighted by the
-/// covered area of each pixel. The image has `size` (columns, rows) pixels. The `cells` (columns,
-/// rows) have equal sizes and together cover the image. `pixel` returns the value of the pixel with
-/// an index in `[row][column]` order.
+/// Returns the mean of an image of `size` (columns, rows) over equal `cells` (columns, rows),
+/// `[row][column]`. `pixel` returns the value of the pixel with an index in `[row][column]` order.
 pub fn box_means(
     size: [usize; 2],
     cells: [usize; 2],
@@ -59,10 +53,9 @@ pub fn box_means(
     means
 }
 
-/// Fills cells without samples in a smaller image of `cols` x `rows` cells. `means` has `stride`
-/// values for each cell, one for each light group and channel. `known` is `true` for cells with
-/// samples. A cell without samples gets the values of the nearest cell with samples in its row. A
-/// row without samples gets the values of the nearest row with samples.
+/// Fills cells without samples, where `known` is `false`, in an image of `cols` x `rows` cells of
+/// `stride` values. They get the values of the nearest cell with samples in their row, rows without
+/// samples those of the nearest row with samples.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -85,9 +78,8 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns, for each element of a row, the index of the nearest element for which `known` is true.
-/// If two such elements are equally near, this is the lower index. If `known` is true nowhere,
-/// returns each element's own index.
+/// Returns, for each element, the index of the nearest `known` one: the lower of two that are
+/// equally near, its own if none is known.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

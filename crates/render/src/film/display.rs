@@ -5,11 +5,10 @@ use std::fmt;
 use std::str::FromStr;
 use zerkalo_scene::value::srgb_from_linear;
 
-/// Tone curve: maps scene radiance to the linear light that a display emits, as a fraction of the
-/// display's white.
+/// Tone curve from radiance to linear light of a display, as a fraction of its white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// Tone curve that clips each colour channel at 1.
+    /// Each colour channel is clipped at 1.
     #[default]
     Clip,
     /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
@@ -45,20 +44,19 @@ impl FromStr for Tone {
 /// Display transform: exposure, then tone curve, then sRGB encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Display {
-    /// Exposure in stops: radiance is multiplied by 2 to the power of this value.
+    /// Exposure in stops.
     pub exposure_ev: f64,
-    /// Tone curve that is applied after the exposure.
+    /// Tone curve.
     pub tone: Tone,
 }
 
 impl Display {
-    /// Converts radiance to unrounded sRGB values, 0..=255.
+    /// Converts radiance to unrounded 8-bit levels, 0..=255.
     pub fn levels(&self, radiance: [f64; 3]) -> [f64; 3] {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::levels`].
-    /// A lookup table makes this method several times faster than that one.
+    /// Rounds [`Display::levels`] to 8 bits, several times faster by a lookup table.
     pub fn levels_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
@@ -69,21 +67,18 @@ impl Display {
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.level_8(c))
     }
 
-    /// Converts radiance to linear light of the display, 0..=1: exposure and tone curve without
-    /// sRGB encoding.
+    /// Converts radiance to linear light of the display, 0..=1.
     pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
         toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
     }
 
-    /// Returns the factor by which the exposure multiplies radiance: 2 to the power of the exposure
-    /// in stops.
+    /// Returns the factor by which the exposure multiplies radiance.
     pub fn exposure_factor(&self) -> f64 {
         self.exposure_ev.exp2()
     }
 }
 
-/// Applies the tone curve `tone` to the linear colour `color`, which includes the exposure. The
-/// result is linear light of the display, 0..=1.
+/// Applies the tone curve `tone` to `color`, which includes the exposure.
 #[inline(always)]
 pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     match tone {
@@ -111,7 +106,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Converts an unrounded sRGB value, 0..=255, to 16 bits and rounds it; 255 becomes 65535.
+/// Rounds an 8-bit level, 0..=255, to 16 bits; 255 becomes 65535.
 pub fn quantised_16(level: f64) -> u16 {
     (level * (65535.0 / 255.0)).round() as u16
 }

@@ -1,5 +1,5 @@
-//! Incremental downsampling of the film to the cells of a display, that is, to the pixels of a
-//! smaller image. Only tiles that have changed since the previous downsampling are read again.
+//! Incremental downsampling of the film to a smaller image, whose pixels are called cells. Only
+//! tiles that have changed are read again.
 
 use crate::film::TILE;
 use crate::film::box_filter::{Coverage, coverage, fill_gaps};
@@ -7,14 +7,13 @@ use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
 
-/// Film downsampled to a smaller image, whose pixels are called cells. It holds the mean radiance
-/// of each cell in each light group (lights with sums of their own). Light weights are applied
-/// later; when they change, the film need not be read again.
+/// Film downsampled to a smaller image: the mean radiance of each cell in each light group. When
+/// light weights change, the film need not be read again.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
-    /// Number of cells (pixels of the smaller image) in a row.
+    /// Number of cells in a row.
     pub cols: usize,
-    /// Number of rows of cells (pixels of the smaller image).
+    /// Number of rows of cells.
     pub rows: usize,
     /// Mean radiance of each cell for light weights of 1, `[row][column][group][channel]`.
     means: Vec<f32>,
@@ -22,21 +21,18 @@ pub struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Averages `film` over `cols` x `rows` cells of equal size that together cover the film. The
-    /// value of a cell is the mean of its sampled pixels, weighted by their areas inside of the
-    /// cell.
+    /// Averages `film` over `cols` x `rows` equal cells. The value of a cell is the mean of its
+    /// sampled pixels, weighted by their areas inside the cell.
     ///
-    /// A cell without samples gets the means of the nearest cell of its row that has samples. A row
-    /// without samples gets the means of the nearest row with samples. A film without samples is
-    /// black.
+    /// A cell without samples gets the value of the nearest one of its row, a row without samples
+    /// that of the nearest row. A film without samples is black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
         let mut downsample = IncrementalDownsample::new(film, cols, rows);
         downsample.stale(film).into_iter().for_each(DirtyTile::refresh);
         downsample.thumbnail()
     }
 
-    /// Returns the radiance of each cell (pixel of the smaller image) under the light weights
-    /// `weights`, `[row][column]`.
+    /// Returns the radiance of each cell under the light weights `weights`, `[row][column]`.
     pub fn mixed(&self, weights: &LightWeights) -> Vec<[f32; 3]> {
         assert_eq!(weights.weights.len(), self.groups, "weights for the groups of the film");
         let weights: Vec<_> = weights.weights.iter().map(|w| w.map(|w| w as f32)).collect();
@@ -51,56 +47,45 @@ impl Thumbnail {
     }
 }
 
-/// Cache of the contributions of a film's tiles to the cells of a smaller image. It saves reading
-/// unchanged tiles when the film is downsampled repeatedly; see [`Thumbnail::of_film`].
+/// Cache of the contributions of a film's tiles to the cells of a smaller image.
 pub struct IncrementalDownsample {
     layout: Layout,
-    /// Contribution of each film tile to the cells, in the order of the film's tiles.
     parts: Vec<TilePart>,
 }
 
-/// Geometry of a downsampling: the sizes of the film and of the smaller image, and the cells
-/// (pixels of the smaller image) that each column and each row of film tiles overlaps.
+/// Geometry of a downsampling.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
     groups: usize,
-    /// Cells of the smaller image that each column of tiles overlaps.
+    /// Cells that each column of tiles overlaps.
     across: Vec<Span>,
-    /// Cells of the smaller image that each row of tiles overlaps.
+    /// Cells that each row of tiles overlaps.
     down: Vec<Span>,
 }
 
-/// Cells (pixels) of a smaller image that one column or one row of film tiles overlaps.
+/// Cells that one column or row of film tiles overlaps.
 struct Span {
-    /// Index of the first cell (pixel of the smaller image) that the column or row overlaps.
     first: usize,
-    /// Number of cells (pixels of the smaller image) that the column or row overlaps.
     len: usize,
-    /// Cells that overlap each pixel along one axis: x for a column of tiles, y for a row. A cell
-    /// is given as its index, counted from `first`, and the fraction of the pixel that it covers,
-    /// 0..=1.
+    /// Cells that overlap each pixel along the axis, each as its index from `first` and the
+    /// fraction of the pixel that it covers.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// Contribution of a film tile to those cells (pixels) of a smaller image that the tile overlaps.
+/// Contribution of a film tile to the cells that it overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// State of the tile at its latest refresh: the film's epoch (a counter of its restarts),
-    /// [`Tile::counts`] and [`Tile::lattice_px`]. If the tile still has these values, its samples
-    /// are unchanged. `None` if the tile had no samples at the latest refresh ([`Film::tile`]
-    /// returned `None`).
+    /// Film's epoch, [`Tile::counts`] and [`Tile::lattice_px`] at the latest refresh. `None` if the
+    /// tile had no samples.
     version: Option<(u64, [u32; 2], usize)>,
-    /// Values of each cell that the tile overlaps, `[row][column][area, group 0 red, ...]`. `area`
-    /// is the total area, inside the cell, of the pixels with samples. Each other value is the sum,
-    /// over these pixels, of this area times the pixel's mean in one group and channel. Empty
-    /// without samples.
+    /// Values of each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
+    /// inside the cell, then sums of this area times the pixel's mean. Empty without samples.
     sums: Vec<f64>,
 }
 
-/// Film tile that has changed since the previous downsampling. [`DirtyTile::refresh`] reads its
-/// samples, and may run on any thread.
+/// Film tile that has changed since the previous downsampling.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -109,9 +94,7 @@ pub struct DirtyTile<'a> {
 }
 
 impl IncrementalDownsample {
-    /// Creates the cache for a smaller image of `cols` x `rows` cells (pixels) over a film with the
-    /// size and the number of groups of `film`. The contributions are initially those of an empty
-    /// film.
+    /// Creates the cache for `cols` x `rows` cells over an empty film of the size of `film`.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -130,8 +113,7 @@ impl IncrementalDownsample {
         Self { layout, parts }
     }
 
-    /// Returns `true` if this cache was created for `cols` x `rows` cells and for a film with the
-    /// size and the number of groups of `film`.
+    /// Returns `true` if this cache is for `cols` x `rows` cells and a film like `film`.
     pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
@@ -139,8 +121,8 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since the previous call; the caller must refresh each of
-    /// them. All calls must pass the same film, which may be restarted between calls.
+    /// Returns the tiles that have changed since the previous call, each of which must be
+    /// refreshed. All calls must pass the same film.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
@@ -152,8 +134,7 @@ impl IncrementalDownsample {
         self.parts.iter_mut().enumerate().filter_map(stale).collect()
     }
 
-    /// Returns the mean radiance of each cell (pixel of the smaller image) from the cached
-    /// contributions. Cells without samples get the values of a neighbour.
+    /// Returns the smaller image, from the cached contributions.
     pub fn thumbnail(&self) -> Thumbnail {
         let Layout { cols, rows, groups, .. } = self.layout;
         let stride = 3 * groups;
@@ -183,9 +164,7 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Finds the cells that a column or a row of tiles overlaps along one axis. The tiles begin at
-    /// pixel `start` of the film, which has `pixels` pixels along this axis. `coverage` has the
-    /// pixels that each cell of the smaller image overlaps.
+    /// Finds the cells that the tiles from pixel `start` overlap along an axis of `pixels` pixels.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -205,8 +184,7 @@ impl Span {
 }
 
 impl DirtyTile<'_> {
-    /// Reads the current samples of the tile into its cached contribution to the cells (pixels) of
-    /// the smaller image.
+    /// Reads the current samples of the tile, on any thread.
     pub fn refresh(self) {
         let Self { layout, part, film, index } = self;
         let columns = film.tile_columns();
@@ -218,8 +196,7 @@ impl DirtyTile<'_> {
         part.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
-        // A tile with the sample counts 0 is in its first pass: only the pixels whose x and y are
-        // multiples of `lattice_px` have a sample.
+        // In the first pass, only the pixels of the lattice have a sample.
         let step = if tile.counts() == [0; 2] { tile.lattice_px() } else { 1 };
         for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
@@ -232,11 +209,8 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the values of one row of
-/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the pixels were inside this
-/// row of cells with their full height; the caller multiplies `line` by the fraction of the height
-/// that is inside. `per_unit` has a factor for each group and channel, which converts an integer
-/// sum to the sum of the radiance of samples.
+/// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of a row of cells as in
+/// [`TilePart::sums`], as if the pixels were inside it with their full height.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

@@ -1,15 +1,14 @@
 //! Invalid samples of a film: samples that are NaN or negative.
 
-/// Largest number of invalid samples whose positions are stored. Further ones are only counted.
+/// Largest number of invalid samples whose positions are stored.
 pub const INVALID_REMEMBERED: usize = 16;
 
-/// Position of an invalid sample (NaN or negative): the values that are needed to trace it again.
+/// Position of an invalid sample: the values that are needed to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
-    /// Index of the sample in its sample sequence. Each pixel has one sequence for each of the two
-    /// replicates (halves of the samples).
+    /// Index of the sample in its pixel and replicate.
     pub index: u32,
-    /// Replicate (half of the samples) to which the sample belongs; 0: A, 1: B.
+    /// Replicate; 0: A, 1: B.
     pub replicate: u8,
     /// Row of the pixel, counted from the top.
     pub y: u32,
@@ -17,14 +16,13 @@ pub struct InvalidSample {
     pub x: u32,
 }
 
-/// Number of invalid samples (NaN or negative), and the positions of up to [`INVALID_REMEMBERED`]
-/// of them. Both are independent of the order in which threads find the samples.
+/// Number of invalid samples, and the positions of up to [`INVALID_REMEMBERED`] of them,
+/// independent of the order in which threads find them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InvalidSamples {
     /// Number of samples that were NaN or negative.
     pub count: u64,
-    /// Positions of invalid samples, sorted by index, replicate, y and x. If there are more than
-    /// [`INVALID_REMEMBERED`], only the first ones in this order are stored.
+    /// First positions in the order of index, replicate, y and x.
     pub first: Vec<InvalidSample>,
 }
 

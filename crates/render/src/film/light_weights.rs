@@ -1,49 +1,46 @@
-//! Light weights: colour times intensity of each light group (lights with sums of their own in the
-//! film). They convert the film's integer sums to radiance.
+//! Light weights, which convert the film's integer sums to radiance.
 
 use crate::film::tile::Tile;
 
-/// Weight of each light group (lights with sums of their own in the film) in a picture: colour
-/// times intensity. The film's sums are for weights of 1.
+/// Weight of each light group in a picture: colour times intensity. The film's sums are for weights
+/// of 1.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightWeights {
-    /// Red, green and blue weight of each light group; each at least 0.
+    /// Red, green and blue weight of each light group, at least 0.
     pub weights: Vec<[f64; 3]>,
 }
 
 impl LightWeights {
-    /// Returns factors, `[group][channel]`, for the integer sums of a film with the given `scales`.
-    /// A sum times its factor is the sum of the radiance of a pixel's samples in one light group
-    /// and channel, under these weights.
+    /// Returns the factors, `[group][channel]`, that convert integer sums of a film with `scales`
+    /// to sums of the radiance of samples under these weights.
     pub fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
 }
 
-/// Choice of the replicates over which a mean is computed. The replicates A and B are the two
-/// halves of the samples, from whose difference the error is estimated.
+/// Replicates over which a mean is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replicates {
-    /// Both replicates (halves of the samples) together: their mean is the picture.
+    /// Both: their mean is the picture.
     Both,
-    /// Replicate A (one half of the samples) alone.
+    /// Replicate A alone.
     A,
-    /// Replicate B (one half of the samples) alone.
+    /// Replicate B alone.
     B,
 }
 
 /// Integer sums and sample counts of one pixel of a film.
 #[derive(Clone, Copy)]
 pub struct Sums<'a> {
-    /// Integer sums of the replicates A and B (halves of the samples), each `[group][channel]`.
+    /// Integer sums of the replicates A and B, each `[group][channel]`.
     pub values: [&'a [i64]; 2],
-    /// Number of samples in each of the replicates A and B (halves of the samples).
+    /// Number of samples in each of the replicates A and B.
     pub counts: [u32; 2],
 }
 
 impl Sums<'_> {
-    /// Returns the number of the pixel's samples in the chosen replicates (halves of the samples).
+    /// Returns the number of samples in `replicates`.
     pub fn count(&self, replicates: Replicates) -> u32 {
         match replicates {
             Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
@@ -52,8 +49,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns integer sum `i` (in `[group][channel]` order) of the pixel, summed over the chosen
-    /// replicates (halves of the samples).
+    /// Returns integer sum `i`, in the order `[group][channel]`, over `replicates`.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {
@@ -63,9 +59,8 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns the radiance of the pixel: the mean over its samples in the chosen replicates
-    /// (halves of the samples), or black without samples. `per_unit` is the result of
-    /// [`LightWeights::radiance_per_step`].
+    /// Returns the mean over the samples in `replicates`, black without samples. `per_unit` is the
+    /// result of [`LightWeights::radiance_per_step`].
     #[inline(always)]
     pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(replicates);

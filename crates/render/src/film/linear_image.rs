@@ -1,10 +1,10 @@
-//! Linear float image: a copy of a film's pixels that later samples do not change.
+//! Copy of a film's pixels that later samples do not change.
 
 use crate::film::box_filter::{box_means, fill_gaps};
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 
-/// Linear radiance of every pixel of a film at one moment; later samples do not change it.
+/// Linear radiance of every pixel of a film at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     width: usize,
@@ -14,9 +14,8 @@ pub struct LinearImage {
 }
 
 impl LinearImage {
-    /// Creates the image of `film` under `weights`. A pixel without samples gets the value of the
-    /// nearest pixel of its row that has samples. A row without samples gets the values of the
-    /// nearest row with samples.
+    /// Creates the image of `film` under `weights`. Pixels without samples are filled as cells of
+    /// [`Thumbnail::of_film`](crate::film::Thumbnail::of_film).
     pub fn of_film(film: &Film, weights: &LightWeights) -> Self {
         let (width, height) = (film.width(), film.height());
         let per_unit = weights.radiance_per_step(film.scales());
@@ -40,9 +39,7 @@ impl LinearImage {
         [self.width, self.height]
     }
 
-    /// Returns the mean of the picture over each of `cols` x `rows` cells (pixels of a smaller
-    /// image), `[row][column]`, weighted by the covered area of each pixel. The cells have equal
-    /// sizes and together cover the picture.
+    /// Returns the mean over each of `cols` x `rows` equal cells, `[row][column]`.
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
         let means = box_means(self.size(), [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()

@@ -1,10 +1,10 @@
 //! Film: integer sums of samples, and the pictures and noise estimates computed from them.
 //!
-//! The film divides the samples into two independent halves, the replicates A and B. Each is a
-//! picture of its own. The mean of both is the picture; their difference is a measure of the
-//! remaining error. Sums are integers; the order of addition therefore changes no bit of them. Each
-//! light group has its own sums, for white light of unit intensity. When a picture is computed,
-//! [`LightWeights`] multiply the sums of each group by its colour and intensity.
+//! The film divides the samples into two independent halves, the *replicates* A and B. The mean of
+//! both is the picture; their difference is a measure of the remaining error. Sums are integers;
+//! the order of addition therefore changes no bit of them. A *light group* is a set of lights with
+//! sums of its own, for white light of unit intensity. When a picture is computed, [`LightWeights`]
+//! multiply the sums of each group by its colour and intensity.
 
 mod box_filter;
 mod display;
@@ -35,6 +35,5 @@ pub use srgb_table::quantised_8;
 pub use store::{Film, Header, Mismatch, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
-/// Side of a film tile in pixels. A tile is a square of pixels that are stored and sampled
-/// together.
+/// Side of a film tile in pixels, which are stored and sampled together.
 pub const TILE: usize = 16;

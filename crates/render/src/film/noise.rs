@@ -1,5 +1,5 @@
 //! Noise estimates: the error of tiles and pictures, estimated from the difference of the two
-//! replicates (halves of the samples).
+//! replicates.
 //!
 //! The replicates A and B are independent, and equally distributed if their sample counts are
 //! equal. The half difference d = (A - B) / 2 then has the variance of the picture M = (A + B) / 2.
@@ -51,8 +51,7 @@ pub struct Mse {
 }
 
 impl Mse {
-    /// Value of [`TileNoise::squares`] for tests: the smallest positive numbers. The number of
-    /// effective pixels computed from it is practically infinite.
+    /// Value of [`TileNoise::squares`] for tests: practically infinitely many effective pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 
@@ -62,30 +61,25 @@ impl Mse {
     }
 }
 
-/// Estimated error of one tile. The pixels of the tile alternate between white and black, like the
-/// squares of a checkerboard. The white pixels give one estimate, the black pixels another.
+/// Estimated error of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// Validation estimate, from the white pixels of the checkerboard. The noise of the picture is
-    /// computed from it, unless all tiles have the same number of samples.
+    /// Validation estimate, from the white pixels of the checkerboard.
     pub reported: Mse,
-    /// Allocation estimate, from the black pixels of the checkerboard. Adaptive sampling uses it to
-    /// select the tiles that get further samples.
+    /// Allocation estimate, from the black pixels of the checkerboard.
     pub allocation: Mse,
-    /// Sum of e^2 over the pixels of the tile, where e is the squared error of a pixel, summed over
-    /// its channels. [`Noise::effective_pixels`] is computed from it.
+    /// Sum of e^2 over the pixels, where e is the squared error of a pixel, summed over its
+    /// channels.
     pub squares: Mse,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
-    /// Number of samples per pixel in each replicate (half of the samples). If it differs between A
-    /// and B, the mean of both numbers.
+    /// Number of samples per pixel in a replicate: the mean of A and B.
     pub samples: u32,
 }
 
 /// Estimator of tile errors under the given light weights and display transform.
 pub struct Estimator {
-    /// Factors, `[group][channel]`, that convert the film's integer sums to sums of the radiance of
-    /// samples.
+    /// Result of [`LightWeights::radiance_per_step`].
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
@@ -93,9 +87,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Creates an estimator for the tiles of a film. `scales` are those of the film (see
-    /// [`Film::scales`](crate::film::Film::scales)), `mix` are the light weights, and `display` is
-    /// the display transform.
+    /// Creates an estimator for the tiles of a film with `scales`.
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.radiance_per_step(scales),
@@ -105,16 +97,15 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile. Returns `None` if the tile has no samples, or if its
-    /// replicates A and B (halves of the samples) have different numbers of samples.
+    /// Estimates the error of a tile. `None` if the tile has no samples, or different numbers of
+    /// them in both replicates.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// Estimates the error of a tile, even if replicate B (the second half of the samples) has
-    /// fewer samples than A. Returns `None` if A or B has no samples, or if only some pixels have
-    /// the first sample.
+    /// Estimates the error of a tile, even if replicate B has fewer samples than A. `None` if A or
+    /// B has no samples, or during the first pass.
     ///
     /// Let A have n samples and B have m, each of variance v. (A - B)^2 then has the mean v (n + m)
     /// / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m). The half difference is
@@ -197,7 +188,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// Returns the error estimate of the tile from all its pixels, black and white.
+    /// Returns the estimate from all pixels, black and white.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -210,26 +201,24 @@ impl TileNoise {
     }
 }
 
-/// Estimated error of a whole picture: root mean square errors (RMSE) over pixels and channels.
+/// Estimated error of a picture: root mean square errors (RMSE) over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Root mean square error over pixels and channels, in linear radiance.
+    /// RMSE in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error of the displayed picture over pixels and channels, in 8-bit levels.
+    /// RMSE of the displayed picture in 8-bit levels.
     pub rmse_levels: f64,
     /// 95th percentile, over the tiles, of the RMSE of a displayed tile, in 8-bit levels.
     pub p95_levels: f64,
     /// Largest RMSE of a displayed tile, in 8-bit levels.
     pub worst_levels: f64,
-    /// Number of effective pixels (Kish's effective sample size), for the linear and for the
-    /// displayed error. It is (sum of e)^2 / (sum of e^2), where e is the squared error of a pixel;
-    /// 0 if there is no error.
+    /// Number of effective pixels (Kish's effective sample size): (sum of e)^2 / (sum of e^2),
+    /// where e is the squared error of a pixel, linear and displayed; 0 without error.
     pub effective_pixels: Mse,
 }
 
 impl Noise {
-    /// Returns this estimate, but takes `rmse_linear` and `rmse_levels` from `other` where they are
-    /// larger there. The other fields do not change.
+    /// Returns this estimate with the larger RMSE of both.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             rmse_linear: self.rmse_linear.max(other.rmse_linear),
@@ -238,11 +227,7 @@ impl Noise {
         }
     }
 
-    /// Combines the estimates of all tiles. If all tiles have equal numbers of samples, the error
-    /// is estimated from all pixels. Otherwise tiles were selected by the estimates from one half
-    /// of the pixels (the black ones of a checkerboard). The error is then the larger of two
-    /// estimates: one from the other half alone, and one from all pixels. Returns `None` if there
-    /// are no tiles or an estimate is missing.
+    /// Combines the estimates of all tiles. `None` if there are no tiles or an estimate is missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut squares = Mse::default();
@@ -264,8 +249,7 @@ impl Noise {
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_levels = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
-        // `sum` adds up means over the three channels, but `squares` is computed from sums over the
-        // channels. The factor 3 converts the means to sums.
+        // `sum` is of means over three channels, `squares` of sums over them.
         let effective = |sum: f64, squares: f64| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }

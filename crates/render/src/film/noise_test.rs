@@ -56,10 +56,10 @@ struct Outcome {
     tile_spread: f64,
 }
 
-/// Simulates 20 films with different random seeds and `n` samples per pixel in each replicate (half
-/// of the samples). Returns the ratio of the true to the estimated RMSE of each film, for linear
-/// radiance and for 8-bit levels, and the spread of the tiles' estimates. The other parameters are
-/// those of [`Pixel`] and [`Pixel::sum`].
+/// Simulates 20 films with different random seeds and `n` samples per pixel in each replicate.
+/// Returns the ratio of the true to the estimated RMSE of each film, for linear radiance and for
+/// 8-bit levels, and the spread of the tiles' estimates. The other parameters are those of
+/// [`Pixel`] and [`Pixel::sum`].
 fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
     let pixels = scene(normal, dark, &mut Rng(11));
     let (mix, display) = (white(1), Display::default());
@@ -129,8 +129,8 @@ fn estimates_equal_true_errors_in_the_mean() {
 
 /// Checks the noise estimate for dark pixels, few of whose samples receive light. The sRGB encoding
 /// is steep and curved at dark values. The estimate must be better than two simpler ones: half the
-/// displayed difference of the replicates A and B (halves of the samples), and the half difference
-/// in radiance times the slope of the encoding.
+/// displayed difference of the replicates A and B, and the half difference in radiance times the
+/// slope of the encoding.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));

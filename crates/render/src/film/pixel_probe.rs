@@ -1,4 +1,4 @@
-//! Pixel probe: samples, value and error of one pixel, for display in the dashboard.
+//! Pixel probe of the dashboard.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -11,27 +11,23 @@ use crate::film::store::Film;
 pub struct PixelProbe {
     /// Column and row of the pixel in the film.
     pub pixel: [usize; 2],
-    /// Number of samples of the pixel in each of the replicates A and B (halves of the samples).
+    /// Number of samples in the replicates A and B.
     pub samples: [u32; 2],
     /// Linear radiance of the pixel; black without samples.
     pub radiance: [f64; 3],
-    /// Value of the pixel on the display in 8-bit levels, 0..=255, not rounded.
+    /// Displayed value in unrounded 8-bit levels, 0..=255.
     pub levels: [f64; 3],
-    /// Half the difference of the replicates A and B (halves of the samples) in radiance, an
-    /// estimate of the pixel's error. A single pixel's estimate is correct only within a factor of
-    /// two or three. `None` if one of the replicates has no samples.
+    /// Half the difference of both replicates in radiance, which estimates the error within a
+    /// factor of two or three. `None` if one of them has no samples.
     pub difference: Option<[f64; 3]>,
-    /// Estimated RMSE of the tile that contains the pixel, in linear radiance. `None` if one of the
-    /// replicates (halves of the samples) has no samples.
+    /// Estimated RMSE of the pixel's tile, in linear radiance. `None` without an estimate.
     pub tile_rmse_linear: Option<f64>,
-    /// Estimated RMSE of the tile that contains the pixel, on the display in 8-bit levels. `None`
-    /// if one of the replicates (halves of the samples) has no samples.
+    /// Estimated RMSE of the pixel's tile, in 8-bit levels. `None` without an estimate.
     pub tile_rmse_levels: Option<f64>,
 }
 
 impl PixelProbe {
-    /// Reads samples, value and error of the pixel in column `x` and row `y` of `film`. Returns
-    /// `None` if the pixel is outside of the film.
+    /// Probes the pixel in column `x` and row `y` of `film`; `None` outside the film.
     pub fn of_film(
         film: &Film,
         [x, y]: [usize; 2],

@@ -4,26 +4,23 @@
 use std::sync::LazyLock;
 use zerkalo_scene::value::srgb_from_linear;
 
-/// Base-2 logarithm of the number of entries of the sRGB table per octave (factor 2 of linear
-/// light).
+/// Base-2 logarithm of the number of entries per octave of linear light.
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the smallest octave of the sRGB table. Linear light below 2^-9 needs only one entry,
-/// because the sRGB encoding is linear up to 0.0031308.
+/// Exponent of the smallest octave of the table. The sRGB encoding is linear up to 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Number that is subtracted from the upper bits of a double to get the index of the double in the
-/// sRGB table. Entry 0 is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
+/// Upper bits of a double minus this are its index in the table. Entry 0 is the linear part of the
+/// encoding; entry 1 begins at 2^FIRST_OCTAVE.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
 /// Largest difference between the sRGB table and the exact encoding, in 8-bit levels.
-const MAX_ERROR_CODES: f64 = 5.5e-4;
+const MAX_ERROR: f64 = 5.5e-4;
 
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Line segments that approximate the sRGB encoding in 8-bit levels. The first number is the
-    /// value at 0 of the line through the segment, the second is the slope of this line.
+    /// Lines through the segments, in 8-bit levels: value at 0, and slope.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -47,8 +44,7 @@ impl SrgbTable {
         Self { chords }
     }
 
-    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded. The result differs from
-    /// the exact value by less than 5.5e-4 8-bit levels.
+    /// Encodes linear light 0..=1 as an unrounded 8-bit level, with an error below [`MAX_ERROR`].
     #[inline(always)]
     pub fn level(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
@@ -56,19 +52,19 @@ impl SrgbTable {
         at_zero + slope * linear
     }
 
-    /// Encodes linear light 0..=1 as an 8-bit sRGB value, equal to the rounded exact encoding.
+    /// Rounds the exact encoding of linear light 0..=1 to 8 bits.
     #[inline]
     pub fn level_8(&self, linear: f64) -> u8 {
         let above = self.level(linear) + 0.5;
         let nearest = above.floor();
-        if (above - nearest - 0.5).abs() >= 0.5 - MAX_ERROR_CODES {
+        if (above - nearest - 0.5).abs() >= 0.5 - MAX_ERROR {
             return quantised_8(255.0 * srgb_from_linear(linear));
         }
         nearest as u8
     }
 }
 
-/// Rounds an unrounded sRGB value, 0..=255, to 8 bits.
+/// Rounds an 8-bit level, 0..=255.
 pub fn quantised_8(level: f64) -> u8 {
     level.round() as u8
 }
@@ -88,8 +84,8 @@ mod tests {
                 worst = worst.max((SrgbTable::shared().level(linear) - exact).abs());
             }
         }
-        assert!(worst < MAX_ERROR_CODES, "{worst}");
-        assert!(worst > MAX_ERROR_CODES / 2.0, "the stated bound is too loose: {worst}");
+        assert!(worst < MAX_ERROR, "{worst}");
+        assert!(worst > MAX_ERROR / 2.0, "the stated bound is too loose: {worst}");
     }
 
     #[test]

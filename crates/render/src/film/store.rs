@@ -1,6 +1,5 @@
-//! Film: storage of samples as tiles of integer sums. When the render restarts, such as after an
-//! edit, each tile is cleared only when it is next written. Two films are added without rounding,
-//! because their sums are integers.
+//! Film: storage of samples as tiles of integer sums. After a restart, such as by an edit, a tile
+//! is cleared only when it is next written.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -11,12 +10,10 @@ use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 use std::fmt;
 
-/// Smallest size in bytes of a film whose tiles are all allocated before the first sample. The
-/// tiles of a smaller film are allocated when they are first written.
+/// Size in bytes from which all tiles are allocated before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
 
-/// Properties of a film: size, scales, random seed, precision. Two films can be added only if these
-/// are equal.
+/// Properties of a film. Only films with equal properties can be added.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Width of the film in pixels, at least 1.
@@ -28,22 +25,19 @@ pub struct Header {
     pub scales: Vec<f64>,
     /// Random seed of all samples.
     pub seed: u64,
-    /// Floating-point precision in which the samples were computed, `single` or `double`. The
-    /// number of SIMD lanes does not change the samples.
+    /// Floating-point precision of the samples, `single` or `double`.
     pub precision: String,
 }
 
 impl Header {
-    /// Returns `true` if `scale`, by which samples are multiplied before rounding, is a power of
-    /// two and a normal number.
+    /// Returns `true` if `scale` is a power of two and a normal number.
     pub(super) fn is_valid_scale(scale: f64) -> bool {
         scale.is_normal() && scale > 0.0 && scale.to_bits() << 12 == 0
     }
 }
 
-/// Integer sums of samples for every pixel, light group, channel and replicate (half of the
-/// samples). Integer addition gives the same sums in any order. The radiance of a pixel in a light
-/// group is its sum divided by the group's scale and by the number of samples.
+/// Integer sums of samples for every pixel, light group, channel and replicate. The radiance of a
+/// pixel in a light group is its sum divided by the group's scale and by the number of samples.
 #[derive(Debug)]
 pub struct Film {
     header: Header,
@@ -53,8 +47,7 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// Exclusive access of one thread to a film tile. [`TileHandle::prepare`] allocates or clears the
-/// tile.
+/// Exclusive access of one thread to a film tile.
 #[derive(Debug)]
 pub struct TileHandle<'a> {
     /// Column and row of the tile's upper left pixel in the picture.
@@ -64,8 +57,8 @@ pub struct TileHandle<'a> {
 }
 
 impl<'a> TileHandle<'a> {
-    /// Returns the tile for writing. Allocates it first if it has no memory, or clears it if it was
-    /// written before the film's latest restart.
+    /// Returns the tile for writing. Allocates it first, or clears it if it was written before the
+    /// film's latest restart.
     pub fn prepare(self) -> &'a mut Tile {
         self.tile.clear_if_stale(self.epoch);
         self.tile
@@ -75,12 +68,10 @@ impl<'a> TileHandle<'a> {
 /// Reason for which two films cannot be added.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mismatch {
-    /// The headers of the two films differ. The fields are the name of the property, its value in
-    /// the first film, and its value in the second film.
+    /// The headers differ: name of the property, its value in the first and in the second film.
     Header(&'static str, String, String),
-    /// In the tile with this number, each of the films has the first sample of only some pixels.
-    /// The films cannot be added, because the pixels of the sum would have different numbers of
-    /// samples.
+    /// In the tile with this number, both films have the first sample of only some pixels. In their
+    /// sum, pixels would have different numbers of samples.
     Overlap(usize),
 }
 
@@ -113,30 +104,28 @@ impl Film {
         Self::try_new(header).expect("memory for the tiles of a film")
     }
 
-    /// Creates a film without samples as [`Film::new`] does. A large film gets all its memory here;
-    /// later writes then need no further memory.
+    /// Creates a film without samples. A large film gets all its memory here.
     ///
     /// # Errors
-    /// Fails if the memory cannot be allocated.
+    /// Fails if there is too little memory.
     ///
     /// # Panics
-    /// Panics in the same cases as [`Film::new`].
+    /// See [`Film::new`].
     pub fn try_new(header: Header) -> Result<Self, TryReserveError> {
         let mut film = Self::without_memory(header)?;
         film.reserve()?;
         Ok(film)
     }
 
-    /// Returns the memory of the sums of a film in bytes. For each pixel the film holds a 64-bit
-    /// sum for each of two replicates (halves of the samples), each of `groups` light groups, and
-    /// each of three channels. Tiles at the edge of the picture count in full.
+    /// Returns the memory of the sums of a film in bytes. Tiles at the edge of the picture count in
+    /// full.
     pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
         let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
     }
 
-    /// Allocates the memory of all tiles of a large film. Tiles of a small film are allocated when
-    /// they are first written, so that the first picture appears sooner.
+    /// Allocates the tiles of a large film. Those of a small film are allocated when they are first
+    /// written, so that the first picture appears sooner.
     fn reserve(&mut self) -> Result<(), TryReserveError> {
         let size = [self.width(), self.height()].map(|n| n as u32);
         if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
@@ -168,14 +157,13 @@ impl Film {
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
-    /// Replaces this film by a film without samples that has the properties `header`. The new film
-    /// uses the memory of this film.
+    /// Creates a film without samples in the memory of this one.
     ///
     /// # Errors
-    /// Fails if the memory cannot be allocated.
+    /// Fails if there is too little memory.
     ///
     /// # Panics
-    /// Panics in the same cases as [`Film::new`].
+    /// See [`Film::new`].
     pub fn reuse_for(mut self, header: Header) -> Result<Self, TryReserveError> {
         if header == self.header {
             self.restart();
@@ -183,8 +171,7 @@ impl Film {
             return Ok(self);
         }
         let mut film = Self::without_memory(header)?;
-        // The new epoch differs from all earlier epochs of this film, as after a restart. Caches
-        // that compare epochs therefore do not mistake the new film for the old one.
+        // Caches that compare epochs must not mistake the new film for the old one.
         film.epoch = self.epoch + 1;
         for (tile, old) in film.tiles.iter_mut().zip(self.tiles) {
             tile.take_memory(old);
@@ -193,8 +180,8 @@ impl Film {
         Ok(film)
     }
 
-    /// Returns this film as a band of rows of a picture: its row 0 is row `first_row` of the
-    /// picture. All methods count columns and rows from the band's upper left pixel.
+    /// Returns this film as a band of a picture that begins in row `first_row`. Methods count rows
+    /// from the beginning of the band.
     ///
     /// # Panics
     /// Panics if `first_row` is not a multiple of [`TILE`].
@@ -203,7 +190,7 @@ impl Film {
         Self { first_row, ..self }
     }
 
-    /// Returns the row of the picture in which the film begins; 0 for the film of a whole picture.
+    /// Returns the row of the picture in which the film begins.
     pub fn first_row(&self) -> usize {
         self.first_row
     }
@@ -218,34 +205,33 @@ impl Film {
         self.header.height
     }
 
-    /// Returns the number of light groups, each of which has its own sums.
+    /// Returns the number of light groups.
     pub fn groups(&self) -> usize {
         self.header.scales.len()
     }
 
-    /// Returns the scale of each light group: samples are multiplied by it before rounding. It is a
-    /// power of two.
+    /// Returns the scale of each light group, see [`Header::scales`].
     pub fn scales(&self) -> &[f64] {
         &self.header.scales
     }
 
-    /// Returns size, scales, random seed and precision of the film.
+    /// Returns the properties of the film.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
     /// Returns the film's epoch, a counter of its restarts. The contents of a tile are unchanged as
-    /// long as the epoch, the sample counts of the tile and its [`Tile::lattice_px`] are unchanged.
+    /// long as the epoch, [`Tile::counts`] and [`Tile::lattice_px`] are unchanged.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// Discards all samples of the film. The sums of a pixel are cleared when it is next written.
+    /// Discards all samples.
     pub fn restart(&mut self) {
         self.epoch += 1;
     }
 
-    /// Returns the number of tiles of the film. Tiles are numbered row by row.
+    /// Returns the number of tiles, which are numbered row by row.
     pub fn tile_count(&self) -> usize {
         self.tiles.len()
     }
@@ -255,8 +241,7 @@ impl Film {
         self.header.width.div_ceil(TILE)
     }
 
-    /// Returns the tile with the number `index`. Returns `None` if neither
-    /// [`TileHandle::prepare`] nor [`Film::add`] has written to it since the last restart.
+    /// Returns tile `index`; `None` if it was not written since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
@@ -267,20 +252,17 @@ impl Film {
         (width * height) as u64
     }
 
-    /// Returns the numbers of samples per pixel of tile `index` in the replicates A and B (halves
-    /// of the samples). Samples of an incomplete first pass do not count.
+    /// Returns [`Tile::counts`] of tile `index`.
     pub fn counts(&self, index: usize) -> [u32; 2] {
         self.tile(index).map_or([0; 2], Tile::counts)
     }
 
-    /// Iterates over the tiles that have been prepared for writing since the last restart, as pairs
-    /// of the tile's number and the tile.
+    /// Iterates over the tiles written since the last restart, with their numbers.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
 
-    /// Returns handles of tiles of the film, in the order of `indices`. The thread that works on a
-    /// tile calls [`TileHandle::prepare`].
+    /// Returns handles of tiles, in the order of `indices`.
     ///
     /// # Panics
     ///
@@ -304,8 +286,7 @@ impl Film {
         handles.into_iter().flatten().collect()
     }
 
-    /// Returns the number of samples in the film, over all pixels and both replicates (halves of
-    /// the samples).
+    /// Returns the number of samples of all pixels and both replicates.
     pub fn samples(&self) -> u64 {
         let samples_of_tile = |tile: &Tile| {
             let [width, height] = tile.extent();
@@ -319,9 +300,8 @@ impl Film {
         self.touched().map(|(_, tile)| samples_of_tile(tile)).sum()
     }
 
-    /// Writes the radiance of the pixels in row `y` to `row`, which is resized to the film's width.
-    /// The radiance is the mean over the samples in `replicates` (halves of the samples), with the
-    /// light weights `weights`; black without samples.
+    /// Writes the radiance of the pixels in row `y` to `row`: the mean over the samples in
+    /// `replicates`, black without samples.
     pub fn row(
         &self,
         y: usize,
@@ -347,40 +327,35 @@ impl Film {
         }
     }
 
-    /// Returns the estimated error of the picture. Returns `None` if a tile has no samples, or if
-    /// its two replicates (halves of the samples) have different numbers of samples.
+    /// Returns the estimated error of the picture. `None` if a tile has no samples, or different
+    /// numbers of them in both replicates.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Returns the invalid samples (NaN or negative) since the film's last restart: their number,
-    /// and the positions of some of them.
+    /// Returns the invalid samples since the last restart.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Returns the number of samples since the film's last restart that were above the largest
-    /// value that the film can store.
+    /// Returns the number of saturated samples, see [`Tile::saturated_samples`].
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Returns the number of pixels with an integer sum that has reached `i64::MAX`. Further
-    /// samples make these pixels too dark.
+    /// Returns the number of saturated pixels, see [`Tile::saturated_pixels`].
     pub fn saturated_pixels(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. If several films hold disjoint ranges of samples, adding
-    /// them in any order gives the same sums as one film with all of the ranges.
+    /// Adds the samples of another film, which hold another range of sample indices.
     ///
     /// # Errors
-    /// Fails if the headers differ, or if there is a tile in which each film has the first sample
-    /// of only some pixels. The film is then unchanged.
+    /// Fails, without a change, in the cases of [`Mismatch`].
     pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
@@ -391,16 +366,14 @@ impl Film {
         Ok(())
     }
 
-    /// Creates an empty tile with the size of the film's tile `index`. The caller writes samples
-    /// into it and passes it to [`Film::add_at`].
+    /// Creates an empty tile for [`Film::add_at`].
     pub(super) fn new_tile(&self, index: usize) -> Tile {
         let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
         tile.clear_if_stale(self.epoch);
         tile
     }
 
-    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index` of this
-    /// film. Fails if each of the two tiles has the first sample of only some pixels.
+    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
     pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), Mismatch> {
         let ours = &mut self.tiles[index];
         if !ours.is_of(self.epoch) {
@@ -410,10 +383,10 @@ impl Film {
         ours.add_tile(&tile).map_err(|()| Mismatch::Overlap(index))
     }
 
-    /// Checks that the samples of a film with the properties `theirs` can be added to this film.
+    /// Checks that a film with the properties `theirs` can be added to this film.
     ///
     /// # Errors
-    /// Fails if size, scales, seed or precision differ.
+    /// Fails if a property differs.
     pub fn check_header(&self, theirs: &Header) -> Result<(), Mismatch> {
         let properties = |h: &Header| -> [(&'static str, String); 4] {
             [

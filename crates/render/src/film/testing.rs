@@ -2,8 +2,7 @@
 
 use crate::film::{Film, Header, LightWeights, Replicates, TILE, Tile};
 
-/// Returns an empty film of `width` x `height` pixels. Each entry of `scales` creates a light
-/// group; samples of the group are multiplied by it before they are rounded to integers.
+/// Returns an empty film of `width` x `height` pixels with a light group for each of `scales`.
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
     Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
@@ -28,9 +27,9 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     }
 }
 
-/// Adds `count` samples per pixel to both replicates (halves of the samples). `sums(x, y,
-/// replicate)` returns the sums of a pixel's samples in radiance, `[group][channel]`. Each sum is
-/// multiplied by the scale of its group and rounded.
+/// Adds `count` samples per pixel to both replicates. `sums(x, y, replicate)` returns the sums of a
+/// pixel's samples in radiance, `[group][channel]`. Each sum is multiplied by the scale of its
+/// group and rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {
@@ -53,7 +52,7 @@ pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usiz
 /// Film whose contents a test examines.
 pub trait TestFilm {
     /// Returns the radiance of the pixel in column `x` and row `y`: the mean over its samples in
-    /// both replicates (halves of the samples), or black without samples.
+    /// both replicates, or black without samples.
     fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3];
 
     /// Returns the radiance of each pixel of the row `y`, as [`Self::pixel`] does.
@@ -68,9 +67,9 @@ pub trait TestFilm {
     ///   seed (u64), and the name of the floating-point precision as length in bytes (u32) and text.
     /// - Invalid samples: their number (u64), the number of stored positions (u32), and for each
     ///   position index, x, y (u32 each) and replicate (u8).
-    /// - Tiles, row by row: sample counts of A and B, the two halves of the samples (u32 each), and
-    ///   [`Tile::lattice_px`] (u8). If the tile has samples, the sums of the pixels inside the picture
-    ///   follow, `[replicate][row][column][group][channel]` (i64).
+    /// - Tiles, row by row: sample counts of A and B (u32 each), and [`Tile::lattice_px`] (u8). If
+    ///   the tile has samples, the sums of the pixels inside the picture follow,
+    ///   `[replicate][row][column][group][channel]` (i64).
     /// - Number of samples above the largest value that the film can store (u64). It is omitted if it
     ///   is 0.
     fn bytes(&self) -> Vec<u8>;

@@ -1,5 +1,4 @@
-//! Film tile of 16x16 pixels: integer sums of the samples of both replicates (halves of the
-//! samples).
+//! Film tile of 16x16 pixels: integer sums of the samples of both replicates.
 
 use crate::film::invalid::InvalidSamples;
 use crate::film::{InvalidSample, TILE};
@@ -9,7 +8,7 @@ use zerkalo_kernel::lanes::prefetch;
 /// Number of pixels in a film tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
 
-/// Largest number of light groups of a film. Each light group has its own sums.
+/// Largest number of light groups of a film.
 pub const MAX_FILM_GROUPS: usize = 16;
 
 /// Number of integer sums (8 bytes each) in a cache line of 64 bytes.
@@ -18,20 +17,16 @@ const CACHE_LINE: usize = 8;
 /// Integer sums of a pixel without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// Integer sums of 16 x 16 pixels of a film. A pixel has the number `y * 16 + x` in its tile. In
-/// tiles at the right and lower edge of the picture, pixels outside of the picture stay zero (see
-/// [`Tile::extent`]).
+/// Integer sums of 16 x 16 pixels of a film. A pixel has the number `y * 16 + x` in its tile.
+/// Pixels outside the picture stay zero.
 ///
-/// All pixels have the same number of samples, except during the first pass. This pass adds the
-/// first sample of replicate A (half of the samples) to more and more pixels; [`Tile::lattice_px`]
-/// determines those that have it already. The number of samples may differ between the replicates A
-/// and B.
+/// All pixels have the same number of samples in a replicate, except during the first pass, which
+/// adds the first sample of replicate A to more and more pixels, see [`Tile::lattice_px`].
 #[derive(Debug)]
 pub struct Tile {
-    /// Epoch of the tile's contents: the film's epoch (a counter of its restarts) when they were
-    /// written; 0 for a new tile.
+    /// Epoch of the film when the tile was written; 0 for a new tile.
     epoch: u64,
-    /// Number of integer sums of a pixel: `groups * 3` for red, green and blue.
+    /// Number of integer sums of a pixel and replicate: `groups * 3`.
     stride: usize,
     extent: [usize; 2],
     counts: [u32; 2],
@@ -42,9 +37,9 @@ pub struct Tile {
     bad: InvalidSamples,
     /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
-    /// Bits of the pixels that have been written since the film's last restart: bit `p % 64` of
-    /// `[replicate][p / 64]` is for pixel p. The sums of other pixels count as zero, whatever the
-    /// memory contains. A restart therefore does not access the sums.
+    /// Bits of the pixels written since the film's last restart: bit `p % 64` of `[replicate][p /
+    /// 64]` is for pixel p. Sums of other pixels count as zero, so that a restart does not access
+    /// them.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -64,19 +59,17 @@ impl Tile {
         }
     }
 
-    /// Takes the memory of the integer sums of `old`, a tile of another film. The caller must
-    /// ensure that nothing has been written to this tile yet.
+    /// Takes the memory of `old`, a tile of another film. Nothing may have been written to this
+    /// tile yet.
     pub(super) fn take_memory(&mut self, old: Self) {
         self.sums = old.sums;
     }
 
-    /// Returns the number of integer sums of a tile with `groups` light groups.
     pub(super) fn sums_len(groups: usize) -> usize {
         2 * TILE_PIXELS * groups * 3
     }
 
-    /// Allocates memory for the integer sums if the tile has less than it needs. Does not write to
-    /// the memory.
+    /// Allocates the memory of the sums, without writing to it.
     pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
         let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() < len {
@@ -86,8 +79,8 @@ impl Tile {
         Ok(())
     }
 
-    /// Clears the tile if it was last written before the film's latest restart. Allocates its
-    /// memory first if it has too little. `epoch` is the film's epoch, a counter of its restarts.
+    /// Clears the tile if it was written before `epoch`, that of the film. Allocates its memory if
+    /// necessary.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -97,7 +90,7 @@ impl Tile {
         if sums.capacity() >= len {
             sums.resize(len, 0);
         } else {
-            // New memory is allocated, because growing the vector would copy its old contents.
+            // Growing the vector would copy its old contents.
             sums = vec![0; len];
         }
         *self = Self { epoch, sums, ..Self::cleared(self.stride / 3, self.extent) };
@@ -107,28 +100,24 @@ impl Tile {
         self.epoch == epoch
     }
 
-    /// Returns width and height in pixels of the tile's part that is inside the picture, 1..=16
-    /// each.
+    /// Returns width and height of the tile's part inside the picture, 1..=16 pixels.
     pub fn extent(&self) -> [usize; 2] {
         self.extent
     }
 
-    /// Returns two numbers: how many samples every pixel of the tile has in replicate A, and how
-    /// many in replicate B. The replicates are the two halves of the samples.
+    /// Returns the number of samples of every pixel in the replicates A and B, without an
+    /// incomplete first pass.
     pub fn counts(&self) -> [u32; 2] {
         self.counts
     }
 
-    /// Returns the progress of the first pass, which gives every pixel of the tile its first sample
-    /// of replicate A (half of the samples). Pixels whose x and y are multiples of the result have
-    /// this sample already; [`Tile::counts`] does not include it. The result is 0 before and after
-    /// the first pass.
+    /// Returns the progress of the first pass: pixels whose x and y are multiples of the result
+    /// have their first sample of replicate A. 0 before and after the first pass.
     pub fn lattice_px(&self) -> usize {
         usize::from(self.lattice_px)
     }
 
-    /// Returns two numbers: how many samples one pixel has in replicate A, and how many in
-    /// replicate B. The replicates are the two halves of the samples.
+    /// Returns the number of samples of one pixel in the replicates A and B.
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
         let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
@@ -140,19 +129,16 @@ impl Tile {
         self.counts != [0; 2] || self.lattice_px != 0
     }
 
-    /// Increases the sample count of all pixels of the tile in `replicate` (half of the samples; 0:
-    /// A, 1: B) by `samples`. The sums do not change.
+    /// Increases the sample count of all pixels in `replicate` (0: A, 1: B) by `samples`.
     pub fn advance(&mut self, replicate: usize, samples: u32) {
         self.counts[replicate] = self.counts[replicate].saturating_add(samples);
     }
 
-    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have the
-    /// first sample of replicate A (half of the samples). A step of 1 includes all pixels: the
-    /// sample count grows by one, and the first pass of the tile is complete.
+    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have
+    /// their first sample. A step of 1 completes the first pass.
     ///
     /// # Panics
-    /// Panics if `step_px` is none of these five numbers, or larger than the step of the previous
-    /// call in the same first pass.
+    /// Panics if `step_px` is none of these, or larger than in the same pass before.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -168,9 +154,8 @@ impl Tile {
         }
     }
 
-    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B) for
-    /// writing, `[group][channel]`. Callers must ensure that no sum overflows; [`Tile::add`]
-    /// handles overflow itself.
+    /// Returns the integer sums of a pixel for writing, `[group][channel]`. Callers must ensure
+    /// that no sum overflows.
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -187,8 +172,7 @@ impl Tile {
         sums
     }
 
-    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B):
-    /// `[group][channel]`.
+    /// Returns the integer sums of a pixel, `[group][channel]`.
     #[inline(always)]
     pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
         if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
@@ -198,24 +182,21 @@ impl Tile {
         &self.sums[start..start + self.stride]
     }
 
-    /// Prefetches the integer sums of a replicate (half of the samples; 0: A, 1: B) of the tile
-    /// into the processor's cache.
+    /// Prefetches the integer sums of a replicate into the processor's cache.
     pub fn prefetch(&self, replicate: usize) {
         let start = replicate * TILE_PIXELS * self.stride;
         let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
         sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
     }
 
-    /// Iterates over the pairs (replicate, pixel) whose sums have been written since the film's
-    /// last restart. The replicates 0 and 1 are the two halves of the samples.
+    /// Iterates over the pairs (replicate, pixel) written since the last restart.
     fn written(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
         all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
     }
 
-    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to the sums of a pixel.
-    /// A sum that would exceed `i64::MAX` is set to `i64::MAX` and counts as saturated. Because no
-    /// value is negative, the result is independent of the order of addition.
+    /// Adds non-negative `values`, `[group][channel]`, to the sums of a pixel. A sum that would
+    /// exceed `i64::MAX` stays there: the result is independent of the order of addition.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -223,8 +204,7 @@ impl Tile {
         }
     }
 
-    /// Adds non-negative `values` (red, green, blue) to the integer sums of one pixel and light
-    /// group; see [`Tile::add`].
+    /// Adds non-negative `values` to the sums of one light group; see [`Tile::add`].
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
@@ -235,7 +215,8 @@ impl Tile {
         self.full |= !fit;
     }
 
-    /// Returns the number of pixels with an integer sum that has reached `i64::MAX`.
+    /// Returns the number of pixels with a sum that has reached `i64::MAX`. Further samples make
+    /// them too dark.
     pub fn saturated_pixels(&self) -> u64 {
         if !self.full {
             return 0;
@@ -244,29 +225,25 @@ impl Tile {
         (0..TILE_PIXELS).filter(full).count() as u64
     }
 
-    /// Increases the number of saturated samples by `samples`. A saturated sample is above the
-    /// film's largest sample value and is stored with this value.
+    /// Increases the number of saturated samples by `samples`.
     #[cold]
     pub fn record_saturated(&mut self, samples: u64) {
         self.saturated_samples += samples;
     }
 
-    /// Returns the number of samples above the largest value that the film can store. They were
-    /// clamped to this value.
+    /// Returns the number of saturated samples: above the largest value that the film can store, to
+    /// which they were clamped.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }
 
-    /// Records an invalid sample (NaN or negative). In its place the caller adds black to the sums.
+    /// Records an invalid sample, in whose place the caller adds black.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    /// Sets the tile's counters to the values in a film file. The integer sums do not change.
-    /// `counts` are the sample counts of the replicates A and B (halves of the samples).
-    /// `saturated_samples` is the number of samples above the largest value that the film can
-    /// store. `bad` are the invalid samples. `full` is `true` if a sum has reached `i64::MAX`.
+    /// Sets the tile's counters to the values in a film file. `full`: a sum has reached `i64::MAX`.
     pub(super) fn restore(
         &mut self,
         counts: [u32; 2],
@@ -284,7 +261,7 @@ impl Tile {
         &self.bad
     }
 
-    /// Adds the samples of `other`, a tile of another film at the same position.
+    /// Adds the samples of `other`, a tile at the same position of another film.
     ///
     /// # Errors
     ///
@@ -315,14 +292,12 @@ fn saturated_sum(sum: i64) -> i64 {
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // The step is a power of two. A coordinate is a multiple of the step if it has no bits below
-    // the bit of the step.
+    // The step is a power of two: its multiples have no bits below that of the step.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
 /// Iterates row by row over the pixels of a tile whose x and y are multiples of `step_px`, which
-/// divides 16. Leaves out pixels whose x and y are multiples of the larger step `before_px`. If
-/// `before_px` is 0, no pixel is left out.
+/// divides 16, but not of the larger step `before_px` (0: none is left out).
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()

@@ -1,22 +1,21 @@
 //! Sorting of the attributes of an OpenEXR header, so that equal pictures have equal files.
 //!
-//! OpenEXR allows any order of attributes. The order of the library `exr` differs between runs,
-//! because it comes from a hash map. Source of the format: *OpenEXR File Layout*. A header is a
-//! list of attributes that ends with a zero byte. An attribute consists of a name and a type (each
-//! ends with a zero byte), a size (i32, little-endian), and `size` bytes of data.
+//! The order of the crate `exr` comes from a hash map and differs between runs. Source: *OpenEXR
+//! File Layout*. A header is a list of attributes that ends with a zero byte. An attribute consists
+//! of a name and a type (each ends with a zero byte), a size (i32, little-endian), and `size` bytes
+//! of data.
 
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 /// Number of bytes of an OpenEXR file before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
 
-/// Writer that sorts the attributes of an OpenEXR header by name. It buffers the header until it is
-/// complete, writes it to the sink, and passes on all further bytes.
+/// Writer that sorts the attributes of an OpenEXR header by name and passes on all further bytes.
 pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
-    /// Buffered bytes of the header. `None` after the header has been written.
+    /// Bytes of the header, until it is complete.
     buffer: Option<Vec<u8>>,
-    /// Number of bytes of the header, including its last byte; 0 until the header is complete.
+    /// Number of bytes of the header; 0 until it is complete.
     header_len: usize,
 }
 
@@ -28,8 +27,7 @@ impl<W: Write + Seek> Ordered<W> {
 }
 
 impl Ordered<Cursor<Vec<u8>>> {
-    /// Returns the bytes of the OpenEXR header with sorted attributes. Returns no bytes if the
-    /// header is not complete.
+    /// Returns the sorted header, or nothing if it is not complete.
     pub fn into_header(self) -> Vec<u8> {
         let mut bytes = self.sink.into_inner();
         bytes.truncate(self.header_len);
@@ -41,17 +39,18 @@ impl<W: Write + Seek> Write for Ordered<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let Some(buffer) = &mut self.buffer else { return self.sink.write(bytes) };
         buffer.extend_from_slice(bytes);
-        if let Some((mut attributes, rest)) = buffer.get(PREAMBLE..).and_then(attributes) {
+        if let Some(mut attributes) = buffer.get(PREAMBLE..).and_then(attributes) {
             attributes.sort_unstable();
-            self.sink.write_all(&[&buffer[..PREAMBLE], &attributes.concat(), rest].concat())?;
-            self.header_len = buffer.len() - rest.len() + 1;
+            let sorted = attributes.concat();
+            self.header_len = PREAMBLE + sorted.len() + 1;
+            buffer[PREAMBLE..self.header_len - 1].copy_from_slice(&sorted);
+            self.sink.write_all(buffer)?;
             self.buffer = None;
         }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        // A flush does nothing until the header is complete.
         if self.buffer.is_none() { self.sink.flush() } else { Ok(()) }
     }
 }
@@ -65,10 +64,9 @@ impl<W: Write + Seek> Seek for Ordered<W> {
     }
 }
 
-/// Splits `bytes`, an OpenEXR header without its first [`PREAMBLE`] bytes. Returns two values: the
-/// bytes of each attribute, and the bytes from the zero byte at the end of the header on. Returns
-/// `None` if the header is incomplete.
-fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
+/// Returns the attributes in `bytes`, an OpenEXR header without its first [`PREAMBLE`] bytes. `None`
+/// if the header is incomplete.
+fn attributes(mut bytes: &[u8]) -> Option<Vec<&[u8]>> {
     let mut found = Vec::new();
     while *bytes.first()? != 0 {
         let name = bytes.iter().position(|b| *b == 0)? + 1;
@@ -78,7 +76,7 @@ fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
         found.push(bytes.get(..end)?);
         bytes = &bytes[end..];
     }
-    Some((found, bytes))
+    Some(found)
 }
 
 #[cfg(test)]

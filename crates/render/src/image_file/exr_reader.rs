@@ -6,20 +6,17 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Picture that was read from an OpenEXR file, in linear radiance.
+/// Picture from an OpenEXR file.
 pub struct ReadPicture {
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
     /// Pixels in linear radiance, `[row][column]`.
     pub pixels: Vec<[f64; 3]>,
-    /// Pictures of the two halves of the samples (replicates A and B), `[row][column]`. Half of
-    /// their difference is an estimate of the error. `None` if the file lacks these channels, for
-    /// example because another program wrote it.
+    /// Pictures of the replicates A and B. `None` if the file lacks these channels.
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// Largest number of pixels of an OpenEXR file that is read: 8192 x 8192. Larger files are refused,
-/// because the whole picture is read into memory.
+/// Largest number of pixels of a file that is read: 8192 x 8192.
 const MAX_PIXELS: usize = 1 << 26;
 
 /// Reads the headers of an OpenEXR file.
@@ -28,11 +25,8 @@ pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
     MetaData::read_from_buffered(Tracking::new(BufReader::new(File::open(path)?)), false)
 }
 
-/// Reads the channels `R G B` of an OpenEXR file, and the channels `A.R ..` and `B.R ..` of the two
-/// replicates (halves of the samples) if they exist.
-///
-/// # Errors
-/// Fails if the file cannot be read, is too large, or lacks `R G B`.
+/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` of the replicates if
+/// they exist.
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = read_exr_meta(path).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);

@@ -1,14 +1,12 @@
 //! OpenEXR writer. Pictures are linear radiance in 32-bit floats, with additional channels for
 //! replicates, light groups and sample count.
 //!
-//! All channels are in one part; prefixes of their names form layers. `R G B` is the picture.
-//! `A.R ..` and `B.R ..` are the pictures from the two halves of the samples (replicates); half of
-//! their difference is an estimate of the picture's error. `light_NAME.R ..` are the contributions
-//! of the light groups; their sum is the picture. `count` is the number of samples of a pixel.
+//! `R G B` is the picture, `A.R ..` and `B.R ..` are those of the replicates, `light_NAME.R ..` the
+//! contributions of the light groups, whose sum is the picture. `count` is the number of samples of
+//! a pixel.
 //!
-//! The file consists of tiles, so that programs can read a part of a large picture. A row of tiles
-//! is written as soon as it is complete. The header is written again at the end if metadata have
-//! changed.
+//! The file consists of tiles, so that programs can read a part of a large picture. The header is
+//! written again at the end if metadata have changed.
 
 use crate::film::{Replicates, Sums};
 use crate::image_file::bands::Bands;
@@ -29,11 +27,10 @@ use exr::meta::{BlockDescription, Headers};
 use std::io::{self, Cursor};
 use std::ops::Range;
 
-/// Width and height in pixels of a tile of the OpenEXR file. A row of tiles is held in memory while
-/// it is encoded.
+/// Width and height of a tile in pixels. A row of tiles is held in memory.
 const TILE: [usize; 2] = [64, 16];
 
-/// Encodes a picture as OpenEXR and writes it to `sink`, one row of tiles after another.
+/// Writes a picture, one row of tiles after another.
 pub(super) fn encode(
     picture: &ImageData,
     bands: &mut dyn Bands,
@@ -45,16 +42,14 @@ pub(super) fn encode(
     })
 }
 
-/// Source of the values of one channel, such as `A.R`, of the OpenEXR file.
+/// Source of the values of a channel; the last field is the colour (0 red, 1 green, 2 blue).
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance summed over all light groups. The fields are the replicates (halves of the samples)
-    /// whose samples are averaged, and the colour channel (0 red, 1 green, 2 blue).
+    /// Radiance of all light groups, averaged over replicates.
     Mixed(Replicates, usize),
-    /// Radiance of one light group alone. The fields are the group's index and the colour channel
-    /// (0 red, 1 green, 2 blue).
+    /// Radiance of one light group.
     Group(usize, usize),
-    /// Number of samples of a pixel, summed over both replicates (halves of the samples).
+    /// Number of samples in both replicates.
     Count,
 }
 
@@ -93,8 +88,7 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns all bytes of an OpenEXR file before its table of chunks, that is, magic number, version
-/// and header.
+/// Returns all bytes before the table of chunks.
 fn header(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -108,7 +102,7 @@ fn header(
     }
 }
 
-/// Returns the headers of the OpenEXR file: a list of one, because the file has one part.
+/// Returns the header of the only part of the file.
 fn headers(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -139,9 +133,8 @@ fn headers(
         rounding_mode: RoundingMode::Down,
     };
     let header = Header::new(text("picture"), size, descriptions)
-        // RLE is used because it is fast and noisy pictures compress poorly anyway. A picture of
-        // 1920x1080 pixels takes 108 MB uncompressed. RLE reduces it to 100 MB in 0.55 s, ZIP to 71
-        // MB in 3.4 s.
+        // Noisy pictures compress poorly: RLE reduces 108 MB of 1920x1080 pixels to 100 MB in 0.55
+        // s, ZIP to 71 MB in 3.4 s.
         .with_encoding(Compression::RLE, BlockDescription::Tiles(tiles), LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);
@@ -152,8 +145,7 @@ fn text(text: &str) -> Text {
     Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
 }
 
-/// Returns all channels of the OpenEXR file, each as its name and the source of its values. They
-/// are sorted by name, as the format requires.
+/// Returns all channels, sorted by name as the format requires.
 fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     let mut channels = vec![("count".to_string(), Source::Count)];
     for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
@@ -168,9 +160,8 @@ fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     channels
 }
 
-/// Returns a unique layer name for each light group. A layer is a group of OpenEXR channels with a
-/// common prefix. The layer name contains the light group's name in `names`, or the number of the
-/// group if it has no name. It consists of ASCII letters, digits, `_` and `-`.
+/// Returns a unique layer name for each light group, of ASCII letters, digits, `_` and `-`. Groups
+/// without a name have their number.
 fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let mut layers: Vec<String> = Vec::new();
@@ -187,11 +178,11 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Pixel values of a row of tiles of the OpenEXR file, encoded as bytes.
+/// Encoded pixels of a row of tiles.
 struct TileRow<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
-    /// Encoded values of each channel, in `[row][column]` order.
+    /// Encoded values of each channel, `[row][column]`.
     bytes: Vec<Vec<u8>>,
 }
 
@@ -200,7 +191,6 @@ impl<'a> TileRow<'a> {
         Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
-    /// Replaces the encoded values by those of the given rows of the picture.
     fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
         let Self { picture, sources, bytes } = self;
         bytes.iter_mut().for_each(Vec::clear);
@@ -232,10 +222,8 @@ impl<'a> TileRow<'a> {
     }
 }
 
-/// Returns the contribution of one light group to one colour channel of a pixel: the mean over the
-/// pixel's samples; 0 without samples. `i` is the position of this group and channel in
-/// `[group][channel]` order. `per_unit` has the factors that convert integer sums to sums of
-/// radiance, in the same order.
+/// Returns the mean over a pixel's samples of sum `i`, in the order `[group][channel]`; 0 without
+/// samples.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,

@@ -1,27 +1,25 @@
-//! Input of the picture encoders (PNG and OpenEXR) except for the samples.
+//! Input of the encoders apart from rows.
 
 use crate::film::Display;
 use crate::film::LightWeights;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Size and settings of a picture file without its samples, which come from
-/// [`Bands`](crate::image_file::Bands).
+/// Size and settings of a picture file.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
     /// Width and height of the image in pixels.
     pub size: [u32; 2],
-    /// Weight of each light group (lights with sums of their own in the film): colour times
-    /// intensity.
+    /// Weight of each light group: colour times intensity.
     pub mix: &'a LightWeights,
-    /// Name of each light group, for file formats with layers of channels (OpenEXR).
+    /// Name of each light group, for OpenEXR.
     pub group_names: &'a [String],
-    /// Exposure and tone curve, for file formats with displayed values (PNG).
+    /// Exposure and tone curve, for PNG.
     pub display: Display,
-    /// Bits per channel, for file formats with displayed values (PNG).
+    /// Bits per channel, for PNG.
     pub depth: Depth,
 }
 
-/// Number of bits per channel of a picture file with display values.
+/// Number of bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Depth {
     /// 8 bits per channel: 256 levels.
@@ -35,8 +33,7 @@ pub enum Depth {
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Replaces the first bytes of a file by `after`, then seeks to the end of the file. `before` must
-/// be the bytes with which the file begins.
+/// Replaces `before`, the first bytes of a file, by `after`, then seeks to its end.
 ///
 /// # Errors
 /// Fails if `before` and `after` have different lengths, or if the output cannot be written.

@@ -1,5 +1,4 @@
-//! Metadata of picture files and film files: reading, and padding of values with spaces. The
-//! padding reserves place for a value that becomes known only at the end of a render.
+//! Metadata of picture files and film files.
 
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
 use crate::image_file::exr_reader::read_exr_meta;
@@ -9,42 +8,36 @@ use std::io::BufReader;
 use std::path::Path;
 use zerkalo_scene::disk::open_regular;
 
-/// Block size in bytes: metadata values in picture files are padded to a multiple of this size.
+/// Metadata values are padded to a multiple of this number of bytes.
 const PADDED: usize = 128;
 
-/// Pads a metadata value with spaces to a multiple of [`PADDED`] bytes. If a picture is written
-/// while it is rendered, its noise and sample counts are placeholders at first. The final values
-/// overwrite them at the end and must have the same length.
+/// Pads a metadata value with spaces. Noise and sample counts that are known only at the end of a
+/// render overwrite placeholders of the same length.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))
 }
 
-/// Removes the trailing spaces of the value of a metadata entry. Takes and returns the entry's key
-/// and value.
+/// Removes the padding of a metadata entry.
 fn unpadded((key, value): (String, String)) -> (String, String) {
     (key, value.trim_end_matches(' ').to_string())
 }
 
-/// Metadata of a picture file (PNG, OpenEXR) or film file (`.zk`).
+/// Metadata of a picture file (PNG, OpenEXR) or film file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
     /// Name of the file's format: `PNG`, `OpenEXR` or `film`.
     pub format: &'static str,
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
-    /// Metadata keys and values, in the order of the file; sorted by key in OpenEXR files.
+    /// Keys and values in the order of the file; sorted in OpenEXR files.
     pub entries: Vec<(String, String)>,
     /// Header of a film file; `None` for a picture file.
     pub film: Option<FilmFileHeader>,
 }
 
 impl FileMetadata {
-    /// Reads the metadata of the PNG, OpenEXR or film file at `path`, and verifies the checksums of
-    /// a film file.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read, has another format, or is damaged.
+    /// Reads the metadata of a file, and verifies the checksums of a film file.
     pub fn read(path: &Path) -> Result<Self, String> {
         if is_film_file(path) {
             let header = FilmReader::open(path).and_then(FilmReader::verify);
@@ -91,7 +84,7 @@ impl FileMetadata {
         Ok(Self { format: "OpenEXR", size, entries, film: None })
     }
 
-    /// Returns the value of the metadata entry `key`. Returns `None` if there is no such entry.
+    /// Returns the value of the entry `key`.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.entries.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
     }

@@ -1,5 +1,4 @@
-//! Output of picture files: choice of the format by the file's extension, and replacement of
-//! existing files.
+//! Output of picture files in the format of their extension.
 
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
@@ -23,7 +22,7 @@ static FORMATS: [Format; 2] = [
     Format { extension: "exr", encode: exr_writer::encode },
 ];
 
-/// Picture file to be written: a path with the extension of a known format.
+/// Path of a picture file to be written, with a known extension.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImageOutput {
     path: PathBuf,
@@ -32,11 +31,7 @@ pub struct ImageOutput {
 }
 
 impl ImageOutput {
-    /// Creates an output for the file `path`. Its extension, in upper or lower case, chooses the
-    /// format. Accesses no file.
-    ///
-    /// # Errors
-    /// Fails if the extension is missing or unknown.
+    /// Creates an output for `path`, whose extension chooses the format. Accesses no file.
     pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
         let path = path.into();
         let extension = path.extension().map(OsStr::to_string_lossy);
@@ -62,8 +57,8 @@ impl ImageOutput {
         }
     }
 
-    /// Returns an output for the same file that never replaces an existing file. Writing then fails
-    /// if the file exists when the write begins, or when the last row is complete.
+    /// Returns an output that never replaces an existing file, neither when the write begins nor
+    /// when it ends.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
     }
@@ -73,22 +68,13 @@ impl ImageOutput {
         &self.path
     }
 
-    /// Checks, without changing the picture file, that it can be written. Long renders call this
-    /// method at their start.
-    ///
-    /// # Errors
-    ///
-    /// Returns the error that writing would return now.
+    /// Checks that the file can be written, for the start of a long render.
     pub fn check_writable(&self) -> Result<(), WriteError> {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
-    /// Writes the picture to a temporary file in the same directory, row by row. Renames this file
-    /// to the path of the picture when it is complete and stored on the disk.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written, or if `bands` cannot supply a row. An existing file is
-    /// then unchanged.
+    /// Writes the picture row by row to a temporary file, which replaces an old one when it is
+    /// complete and stored on the disk.
     pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
         replace_file(&self.path, self.existing, |file| {
             let mut out = BufWriter::with_capacity(1 << 16, file);
@@ -97,11 +83,7 @@ impl ImageOutput {
         })
     }
 
-    /// Writes the picture of `film`, whose header is `header`. `depth` is the number of bits per
-    /// channel of a PNG.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be written.
+    /// Writes the picture of `film` with its `header`.
     pub fn write_film(
         &self,
         header: &FilmFileHeader,

@@ -11,12 +11,12 @@ use png::{
 };
 use std::io::{self, Write};
 
-/// Largest number of bytes of image data in a chunk of the PNG file.
+/// Largest number of bytes of image data in a chunk.
 const CHUNK_BYTES: usize = 1 << 18;
-/// Number of bytes of the PNG file's last chunk, which has no data.
+/// Number of bytes of the last chunk, which has no data.
 const END_CHUNK_BYTES: usize = 12;
 
-/// Encodes a picture as PNG and writes it to `sink` row by row.
+/// Writes a picture row by row.
 pub(super) fn encode(
     picture: &ImageData,
     bands: &mut dyn Bands,
@@ -50,16 +50,16 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns all bytes of a PNG file before its image data.
+/// Returns all bytes before the image data.
 fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    // The writer adds the last chunk of a PNG file when it is dropped. This chunk is cut off.
+    // The writer adds the last chunk when it is dropped.
     drop(start(picture, metadata, &mut bytes)?);
     bytes.truncate(bytes.len() - END_CHUNK_BYTES);
     Ok(bytes)
 }
 
-/// Writes the part of a PNG file before the image data, and returns a writer for the image data.
+/// Writes the part before the image data.
 fn start<W: Write>(
     picture: &ImageData,
     metadata: &[(String, String)],
@@ -73,8 +73,7 @@ fn start<W: Write>(
         Depth::Sixteen => BitDepth::Sixteen,
     });
     encoder.set_compression(Compression::Fast);
-    // Some readers ignore the sRGB chunk. For them the file also contains the gamma and the
-    // chromaticities that the PNG specification gives for sRGB.
+    // For readers that ignore the sRGB chunk: the values that the PNG specification gives for sRGB.
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
     let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
@@ -85,8 +84,7 @@ fn start<W: Write>(
         blue: xy(15_000, 6_000),
     });
     for (key, value) in metadata {
-        // Text chunks (tEXt) can hold only Latin-1, but more programs read them than the newer iTXt
-        // chunks. They are therefore used for ASCII values.
+        // More programs read tEXt than iTXt, but it holds only Latin-1.
         if value.is_ascii() {
             encoder.add_text_chunk(key.clone(), padded(value))?;
         } else {
@@ -96,7 +94,7 @@ fn start<W: Write>(
     encoder.write_header()
 }
 
-/// Encodes an 8-bit sRGB picture as PNG. `rgb` has red, green and blue of each pixel, row by row.
+/// Encodes `rgb`, the bytes of 8-bit sRGB pixels row by row, as PNG.
 ///
 /// # Errors
 /// Fails if the length of `rgb` is not 3 bytes per pixel.
@@ -112,8 +110,7 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Replaces `bytes` by those of row `y` of the PNG image: red, green, blue of each pixel. 16-bit
-/// values are big-endian, as PNG requires.
+/// Replaces `bytes` by those of row `y`. 16-bit levels are big-endian.
 fn encode_row(
     picture: &ImageData,
     bands: &mut dyn Bands,

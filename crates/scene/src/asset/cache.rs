@@ -15,8 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 use zerkalo_kernel::primitive::Mesh;
 
-/// Largest memory for cached files that no scene uses any more \[bytes\]. Such files are kept
-/// because an undo may bring them back.
+/// Largest memory in bytes for files that no scene uses any more, but an undo may bring back.
 const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
@@ -25,18 +24,17 @@ const MAX_IMAGE_BYTES: u64 = 512 << 20;
 /// Estimated peak memory for building the BVH of a mesh \[bytes per triangle\].
 const BUILD_BYTES: u64 = 400;
 
-/// Stage of loading an asset file, for progress messages: reading the file, or building the BVH of
-/// a mesh.
+/// Stage of loading an asset file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadProgress {
-    /// Stage of loading: a file is being read.
+    /// Reading of a file.
     Reading {
-        /// Path of the asset file that is being read.
+        /// Path of the file.
         file: PathBuf,
-        /// Length in bytes of the file that is being read.
+        /// Length in bytes.
         bytes: u64,
     },
-    /// Stage of loading: the BVH of a mesh is being built.
+    /// Building of the BVH of a mesh.
     Building {
         /// Path of the mesh file.
         file: PathBuf,
@@ -60,8 +58,7 @@ impl fmt::Display for LoadProgress {
     }
 }
 
-/// Cache key of an asset file. A file with the same path and another modification time or length
-/// has another key.
+/// Cache key of one version of a file.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -69,13 +66,10 @@ struct Key {
     bytes: u64,
 }
 
-/// Cache entry of an asset file: its content or the error of reading it. Empty until the file has
-/// been read.
+/// Content of a file or the error of reading it. Empty until the file has been read.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// Cache of asset files of one type; the least recently used ones are evicted. The map holds two
-/// values for a key: its cache entry, and the number of the last use of this entry. Uses of the
-/// cache are numbered from 1.
+/// Cache of files of one type. The map has the number of the last use of each entry.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
     last_used: u64,
@@ -88,8 +82,7 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    /// Returns the cache entry for `key`, and creates it if there is none. Removes the entries for
-    /// other versions of the same file, which have another modification time or length.
+    /// Returns the entry for `key`, a new one if necessary. Removes other versions of the file.
     fn entry(&mut self, key: &Key) -> CacheEntry<T> {
         self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
@@ -98,8 +91,7 @@ impl<T> Cache<T> {
         entry.clone()
     }
 
-    /// Evicts files that no scene uses, the least recently used first, until the remaining unused
-    /// files take at most [`UNUSED_BYTES`]. `bytes_of` returns the memory of a file's content.
+    /// Evicts unused files, the least recently used first, down to [`UNUSED_BYTES`].
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let unused: Vec<(u64, usize, Key)> = self
             .files
@@ -119,8 +111,7 @@ impl<T> Cache<T> {
     }
 }
 
-/// Returns the keys of the files to evict. `unused` has the unused files, each as `(number of its
-/// last use, memory in bytes, key)`.
+/// Returns the keys to evict. `unused` has number of the last use, memory in bytes and key.
 fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
     sort_by_number(&mut unused, |(last_used, ..)| -(*last_used as i64));
     let mut sum = 0usize;
@@ -131,9 +122,8 @@ fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
     unused.into_iter().filter_map(exceeds).collect()
 }
 
-/// Cache of all asset files that scenes name. All scenes and threads share the content of a file.
-/// The file is read once, and again only if it changes on disk. Errors are cached as well. Unused
-/// files are evicted if they take more than 256 MiB.
+/// Cache of all asset files that scenes name, shared by scenes and threads. A file is read again
+/// only if it changes on disk. Errors are cached as well.
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,
@@ -154,8 +144,8 @@ impl fmt::Debug for Assets {
 }
 
 impl Assets {
-    /// Creates an empty cache. `progress` is called at the start of each stage of loading, on the
-    /// thread that loads the file.
+    /// Creates an empty cache. The thread that loads a file calls `progress` at the start of each
+    /// stage.
     pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
         Self {
             meshes: Mutex::default(),
@@ -166,9 +156,6 @@ impl Assets {
     }
 
     /// Returns the mesh in the file at `path`.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or is not a valid mesh.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
             let needed = key.bytes.saturating_mul(mesh::parse_bytes(path));
@@ -184,18 +171,12 @@ impl Assets {
     }
 
     /// Returns the image in the file at `path`.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or is not a valid image.
     pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
         let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.images, path, read, Image::bytes)
     }
 
     /// Returns the environment image (radiance from all directions) in the file at `path`.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or is not a valid image.
     pub fn radiance_map(&self, path: &Path) -> Result<Arc<RadianceMap>, AssetError> {
         let read = |key: &Key| RadianceMap::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.radiance_maps, path, read, RadianceMap::bytes)
@@ -207,12 +188,7 @@ impl Assets {
     }
 }
 
-/// Checks that `needed` bytes of memory are available. `path` is the asset file, and `what` names
-/// the data that needs the memory.
-///
-/// # Errors
-/// Fails if less memory is available. The error states the needed and the available memory, and a
-/// remedy.
+/// Checks that `needed` bytes of memory are available for `what`.
 fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> {
     let expected = "a mesh of fewer triangles, or more free memory";
     missing_memory(needed).map_or(Ok(()), |missing| {
@@ -220,15 +196,13 @@ fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> 
     })
 }
 
-/// Locks an asset cache, even if a thread has panicked while it held the lock. The cache is valid
-/// then, because no method leaves it half changed.
+/// Locks a cache. It is valid even after a panic, because no method leaves it half changed.
 fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the content of the asset file at `path` from `cache`. If the cache lacks the file,
-/// `read` reads it. Other threads can use the cache meanwhile. `bytes_of` returns the memory of the
-/// content in bytes.
+/// Returns the file at `path` from `cache`. If it is missing there, `read` reads it, while other
+/// threads can use the cache.
 fn load<T>(
     cache: &Mutex<Cache<T>>,
     path: &Path,

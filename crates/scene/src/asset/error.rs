@@ -4,16 +4,16 @@ use crate::value::sanitized;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Location of an error in an asset file: a line, a byte offset, a named part, or the whole file.
+/// Location of an error in an asset file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileLocation {
-    /// No location: the error concerns the file as a whole.
+    /// File as a whole.
     Whole,
-    /// Line of the error in a text file, counted from 1.
+    /// Line, counted from 1.
     Line(usize),
-    /// Offset of the error in the file, in bytes counted from 0.
+    /// Offset in bytes.
     Byte(usize),
-    /// Name of the part with the error, such as `vertex 17` or `accessors[3]`.
+    /// Part, such as `vertex 17` or `accessors[3]`.
     Part(String),
 }
 
@@ -24,24 +24,20 @@ pub struct AssetError {
     pub file: PathBuf,
     /// Location of the error in the file.
     pub place: FileLocation,
-    /// Clause without a full stop that states the error, such as `face names vertex 9, of 8`. The
-    /// message consists of file, location and this clause.
+    /// Clause that states the error, such as `face names vertex 9, of 8`.
     pub found: String,
-    /// Phrase that states the valid content at this location, such as `a vertex below 8, their
-    /// number`.
+    /// Phrase that states what is valid, such as `a vertex below 8, their number`.
     pub expected: String,
 }
 
 impl AssetError {
-    /// Creates an error about the file at `path` as a whole. `found` and `expected` become the
-    /// fields of these names in [`AssetError`].
+    /// Creates an error about the file at `path` as a whole.
     pub(super) fn of_file(path: &Path, found: impl Into<String>, expected: &str) -> Self {
         let (file, expected) = (path.to_path_buf(), expected.to_string());
         Self { file, place: FileLocation::Whole, found: found.into(), expected }
     }
 
-    /// Returns the file, the location and the error, such as `bunny.obj:12: face names vertex 9, of
-    /// 8`.
+    /// Returns file, location and error: `bunny.obj:12: face names vertex 9, of 8`.
     pub fn what(&self) -> String {
         let file = self.file.display();
         let place = match &self.place {

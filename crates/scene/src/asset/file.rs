@@ -10,19 +10,16 @@ use std::path::{Component, Path, PathBuf};
 /// Largest size in bytes of an asset file that is read: 2 GiB.
 pub const MAX_BYTES: u64 = 2 << 30;
 
-/// Asset file that has been read into memory.
+/// Asset file in memory.
 pub struct FileContents {
-    /// Path of the asset file that was read.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Content of the asset file in bytes.
+    /// Content of the file.
     pub bytes: Vec<u8>,
 }
 
 impl FileContents {
     /// Reads the file at `path`, which may have at most `limit` bytes.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read, is not a regular file, or has more than `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let error = |found: String, expected: &str| Err(AssetError::of_file(path, found, expected));
         let file = match open_regular(path) {
@@ -41,8 +38,7 @@ impl FileContents {
             let found = format!("there is no memory for its {}", megabytes(metadata.len()));
             return error(found, "a smaller file, or more free memory");
         }
-        // One byte more than the limit is read, to detect a file that has grown since its length
-        // was checked.
+        // One byte more than the limit shows that the file has grown.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
@@ -51,8 +47,7 @@ impl FileContents {
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
-    /// Creates an error at location `place` in this file. `found` is a clause that states the
-    /// error. `expected` is a phrase that states the valid content. Neither ends with a full stop.
+    /// Creates an error at `place` in this file.
     pub fn error(
         &self,
         place: FileLocation,
@@ -62,15 +57,13 @@ impl FileContents {
         AssetError { place, ..AssetError::of_file(&self.path, found, expected) }
     }
 
-    /// Creates an error about this file as a whole. `found` and `expected` are those of
-    /// [`FileContents::error`].
+    /// Creates an error about this file as a whole.
     pub fn fault(&self, found: impl Into<String>, expected: &str) -> AssetError {
         self.error(FileLocation::Whole, found, expected)
     }
 
-    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file,
-    /// by the rule in docs/scene-format.md. Returns `None` if `name` is an absolute path, a path
-    /// with `..` or a URL, because it could then name a file outside of the folder.
+    /// Resolves `name`, which occurs in this file, relative to its folder, by the rule in
+    /// docs/scene-format.md. `None` if it could name a file outside the folder.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)

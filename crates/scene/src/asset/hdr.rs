@@ -23,10 +23,6 @@ pub struct HdrFile<'a> {
 
 impl<'a> HdrFile<'a> {
     /// Reads the header of a file whose first line begins with `#?RADIANCE`.
-    ///
-    /// # Errors
-    /// Fails if the header is invalid, if the pixels are not RGBE, or if they are not stored row by
-    /// row from the top, from left to right.
     pub fn parse(source: &'a FileContents) -> Result<Self, AssetError> {
         let mut lines = Lines { rest: &source.bytes, number: 0 };
         let end =
@@ -79,9 +75,6 @@ impl<'a> HdrFile<'a> {
 
     /// Decodes the pixels (red, green, blue) of the file `source`, row by row from the top. The
     /// image must have pixels.
-    ///
-    /// # Errors
-    /// Fails if the file has fewer pixels than its size, or invalid runs.
     pub fn pixels(&self, source: &FileContents) -> Result<Vec<[f32; 3]>, AssetError> {
         let [width, height] = self.size.map(|n| n as usize);
         let (scales, factor) = (scales(), 1.0 / self.exposure);

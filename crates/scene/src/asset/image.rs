@@ -1,10 +1,12 @@
 //! Images for textures, from PNG and JPEG files.
 
 use crate::asset::error::AssetError;
-use crate::asset::exif::Orientation;
 use crate::asset::file::FileContents;
 use crate::value::{Fnv1a64, linear_from_srgb};
-use png::{BitDepth, ColorType, Transformations};
+use image::codecs::png::PngDecoder;
+use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage, ImageDecoder, ImageError, Limits, RgbImage};
+use std::error::Error;
 use std::fmt::Display;
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -17,13 +19,12 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 pub const MAX_SIDE: u32 = 32_768;
 
 /// Largest number of pixels of a texture image: 64 Mi. An image of this size takes at most 402 MB
-/// of memory after decoding, and at most 810 MB during decoding.
+/// of memory after decoding, and at most 1.1 GB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
-/// pixels per byte of uncompressed data, times the factor of at most 1032 by which deflate
-/// compresses this data. A JPEG has at most 64 pixels per bit, which is 512 per byte. A Radiance
-/// file in the old encoding has at most 65536 pixels per 8 bytes, which is 8192 per byte.
+/// Largest number of pixels per byte of an image file, that of PNG: eight pixels per byte of
+/// uncompressed data, times 1032, the largest ratio of deflate. A JPEG has at most 512, a Radiance
+/// file in the old encoding 8192.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// Format of an image file.
@@ -36,7 +37,7 @@ pub(super) enum ImageFormat {
 }
 
 impl ImageFormat {
-    /// Determines the format by the first bytes of a file. Returns `None` for all other formats.
+    /// Determines the format by the first bytes of a file.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         let formats: [(&[u8], Self); 4] = [
             (b"\x89PNG\r\n\x1a\n", Self::Png),
@@ -48,15 +49,14 @@ impl ImageFormat {
     }
 }
 
-/// Pixels of a texture image with 8 or 16 bits per channel, as in the file. A grey pixel is one
-/// number, a coloured pixel three.
+/// Levels with the bit depth of the file, one of a grey pixel, three of a coloured one.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
     Words(Vec<u16>),
 }
 
-/// Texture image, decoded in the bit depth of its file: 1 to 6 bytes per pixel.
+/// Texture image: 1 to 6 bytes per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     size: [u32; 2],
@@ -64,8 +64,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns a table of linear light from 0 to 1, indexed by sRGB level from 0 (black) to `last`
-/// (white).
+/// Returns the linear light, 0..=1, of the sRGB levels from 0 to `last` (white).
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -75,7 +74,7 @@ static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
-    /// Adds the size and the pixels of the image to `hash`.
+    /// Adds size and pixels to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
         hash.update(&[self.channels as u8]);
@@ -85,28 +84,31 @@ impl Image {
         }
     }
 
-    /// Decodes an image file in memory. The format is determined by the first bytes of the file.
-    ///
-    /// # Errors
-    /// Fails if the file is not a valid image.
+    /// Decodes an image file.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
-        let (image, orientation) = match ImageFormat::of(&source.bytes) {
-            Some(ImageFormat::Png) => decode_png(source)?,
-            Some(ImageFormat::Jpeg) => decode_jpeg(source)?,
-            _ => return Err(source.fault("this is neither a PNG nor a JPEG", EXPECTED)),
-        };
-        let Self { size, channels, texels } = image;
-        let (size, texels) = match texels {
-            Texels::Bytes(t) => {
-                let (size, t) = orientation.apply(size, channels, t);
-                (size, Texels::Bytes(t))
+        match ImageFormat::of(&source.bytes) {
+            Some(ImageFormat::Png) => decode_png(source),
+            Some(ImageFormat::Jpeg) => decode_jpeg(source),
+            Some(ImageFormat::Hdr | ImageFormat::OpenExr) | None => {
+                Err(source.fault("this is neither a PNG nor a JPEG", EXPECTED))
             }
-            Texels::Words(t) => {
-                let (size, t) = orientation.apply(size, channels, t);
-                (size, Texels::Words(t))
-            }
+        }
+    }
+
+    /// Returns `image` upright, by the EXIF data of its file, and without alpha.
+    fn upright(mut image: DynamicImage, exif: Option<&[u8]>) -> Self {
+        if let Some(orientation) = exif.and_then(Orientation::from_exif_chunk) {
+            image.apply_orientation(orientation);
+        }
+        let (size, color) = ([image.width(), image.height()], image.color());
+        let is_deep = color.bits_per_pixel() > 8 * u16::from(color.channel_count());
+        let texels = match (color.has_color(), is_deep) {
+            (false, false) => Texels::Bytes(image.into_luma8().into_raw()),
+            (false, true) => Texels::Words(image.into_luma16().into_raw()),
+            (true, false) => Texels::Bytes(image.into_rgb8().into_raw()),
+            (true, true) => Texels::Words(image.into_rgb16().into_raw()),
         };
-        Ok(Self { size, channels, texels })
+        Self { size, channels: if color.has_color() { 3 } else { 1 }, texels }
     }
 
     /// Returns width and height in pixels, each at least 1.
@@ -122,11 +124,11 @@ impl Image {
         }
     }
 
-    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y`, counted from the
-    /// top. The numbers of the file are interpreted as sRGB levels.
+    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y` from the top. Levels
+    /// are sRGB.
     ///
     /// # Panics
-    /// Panics if the image has no such pixel.
+    /// Panics outside the image.
     pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
         let index = self.index(x, y);
         let channel = |c: usize| match &self.texels {
@@ -136,12 +138,11 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, that the image has as a height map at the pixel in column `x` and
-    /// row `y`, counted from the top. The numbers of the file are interpreted without sRGB
-    /// decoding. The height of a coloured pixel is the mean of its channels.
+    /// Returns the height, 0..=1, of a pixel of a height map. Levels are linear; the height of a
+    /// coloured pixel is their mean.
     ///
     /// # Panics
-    /// Panics if the image has no such pixel.
+    /// Panics outside the image.
     pub fn height(&self, x: u32, y: u32) -> f32 {
         let index = self.index(x, y);
         let level = |i: usize| match &self.texels {
@@ -157,9 +158,7 @@ impl Image {
     }
 }
 
-/// Checks the size of an image of `width` x `height` pixels in the file `source`. Neither side may
-/// exceed `max_side`. The number of pixels must be from 1 to `max_pixels`. It must also be at most
-/// [`PIXELS_PER_BYTE`] times the length of the file in bytes.
+/// Checks the declared size of an image against the limits and the length of the file.
 pub(super) fn check_size(
     source: &FileContents,
     [width, height]: [u32; 2],
@@ -170,8 +169,7 @@ pub(super) fn check_size(
     let size = format!("the image has {width} x {height} pixels");
     if width.max(height) > max_side || pixels > max_pixels || pixels == 0 {
         let least = if pixels == 0 { "at least one, " } else { "" };
-        let expected = format!("{least}at most {max_side} a side and {max_pixels} altogether");
-        return Err(source.fault(size, &expected));
+        return Err(source.fault(size, &format!("{least}{}", size_limits(max_side, max_pixels))));
     }
     if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
         let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
@@ -180,96 +178,65 @@ pub(super) fn check_size(
     Ok(())
 }
 
+fn size_limits(max_side: u32, max_pixels: u64) -> String {
+    format!("at most {max_side} a side and {max_pixels} altogether")
+}
+
 const EXPECTED: &str = "a PNG or JPEG image";
 
-/// Creates the error that the image file `source` has a known format, but is invalid.
 fn decode_error(source: &FileContents, format: &str, error: impl Display) -> AssetError {
     source.fault(format!("the {format} image cannot be read: {error}"), EXPECTED)
 }
 
-/// Decodes a PNG file and the orientation in its EXIF data. The alpha channel is dropped.
-fn decode_png(source: &FileContents) -> Result<(Image, Orientation), AssetError> {
-    let error = |e| decode_error(source, "PNG", e);
-    let limits = png::Limits { bytes: MAX_PIXELS as usize * 8 };
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(&source.bytes[..]), limits);
-    // Palettes become colours, transparent colours an alpha channel, and levels have 8 or 16 bits.
-    decoder.set_transformations(Transformations::EXPAND);
-    let size = decoder.read_header_info().map_err(error)?.size().into();
-    check_size(source, size, MAX_SIDE, MAX_PIXELS)?;
-    let mut reader = decoder.read_info().map_err(error)?;
-    let exif = reader.info().exif_metadata.as_deref();
-    let orientation = exif.map_or(Orientation::UPRIGHT, Orientation::of_exif);
-    let length = reader.output_buffer_size();
-    let length = length.ok_or_else(|| decode_error(source, "PNG", "it is too large"))?;
-    let (color, depth) = reader.output_color_type();
-    let texels = if depth == BitDepth::Sixteen {
-        let mut words = vec![0u16; length / 2];
-        reader.next_frame(bytemuck::cast_slice_mut(&mut words)).map_err(error)?;
-        words.iter_mut().for_each(|word| *word = u16::from_be(*word));
-        Texels::Words(without_alpha(words, color))
-    } else {
-        let mut bytes = vec![0; length];
-        reader.next_frame(&mut bytes).map_err(error)?;
-        Texels::Bytes(without_alpha(bytes, color))
-    };
-    let channels = match color {
-        ColorType::Grayscale | ColorType::GrayscaleAlpha => 1,
-        ColorType::Rgb | ColorType::Rgba | ColorType::Indexed => 3,
-    };
-    Ok((Image { size, channels, texels }, orientation))
-}
-
-/// Returns the levels of all channels except alpha. `levels` are those of all channels.
-fn without_alpha<T: Copy>(mut levels: Vec<T>, color: ColorType) -> Vec<T> {
-    match color {
-        ColorType::GrayscaleAlpha => remove_last::<2, _>(&mut levels),
-        ColorType::Rgba => remove_last::<4, _>(&mut levels),
-        ColorType::Grayscale | ColorType::Rgb | ColorType::Indexed => {}
-    }
-    levels
-}
-
-/// Removes every `N`th element of `elements`.
-fn remove_last<const N: usize, T: Copy>(elements: &mut Vec<T>) {
-    let count = elements.len() / N;
-    for i in 0..count {
-        for j in 0..N - 1 {
-            elements[i * (N - 1) + j] = elements[i * N + j];
+/// Decodes a PNG file.
+fn decode_png(source: &FileContents) -> Result<Image, AssetError> {
+    // `image` puts the words "Format error decoding Png" before the cause of an error.
+    let error = |error: ImageError| match (&error, error.source()) {
+        (ImageError::Limits(_), _) => {
+            source.fault("the PNG image is too large", &size_limits(MAX_SIDE, MAX_PIXELS))
         }
-    }
-    elements.truncate(count * (N - 1));
-    elements.shrink_to_fit();
+        (_, Some(cause)) => decode_error(source, "PNG", cause),
+        (_, None) => decode_error(source, "PNG", &error),
+    };
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_PIXELS * 8);
+    let mut decoder =
+        PngDecoder::with_limits(Cursor::new(&source.bytes[..]), limits).map_err(error)?;
+    check_size(source, decoder.dimensions().into(), MAX_SIDE, MAX_PIXELS)?;
+    let exif = decoder.exif_metadata().map_err(error)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(error)?;
+    Ok(Image::upright(image, exif.as_deref()))
 }
 
-/// Decodes a JPEG file and the orientation in its EXIF data. Colours become red, green and blue.
-fn decode_jpeg(source: &FileContents) -> Result<(Image, Orientation), AssetError> {
+/// Decodes a JPEG file. Colours become red, green and blue.
+fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
     let error = |e| decode_error(source, "JPEG", e);
     let options = DecoderOptions::default()
-        .set_strict_mode(false)
+        .set_strict_mode(true)
         .set_max_width(usize::MAX)
         .set_max_height(usize::MAX);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&source.bytes[..]), options);
     decoder.decode_headers().map_err(error)?;
     // Sides in a JPEG file have 16 bits. After the headers are read, they are known.
     let (width, height) = decoder.dimensions().unwrap_or_default();
-    let size = [width as u32, height as u32];
-    check_size(source, size, MAX_SIDE, MAX_PIXELS)?;
-    let orientation =
-        decoder.exif().map_or(Orientation::UPRIGHT, |exif| Orientation::of_exif(exif));
-    let (space, channels) = match decoder.input_colorspace() {
-        Some(ColorSpace::Luma) => (ColorSpace::Luma, 1),
-        _ => (ColorSpace::RGB, 3),
-    };
+    let [width, height] = [width as u32, height as u32];
+    check_size(source, [width, height], MAX_SIDE, MAX_PIXELS)?;
+    let is_grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
+    let space = if is_grey { ColorSpace::Luma } else { ColorSpace::RGB };
     decoder.set_options(options.jpeg_set_out_colorspace(space));
-    let mut texels = vec![0; width * height * channels];
-    decoder.decode_into(&mut texels).map_err(error)?;
-    Ok((Image { size, channels, texels: Texels::Bytes(texels) }, orientation))
+    let levels = decoder.decode().map_err(error)?;
+    let image = match is_grey {
+        true => GrayImage::from_raw(width, height, levels).map(DynamicImage::from),
+        false => RgbImage::from_raw(width, height, levels).map(DynamicImage::from),
+    };
+    let image = image.ok_or_else(|| decode_error(source, "JPEG", "pixels are missing"))?;
+    Ok(Image::upright(image, decoder.exif().map(Vec::as_slice)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use png::Info;
+    use png::{BitDepth, ColorType, Info};
     use proptest::prelude::*;
     use std::path::PathBuf;
 
@@ -348,17 +315,20 @@ mod tests {
         assert_eq!(values(&image.unwrap()), pixels.collect::<Vec<_>>().as_flattened());
     }
 
+    const JPEGS: [&[u8]; 4] = [
+        include_bytes!("../../../../tests/images/color.jpg"),
+        include_bytes!("../../../../tests/images/progressive.jpg"),
+        include_bytes!("../../../../tests/images/cmyk.jpg"),
+        include_bytes!("../../../../tests/images/grey.jpg"),
+    ];
+
     #[test]
     fn jpeg_is_decoded() {
         // The upper rows of these files are (200, 100, 50) on the left, (50, 100, 200) on the right.
-        let files: [(&[u8], [[f32; 3]; 2]); 4] = [
-            (include_bytes!("../../../../tests/images/color.jpg"), LEFT_AND_RIGHT),
-            (include_bytes!("../../../../tests/images/progressive.jpg"), LEFT_AND_RIGHT),
-            (include_bytes!("../../../../tests/images/cmyk.jpg"), LEFT_AND_RIGHT),
-            (include_bytes!("../../../../tests/images/grey.jpg"), [[124.0; 3], [97.0; 3]]),
-        ];
         const LEFT_AND_RIGHT: [[f32; 3]; 2] = [[200.0, 100.0, 50.0], [50.0, 100.0, 200.0]];
-        for (bytes, colors) in files {
+        let grey = [[124.0; 3], [97.0; 3]];
+        let colors = [LEFT_AND_RIGHT, LEFT_AND_RIGHT, LEFT_AND_RIGHT, grey];
+        for (bytes, colors) in JPEGS.into_iter().zip(colors) {
             let image = Image::parse(&file(bytes.into())).unwrap();
             assert_eq!(image.size(), [48, 40]);
             for (x, expected) in [(5, colors[0]), (40, colors[1])] {
@@ -370,13 +340,13 @@ mod tests {
     }
 
     #[test]
-    fn cameras_may_turn_images() {
+    fn images_become_upright() {
         // Orientation 6: the first row is the right column, from above.
         let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
         let rows: Vec<u8> = (0..24).collect();
-        let mut turned = info([3, 2], ColorType::Rgba, BitDepth::Eight);
-        turned.exif_metadata = Some(exif.into());
-        let image = parsed(turned, &rows);
+        let mut rotated = info([3, 2], ColorType::Rgba, BitDepth::Eight);
+        rotated.exif_metadata = Some(exif.into());
+        let image = parsed(rotated, &rows);
         assert_eq!(image.size(), [2, 3]);
         let firsts: Vec<u16> = values(&image).chunks(3).map(|pixel| pixel[0]).collect();
         assert_eq!(firsts, [12, 0, 16, 4, 20, 8]);
@@ -384,11 +354,21 @@ mod tests {
         let length = (8 + exif.len()) as u16;
         let segment = [b"\xff\xe1", &length.to_be_bytes()[..], b"Exif\0\0", exif].concat();
         let with_exif = file([&jpeg[..2], &segment, &jpeg[2..]].concat());
-        let (upright, turned) =
+        let (upright, rotated) =
             (Image::parse(&file(jpeg.into())).unwrap(), Image::parse(&with_exif).unwrap());
-        assert_eq!(turned.size(), [40, 48]);
-        assert_eq!(turned.color(39, 47), upright.color(47, 0));
-        assert_eq!(turned.color(0, 7), upright.color(7, 39));
+        assert_eq!(rotated.size(), [40, 48]);
+        assert_eq!(rotated.color(39, 47), upright.color(47, 0));
+        assert_eq!(rotated.color(0, 7), upright.color(7, 39));
+    }
+
+    #[test]
+    fn truncated_jpeg_is_rejected() {
+        for bytes in JPEGS {
+            for kept in [bytes.len() / 4, bytes.len() / 2, bytes.len() - 40] {
+                let error = Image::parse(&file(bytes[..kept].into())).unwrap_err();
+                assert!(error.found.contains("the JPEG image cannot be read"), "{error}");
+            }
+        }
     }
 
     proptest! {
@@ -433,11 +413,9 @@ mod tests {
 
     #[test]
     fn oversized_image_is_rejected_before_decoding() {
-        for (side, words) in [
-            (60_000, "60000 x 60000"),
-            (8_000, "more than its"),
-            (u32::MAX >> 1, "2147483647 x 2147483647"),
-        ] {
+        for (side, words) in
+            [(60_000, "60000 x 60000"), (8_000, "more than its"), (u32::MAX >> 1, "too large")]
+        {
             let error = Image::parse(&png_declaring(side)).unwrap_err();
             assert!(error.found.contains(words), "{side}: {error}");
         }

@@ -5,8 +5,7 @@ use crate::value::ValidationError;
 use std::fmt;
 use std::sync::Arc;
 
-/// Content of an asset file or the error of reading it, with the name under which the file was
-/// read. `None` before the first attempt to read it.
+/// Name and content of an asset file, or the error of reading it. `None` before it is read.
 pub struct Loaded<T>(Option<(String, Result<Arc<T>, AssetError>)>);
 
 impl<T> Clone for Loaded<T> {
@@ -21,8 +20,7 @@ impl<T> Default for Loaded<T> {
     }
 }
 
-/// Two values are equal if neither is loaded, or if both have equal contents or equal errors.
-/// Contents in the same allocation are equal without a comparison of their data.
+/// Comparison of contents or errors. Contents in the same allocation are equal.
 impl<T: PartialEq> PartialEq for Loaded<T> {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -34,7 +32,7 @@ impl<T: PartialEq> PartialEq for Loaded<T> {
     }
 }
 
-/// Formats the state of loading: `not loaded`, `loaded`, or the error. The content is omitted.
+/// State of loading, without the content.
 impl<T> fmt::Debug for Loaded<T> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.0 {
@@ -46,23 +44,19 @@ impl<T> fmt::Debug for Loaded<T> {
 }
 
 impl<T> Loaded<T> {
-    /// Returns the content of the file. Returns `None` if the file has not been read yet, or if
-    /// reading it failed.
+    /// Returns the content, if the file was read without error.
     pub fn content(&self) -> Option<&Arc<T>> {
         self.0.as_ref()?.1.as_ref().ok()
     }
 
-    /// Calls `load` with the file's `name` and stores the result, unless that of this name is
-    /// stored already. An empty name means no file.
+    /// Loads the file `name`, unless it is loaded already. An empty name means no file.
     pub fn resolve(&mut self, name: &str, load: impl FnOnce(&str) -> Result<Arc<T>, AssetError>) {
         if self.0.as_ref().map_or("", |(known, _)| known) != name {
             self.0 = (!name.is_empty()).then(|| (name.to_string(), load(name)));
         }
     }
 
-    /// Returns the error of reading the file as a validation error of the key `file`, which names
-    /// the file in the scene description. Returns `None` if the file was read without error, or has
-    /// not been read yet.
+    /// Returns the error of reading the file as one of the key `file`.
     pub fn fault(&self) -> Option<ValidationError> {
         let error = self.0.as_ref()?.1.as_ref().err()?;
         Some(ValidationError::new("file", error.what(), error.expected.clone()))

@@ -10,13 +10,11 @@
 
 mod cache;
 mod error;
-mod exif;
 mod file;
 mod hdr;
 mod image;
 mod loaded;
 mod mesh;
-mod radiance_distribution;
 mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};

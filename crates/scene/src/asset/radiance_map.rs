@@ -8,7 +8,6 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::hdr::HdrFile;
 use crate::asset::image::{Image, ImageFormat, check_size};
-use crate::asset::radiance_distribution::RadianceDistribution;
 use crate::value::Fnv1a64;
 use exr::image::RgbChannels;
 use exr::math::Vec2;
@@ -17,48 +16,51 @@ use exr::meta::header::Header;
 use exr::prelude::traits::*;
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
+use zerkalo_kernel::sampling::{PiecewiseConstant2D, PixelSample};
 
 /// Largest number of pixels in a row or column of an environment image.
 const MAX_MAP_SIDE: u32 = 16_384;
 
-/// Largest number of pixels of an environment image: 32 Mi, such as 8192 x 4096. The pixels of such
-/// an image take 403 MB.
+/// Largest number of pixels of an environment image: 32 Mi, which take 403 MB.
 const MAX_MAP_PIXELS: u64 = 1 << 25;
 
-/// Largest valid radiance of a pixel in an environment image. For comparison: the radiance of the
-/// sun is about 2e7 W/(sr m^2).
+/// Largest valid radiance of a pixel. That of the sun is about 2e7 W/(sr m^2).
 const MAX_RADIANCE: f32 = 1e15;
 
-/// Decoded image of radiance from all directions, for environment lights. Its values are linear,
-/// finite and at least 0.
+/// Radiance from all directions, for environment lights: linear, finite, at least 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadianceMap {
     size: [u32; 2],
     /// Radiance (red, green, blue) of the image's pixels, row by row from the top.
     pixels: Vec<[f32; 3]>,
-    distribution: RadianceDistribution,
+    distribution: PiecewiseConstant2D,
     mean: [f64; 3],
 }
 
+/// Direction sampled by [`RadianceMap::sample`].
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionSample {
+    /// Unit vector of the direction.
+    pub direction: [f64; 3],
+    /// Density with which it is sampled \[1/sr\].
+    pub density: f64,
+}
+
 impl RadianceMap {
-    /// Creates the image with the given pixels, row by row from the top.
+    /// Creates the image of `pixels`, row by row from the top.
     ///
     /// # Panics
     /// Panics if the number of pixels is not the product of the sides, or is 0.
     pub fn new(size: [u32; 2], pixels: Vec<[f32; 3]>) -> Self {
         assert_eq!(pixels.len(), size[0] as usize * size[1] as usize);
         assert!(!pixels.is_empty());
-        let distribution = RadianceDistribution::new(size.map(|n| n as usize), &pixels);
+        let distribution = PiecewiseConstant2D::new(size.map(|n| n as usize), &pixels);
         let mean = distribution.mean(&pixels);
         Self { size, pixels, distribution, mean }
     }
 
-    /// Decodes an environment image file in memory. The format is determined by the first bytes of
-    /// the file. Values of a Radiance HDR file are divided by the product of its `EXPOSURE` lines;
-    /// values of PNG and JPEG files are sRGB levels. Negative values are replaced by 0.
-    ///
-    /// # Errors
-    /// Fails if the file is not a valid image.
+    /// Decodes an environment image file. Values of PNG and JPEG files are sRGB levels. Negative
+    /// values are replaced by 0.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         match ImageFormat::of(&source.bytes) {
             Some(ImageFormat::Hdr) => {
@@ -82,11 +84,7 @@ impl RadianceMap {
         }
     }
 
-    /// Creates the image with the pixels of the file `source`, row by row from the top. Negative
-    /// values are replaced by 0.
-    ///
-    /// # Errors
-    /// Fails if a value is infinite, too large or not a number.
+    /// Creates the image of the pixels of the file `source`.
     fn of_pixels(
         source: &FileContents,
         size: [u32; 2],
@@ -104,7 +102,7 @@ impl RadianceMap {
         Ok(Self::new(size, pixels))
     }
 
-    /// Adds the size and the pixels of the image to `hash`.
+    /// Adds size and pixels to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
         self.pixels.iter().flatten().for_each(|x| hash.update(&x.to_le_bytes()));
@@ -120,29 +118,26 @@ impl RadianceMap {
         self.mean
     }
 
-    /// Returns the largest value of a channel (R, G or B) over all pixels of the image.
+    /// Returns the largest value of a channel.
     pub fn max(&self) -> f64 {
         self.pixels.iter().flatten().copied().fold(0.0, f32::max).into()
     }
 
-    /// Returns the smallest positive value of a channel (R, G or B) over all pixels of the image.
-    /// Returns `None` if the image is black.
+    /// Returns the smallest positive value of a channel; `None` if the image is black.
     pub fn min(&self) -> Option<f64> {
         let channels = self.pixels.iter().flatten().copied().filter(|x| *x > 0.0);
         channels.reduce(f32::min).map(f64::from)
     }
 
-    /// Returns the radiance in the direction of the unit vector `direction`, interpolated between
-    /// the centres of the pixels.
+    /// Returns the radiance from the unit vector `direction`, interpolated between pixel centres.
     pub fn radiance(&self, direction: [f64; 3]) -> [f64; 3] {
         let [columns, rows] = self.size.map(|n| n as usize);
         let [x, y] = position(direction);
         let (x, y) = (x * columns as f64 - 0.5, y * rows as f64 - 0.5);
         let (column, row) = (x.floor(), y.floor());
         let (s, t) = (x - column, y - row);
-        // The left and the right edge of the image are adjacent. There is no row above the top row
-        // or below the bottom row. Beyond the pixel centres of these two rows, their values are
-        // used without interpolation between rows.
+        // The left and the right edge are adjacent. Beyond the centres of the first and last row
+        // there is no interpolation between rows.
         let left = if column < 0.0 { columns - 1 } else { (column as usize).min(columns - 1) };
         let right = if left + 1 < columns { left + 1 } else { 0 };
         let (above, below) = (row.max(0.0) as usize, (row + 1.0) as usize);
@@ -159,24 +154,22 @@ impl RadianceMap {
     }
 
     /// Samples a direction with a density that follows the luminance of the image. `u` and `v` are
-    /// uniform in [0, 1). Returns two values: the unit vector of the direction, and the density
-    /// \[1/sr\] with which it is sampled.
-    pub fn sample(&self, u: f64, v: f64) -> ([f64; 3], f64) {
-        let (x, cos, density) = self.distribution.sample(u, v);
+    /// uniform in [0, 1).
+    pub fn sample(&self, u: f64, v: f64) -> DirectionSample {
+        let PixelSample { x, cos, density } = self.distribution.sample(u, v);
         let (sin_phi, cos_phi) = (TAU * x).sin_cos();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        ([-sin * sin_phi, cos, sin * cos_phi], density)
+        DirectionSample { direction: [-sin * sin_phi, cos, sin * cos_phi], density }
     }
 
-    /// Returns the density \[1/sr\] with which [`RadianceMap::sample`] draws the unit vector
-    /// `direction`.
+    /// Returns the density \[1/sr\] of [`RadianceMap::sample`].
     pub fn density(&self, direction: [f64; 3]) -> f64 {
         self.distribution.density(position(direction))
     }
 }
 
-/// Returns the position of a direction in the image: 0 to 1 from left to right, and 0 to 1 from top
-/// to bottom.
+/// Returns the position of a direction in the image, 0 to 1 from left to right and from top to
+/// bottom.
 fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
     let turns = (-x).atan2(z) / TAU;
     let column = if turns < 0.0 { turns + 1.0 } else { turns };
@@ -185,8 +178,8 @@ fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 const EXPECTED: &str = "a Radiance HDR, OpenEXR, PNG or JPEG image";
 
-/// Decodes the first layer of an OpenEXR file that has the channels `R G B` and is not deep. Returns
-/// the size of the display window, and its pixels. Pixels outside of the layer are black.
+/// Decodes the display window of the first layer of an OpenEXR file that has the channels `R G B`
+/// and is not deep. Pixels outside the layer are black.
 fn decode_exr(source: &FileContents) -> Result<([u32; 2], Vec<[f32; 3]>), AssetError> {
     let reader = exr::block::read(Cursor::new(&source.bytes[..]), false)
         .map_err(|error| source.fault(format!("the header cannot be read: {error}"), EXPECTED))?;
@@ -372,7 +365,7 @@ FORMAT=32-bit_rle_rgbe
         for i in 0..2000u32 {
             let u = (f64::from(i) + 0.5) / 2000.0;
             let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
-            let (direction, density) = map.sample(u, v);
+            let DirectionSample { direction, density } = map.sample(u, v);
             let length: f64 = direction.iter().map(|x| x * x).sum();
             assert!((length - 1.0).abs() < 1e-12);
             let expected = map.density(direction);
@@ -409,5 +402,25 @@ FORMAT=32-bit_rle_rgbe
         let found_in_wide = found(wide);
         assert!(found_in_wide.contains("1048576 x 5"), "{found_in_wide}");
         assert!(found(b"no image".to_vec()).contains("known format"));
+    }
+
+    /// Checks that the weight of a sample, also beside a bright pixel, is at most 17 times the mean
+    /// weight. A weight is the interpolated radiance divided by the sampling density; the mean
+    /// weight is 4 pi times the mean radiance. The factor follows from the distribution's floor.
+    #[test]
+    fn weights_are_bounded_beside_a_bright_pixel() {
+        const SIZE: [usize; 2] = [24, 12];
+        let dark = [0.01f32; 3];
+        let mut pixels_of_image = vec![dark; SIZE[0] * SIZE[1]];
+        pixels_of_image[5 * SIZE[0] + 9] = [1e6; 3];
+        let map = RadianceMap::new(SIZE.map(|n| n as u32), pixels_of_image);
+        let [mean, ..] = map.mean();
+        for i in 0..200_000u32 {
+            let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
+            let DirectionSample { direction, density } =
+                map.sample((f64::from(i) + 0.5) / 200_000.0, v);
+            let weight = map.radiance(direction)[0] / density;
+            assert!(weight <= 17.0 * 4.0 * PI * mean, "{weight}, {mean}");
+        }
     }
 }

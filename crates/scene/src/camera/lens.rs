@@ -30,8 +30,7 @@ one_of! {
 /// Largest valid lens radius, in scene units.
 const MAX_RADIUS: f64 = 1e9;
 
-/// Smallest distance of the plane in focus from the eye, as a fraction of the lens radius. A plane
-/// nearer to the eye is moved to this distance.
+/// Smallest distance of the plane in focus from the eye, as a fraction of the lens radius.
 const MIN_FOCUS_PER_RADIUS: f64 = 1e-6;
 
 /// Half the height of the picture on film of 36 x 24 mm \[m\].
@@ -40,11 +39,8 @@ const HALF_FILM_HEIGHT: f64 = 0.012;
 const HALF_FILM_WIDTH: f64 = 0.018;
 
 impl Camera {
-    /// Returns the radius of the lens in scene units, 0 to 1e9; 0 is a pinhole.
-    ///
-    /// The f-number N determines the radius f / (2 N) of a lens with the focal length
-    /// f = h / tan(angle / 2). Here h is 12 mm for a vertical view angle (half the height of the
-    /// film) and 18 mm for a horizontal one (half its width).
+    /// Returns the radius of the lens in scene units, 0 to 1e9; 0 is a pinhole. A lens of the focal
+    /// length f and the f-number N has the radius f / (2 N).
     pub fn lens_radius(&self) -> f64 {
         match self.aperture {
             None => 0.0,
@@ -55,7 +51,8 @@ impl Camera {
         }
     }
 
-    /// Returns the focal length of the lens in metres, for film of 36 x 24 mm.
+    /// Returns the focal length h / tan(angle / 2) in metres, where h is half the height or width
+    /// of the film.
     pub fn focal_length(&self) -> f64 {
         let half = match self.view_angle {
             ViewAngle::Vertical(_) => HALF_FILM_HEIGHT,
@@ -65,10 +62,9 @@ impl Camera {
     }
 
     /// Returns the distance of the plane in focus from the eye along the view direction, greater
-    /// than 0. If `focus` is `None`, the target is the point in focus. If the point in focus is
-    /// behind the eye, the plane is at the same distance in front of the eye. The result is at
-    /// least a millionth of the lens radius. If there is a point in focus, the result is also at
-    /// least a millionth of its distance from the eye.
+    /// than 0. Without `focus` it is that of the target. A point behind the eye counts as in front
+    /// of it. The result is at least a millionth of the lens radius and of the distance of the
+    /// point.
     pub fn focus_depth(&self) -> f64 {
         let point = match (self.focus, self.target) {
             (Some(Focus::Distance(distance)), _) => Err(distance),
@@ -87,8 +83,8 @@ impl Camera {
         depth.max(MIN_FOCUS_PER_RADIUS * self.lens_radius()).max(f64::MIN_POSITIVE)
     }
 
-    /// Returns a validation error if the point in focus is the eye itself, or if the aperture is
-    /// open and neither `focus` nor `target` is given. Otherwise returns `None`.
+    /// Returns a validation error if the point in focus is the eye, or if an open lens has no plane
+    /// in focus.
     pub(super) fn focus_error(&self) -> Option<ValidationError> {
         if self.focus == Some(Focus::Point(self.eye)) {
             return Some(ValidationError::new(

@@ -45,8 +45,7 @@ one_of! {
     }
 }
 
-/// Creates the camera of a scene file without a `[camera]` table. This camera looks at the origin.
-/// A `[camera]` table must have `target` or `direction`.
+/// Camera without a `[camera]` table: directed at the origin.
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -66,8 +65,7 @@ impl Default for Camera {
 pub const FIELDS: &[Field] = Camera::FIELDS;
 
 impl ViewAngle {
-    /// Returns the key of the opening angle in scene files, `vertical` or `horizontal`, and the
-    /// angle in degrees.
+    /// Returns the key in scene files, and the angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -77,9 +75,7 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Returns the unit vector of the camera's view direction. Returns `None` if `target` is the
-    /// eye itself, if `direction` is zero, or if not exactly one of `target` and `direction` is
-    /// given.
+    /// Returns the unit vector of the view direction; `None` if the camera does not define one.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
@@ -89,7 +85,7 @@ impl Camera {
         unit(look)
     }
 
-    /// Returns the validation errors of the camera.
+    /// Returns the validation errors.
     pub fn faults(&self) -> Vec<ValidationError> {
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(ValidationError::new(
@@ -111,9 +107,8 @@ impl Camera {
         checks.and(self.orientation_error()).and(self.focus_error()).errors()
     }
 
-    /// Returns a validation error if the camera does not define the axes of the picture: the target
-    /// is the eye, or `up` is parallel to the view direction. Returns `None` otherwise. All numbers
-    /// of the camera must be in range.
+    /// Returns a validation error if the target is the eye, or if `up` is parallel to the view
+    /// direction. All numbers must be in range.
     fn orientation_error(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
             return Some(ValidationError::new(
@@ -123,8 +118,8 @@ impl Camera {
             ));
         };
         let up = unit(self.up)?;
-        // If the sine of the angle between the vectors is 1e-6 or less, rounding errors would
-        // determine the picture's axes.
+        // If the sine of the angle is 1e-6 or less, rounding errors would determine the picture's
+        // axes.
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",

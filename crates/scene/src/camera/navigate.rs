@@ -1,26 +1,22 @@
-//! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, and framing of a sphere.
+//! Interactive camera movements.
 //!
-//! Every movement function returns a new camera. The new camera has a `target` if the old camera
-//! has one, otherwise a `direction`. The pivot of a movement is the target. A camera without a
-//! target has its pivot straight ahead, at a distance that the caller gives. Coordinates are
-//! rounded to about a millionth of the distance between eye and pivot. The function returns the old
-//! camera if the moved camera would be invalid, such as with coordinates out of range or with the
-//! eye at the target. Rotations are relative to `up`; the view direction stays at least 0.1 degrees
-//! away from `up`.
+//! Each movement returns a new camera, or the old one if the new one would be invalid. The pivot is
+//! the target; a camera without a target has its pivot `distance` ahead. Coordinates are rounded to
+//! about a millionth of the distance between eye and pivot. Rotations are relative to `up`; the
+//! view direction stays at least 0.1 degrees away from it.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{round_fine, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// Steepest view up or down that interactive movements allow, in degrees above or below the plane
-/// perpendicular to `up`.
+/// Steepest view up or down, in degrees from the plane perpendicular to `up`.
 const MAX_PITCH: f64 = 89.9;
-/// Smallest and largest opening angle to which interactive zoom goes, in degrees.
+/// Smallest and largest opening angle of interactive zoom, in degrees.
 const ZOOM_ANGLES: [f64; 2] = [0.1, 170.0];
 
 impl Camera {
-    /// Returns the camera's axes as orthonormal vectors to the right, up in the picture, and
-    /// forward. They are also defined for an invalid camera.
+    /// Returns the axes: unit vectors to the right, up in the picture, and forward. They are also
+    /// defined for an invalid camera.
     pub fn frame(&self) -> [DVec3; 3] {
         let forward = self.view().unwrap_or(DVec3::NEG_Z);
         let up = unit(self.up).unwrap_or(DVec3::Y);
@@ -30,7 +26,7 @@ impl Camera {
     }
 
     /// Returns half the width and half the height of the picture, on the picture plane at unit
-    /// distance from the eye. `aspect` is the picture's width divided by its height.
+    /// distance. `aspect` is width divided by height.
     pub fn half_size(&self, aspect: f64) -> [f64; 2] {
         let (_, degrees) = self.view_angle.key_degrees();
         let half = (0.5 * degrees).to_radians().tan();
@@ -40,9 +36,7 @@ impl Camera {
         }
     }
 
-    /// Orbits the camera around its pivot (the target) at constant distance, `right` degrees to the
-    /// right and `up` degrees upwards. The pivot of a camera without a target is the point
-    /// `distance` ahead.
+    /// Orbits around the pivot, `right` degrees to the right and `up` degrees upwards.
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         // If the eye moves to the right around the pivot, the view direction rotates to the left.
@@ -52,18 +46,14 @@ impl Camera {
         self.placed(pivot - forward * distance, forward, distance)
     }
 
-    /// Moves the camera across the view direction by `right` and `up`, as fractions of the distance
-    /// to its pivot (the target). The pivot of a camera without a target is the point `distance`
-    /// ahead.
+    /// Moves across the view direction by fractions of the distance to the pivot.
     pub fn pan(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         let [x, y, _] = self.frame();
         self.shifted((x * right + y * up) * distance, distance)
     }
 
-    /// Multiplies the camera's distance to its pivot (the target) by `factor`. A factor less than 1
-    /// moves the camera nearer, but never past the pivot. The pivot of a camera without a target is
-    /// the point `distance` ahead.
+    /// Multiplies the distance to the pivot by `factor`.
     pub fn dolly(&self, factor: f64, distance: f64) -> Self {
         let old = self.pivot_distance(distance);
         if !(factor > 0.0 && factor.is_finite()) {
@@ -73,8 +63,7 @@ impl Camera {
         let eye = DVec3::from_array(self.eye);
         let pivot = self.target.map_or(eye + forward * old, DVec3::from_array);
         let new = old * factor;
-        // The dolly stops at this distance from the pivot, because coordinates of type `f64` would
-        // have too little precision below it.
+        // Nearer to the pivot, coordinates would have too little precision.
         if new < 1e-6 * pivot.abs().max_element().max(1e-6) {
             return self.clone();
         }
@@ -88,8 +77,8 @@ impl Camera {
         self.shifted(translation, self.pivot_distance(translation.length().max(1e-3)))
     }
 
-    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. If
-    /// the camera has a target, the target moves on a circle around the eye.
+    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. A
+    /// target moves on a circle around the eye.
     pub fn look(&self, right: f64, up: f64) -> Self {
         let distance = self.pivot_distance(1.0);
         match self.rotated(right, up) {
@@ -112,8 +101,8 @@ impl Camera {
         self.valid_or_self(Self { up, ..self.clone() })
     }
 
-    /// Changes the opening angle so that the width of the picture plane at unit distance is
-    /// multiplied by `factor`. A factor less than 1 narrows the view.
+    /// Multiplies the width of the picture plane at unit distance by `factor`; below 1 narrows the
+    /// view.
     pub fn zoom(&self, factor: f64) -> Self {
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();
@@ -122,8 +111,8 @@ impl Camera {
             let half = (0.5 * degrees).to_radians().tan() * factor;
             let [narrow, wide] = ZOOM_ANGLES;
             let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
-            // An angle that is already outside of the limits keeps its value, because clamping
-            // would change it in the direction opposite to the zoom.
+            // Clamping an angle outside of the limits would change it in the direction opposite to
+            // the zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
         let view_angle = match self.view_angle {
@@ -133,11 +122,9 @@ impl Camera {
         self.valid_or_self(Self { view_angle, ..self.clone() })
     }
 
-    /// Moves the eye so that the sphere of `radius` around `center` fills the picture. The distance
-    /// from the eye to `center` is 10 % greater than the distance at which the sphere would touch
-    /// the picture's edges. The view direction does not change. `center` and `radius` are in scene
-    /// units. `aspect` is the picture's width divided by its height. A camera with a target gets
-    /// `center` as its target.
+    /// Moves the eye along the view direction so that the sphere of `radius` around `center` fills
+    /// the picture, with a margin of 10 %. `aspect` is the picture's width divided by its height. A
+    /// target becomes `center`.
     pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
         let forward = self.frame()[2];
         let half = self.half_size(aspect).into_iter().fold(f64::INFINITY, f64::min).atan();
@@ -153,23 +140,21 @@ impl Camera {
         self.valid_or_self(aimed.moved_to(center - forward * distance, forward, distance, false))
     }
 
-    /// Returns the distance from the eye to the target, or `distance` if the camera has no target.
-    /// If this distance is not positive and finite, returns 1.
+    /// Returns the distance from the eye to the pivot; 1 if it is not positive and finite.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);
         if distance > 0.0 && distance.is_finite() { distance } else { 1.0 }
     }
 
-    /// Returns the view direction rotated by `right` degrees to the right and `up` degrees upwards.
-    /// Returns `None` if an angle is not finite.
+    /// Returns the rotated view direction; `None` if an angle is not finite.
     fn rotated(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;
         }
         let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
-        // Unit vector of the view direction without its component along `up`.
+        // View direction without its component along `up`.
         let ahead = axis.cross(side);
         let pitch = forward.dot(axis).clamp(-1.0, 1.0).asin().to_degrees();
         let pitch = (pitch + up).clamp(-MAX_PITCH, MAX_PITCH).to_radians();
@@ -178,18 +163,14 @@ impl Camera {
         Some((level * pitch.cos() + axis * pitch.sin()).normalize())
     }
 
-    /// Returns the camera moved to `eye`, with the view direction `forward`. If the eye moves, the
-    /// target is kept; otherwise the target moves to the point `distance` ahead of the eye. The
-    /// moved point is rounded to about a millionth of `distance`. Returns this camera if the result
-    /// would be invalid.
+    /// Returns the camera at `eye` with the view direction `forward`. If the eye stays, the target
+    /// moves to the point `distance` ahead.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
         let eye_stays = DVec3::from_array(self.eye) == eye;
         self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    /// Returns the camera moved as by [`Camera::placed`], without a check that it is valid. If
-    /// `eye_stays` is `true`, the eye is kept and the target moves to the point `distance` ahead;
-    /// otherwise the eye moves to `eye` and the target is kept.
+    /// Returns [`Camera::placed`] without a check that it is valid.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| round_fine(x, distance)).to_array();
@@ -206,8 +187,7 @@ impl Camera {
         next
     }
 
-    /// Returns the camera with eye and target moved by `translation`. Moved coordinates are rounded
-    /// to about a millionth of `distance`. Returns this camera if the result would be invalid.
+    /// Returns the camera with eye and target moved by `translation`.
     fn shifted(&self, translation: DVec3, distance: f64) -> Self {
         let moved = |point: [f64; 3]| {
             std::array::from_fn(|i| match translation[i] {
@@ -219,7 +199,7 @@ impl Camera {
         self.valid_or_self(Self { eye: moved(self.eye), target, ..self.clone() })
     }
 
-    /// Returns `next` if it is a valid camera, otherwise `self`.
+    /// Returns `next` if it is valid, otherwise `self`.
     fn valid_or_self(&self, next: Self) -> Self {
         if next.faults().is_empty() { next } else { self.clone() }
     }

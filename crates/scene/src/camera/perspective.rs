@@ -2,48 +2,39 @@
 
 use crate::camera::{Camera, ViewAngle};
 use glam::DVec3;
+use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
-/// Perspective camera compiled for a film size. The direction to the upper left corner of a pixel
-/// is computed in double precision and then rounded to the precision of the rays. Offsets inside of
-/// pixels are computed in the precision of the rays.
+/// Perspective camera compiled for a film size. The direction to the corner of a pixel is computed
+/// in double precision, offsets inside the pixel in the precision of the rays.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     eye: DVec3,
-    /// Unit vector to the right in the picture, perpendicular to `v` and `w`.
+    /// Unit vectors to the right, up and forward.
     u: DVec3,
-    /// Unit vector up in the picture, perpendicular to `u` and `w`.
     v: DVec3,
-    /// Unit vector forward, the view direction.
     w: DVec3,
-    /// Vector from a pixel to the next one to the right, on the picture plane at unit distance.
+    /// Vectors to the next pixel to the right and below, on the picture plane at unit distance.
     dx_axis: DVec3,
-    /// Vector from a pixel to the next one below, on the picture plane at unit distance.
     dy_axis: DVec3,
-    /// Vector from the eye to the picture's upper left corner, on the picture plane at unit
-    /// distance.
+    /// Vector from the eye to the picture's upper left corner, on that plane.
     raster_corner: DVec3,
     near: f64,
     /// Thin lens of the camera; `None` for a pinhole.
     lens: Option<ThinLens>,
 }
 
-/// Thin lens: a disk of uniform transmission around the eye, perpendicular to the view direction.
-/// It refracts rays so that those from one point of the plane in focus meet in one point of the
-/// picture.
+/// Thin lens: a disk around the eye, perpendicular to the view direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinLens {
     /// Radius of the lens in scene units, greater than 0.
     pub radius: f64,
-    /// Distance of the plane in focus from the eye along the view direction, in scene units,
-    /// greater than 0.
+    /// Distance of the plane in focus along the view direction, in scene units, greater than 0.
     pub focus: f64,
 }
 
 impl ThinLens {
-    /// Returns the radius of the circle of confusion on a plane at `depth` from the eye,
-    /// perpendicular to the view direction. It is the distance, on this plane, between two rays of
-    /// the same picture point: one through the edge of the lens, one through its centre.
+    /// Returns the radius of the circle of confusion on a plane at `depth` from the eye.
     pub fn blur(&self, depth: f64) -> f64 {
         self.radius * (1.0 - depth / self.focus).abs()
     }
@@ -56,15 +47,10 @@ impl PerspectiveCamera {
         let [u, v, w] = camera.frame();
         let (width, height) = (f64::from(width), f64::from(height));
         // Half the width and half the height of the picture plane at unit distance from the eye.
+        let half = (0.5 * camera.view_angle.key_degrees().1).to_radians().tan();
         let (half_width, half_height) = match camera.view_angle {
-            ViewAngle::Vertical(degrees) => {
-                let half = (0.5 * degrees).to_radians().tan();
-                (half * width / height, half)
-            }
-            ViewAngle::Horizontal(degrees) => {
-                let half = (0.5 * degrees).to_radians().tan();
-                (half, half * height / width)
-            }
+            ViewAngle::Vertical(_) => (half * width / height, half),
+            ViewAngle::Horizontal(_) => (half, half * height / width),
         };
         Self {
             eye: DVec3::from(camera.eye) - origin,
@@ -97,30 +83,26 @@ impl PerspectiveCamera {
         self.eye
     }
 
-    /// Returns the camera's axes as orthonormal vectors to the right, up in the picture, and
-    /// forward.
+    /// Returns the unit vectors to the right, up in the picture, and forward.
     pub fn frame(&self) -> [DVec3; 3] {
         [self.u, self.v, self.w]
     }
 
-    /// Returns the approximate smallest angle \[radians\] between rays through the centres of
-    /// neighbouring pixels. This angle occurs at the picture's corners.
+    /// Returns about the smallest angle \[radians\] between rays of neighbouring pixels, which
+    /// occurs at the picture's corners.
     pub fn pixel_angle(&self) -> f64 {
-        // Let a pixel of size p on the picture plane be at the distance d from the eye. A step of p
-        // perpendicular to the ray rotates the ray by about p / d. A step of p on the plane, which
-        // may be oblique to the ray, rotates it by at least p / d^2.
+        // Let a pixel of size p be at the distance d. A step of p perpendicular to the ray rotates
+        // it by about p / d; a step on the oblique plane rotates it by at least p / d^2.
         self.pixel() / self.raster_corner.length_squared()
     }
 
-    /// Returns the length of the shorter side of a pixel on the picture plane at unit distance from
-    /// the eye.
+    /// Returns the shorter side of a pixel on the picture plane at unit distance.
     pub fn pixel(&self) -> f64 {
         self.dx_axis.length().min(self.dy_axis.length())
     }
 
     /// Returns the vectors from the eye to the corners of a rectangle of pixels, on the picture
-    /// plane at unit distance. Pixel `[x, y]` is the upper left one of the rectangle. The corners
-    /// are in clockwise order, from the upper left one.
+    /// plane at unit distance: clockwise from the upper left one, the corner of pixel `[x, y]`.
     pub fn corners(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> [DVec3; 4] {
         let (x0, y0) = (x as f64, y as f64);
         let (x1, y1) = (x0 + width as f64, y0 + height as f64);
@@ -128,48 +110,41 @@ impl PerspectiveCamera {
             .map(|(x, y)| self.raster_corner + self.dx_axis * x + self.dy_axis * y)
     }
 
-    /// Projects a point in front of the eye to a position in the picture: column and row in pixels,
-    /// with fractions.
+    /// Projects a point in front of the eye to column and row, with fractions.
     pub fn project(&self, point: DVec3) -> [f64; 2] {
         let from_eye = point - self.eye;
         let on_plane = from_eye / from_eye.dot(self.w) - self.raster_corner;
         [self.dx_axis, self.dy_axis].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
     }
 
-    /// Returns the vector from the eye to the upper left corner of pixel (`x`, `y`), on the picture
-    /// plane at unit distance.
+    /// Returns the vector from the eye to the upper left corner of pixel (`x`, `y`).
     #[inline(always)]
     pub fn pixel_corner_direction<S: Float>(&self, (x, y): (u32, u32)) -> [S; 3] {
         let corner = self.raster_corner + self.dx_axis * f64::from(x) + self.dy_axis * f64::from(y);
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns two values for each lane: the origin and the unit direction of the ray through the
-    /// eye and a point of a pixel. The origins are on the near plane. `base` is the result of
-    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset of the point from
-    /// the upper left corner of the pixel, to the right and downward \[pixels\].
+    /// Returns the rays through points of a pixel, from the near plane. `base` is the pixel's
+    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from it, to the
+    /// right and downward \[pixels\].
     #[inline(always)]
-    pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
+    pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> Ray<L> {
         let dx_axis = Vec3::of(self.dx_axis.to_array());
         let dy_axis = Vec3::of(self.dy_axis.to_array());
         let direction = dx_axis.mul_add(dx, dy_axis.mul_add(dy, base));
         let eye = Vec3::of(self.eye.to_array());
-        // The component of `direction` along the view direction `w` is 1. The vector `near *
-        // direction` therefore ends on the near plane.
+        // The component of `direction` along `w` is 1.
         let origin =
             if self.near > 0.0 { direction.mul_add(L::from_f64(self.near), eye) } else { eye };
-        (origin, direction.normalize())
+        Ray { origin, direction: direction.normalize() }
     }
 
-    /// Returns two values for each lane: the origin and the unit direction of the ray through a
-    /// point of the lens. `base` and the offset are those of [`PerspectiveCamera::rays`]. `(x, y)`
-    /// is the point of the lens in the unit disk, to the right and upward.
+    /// Returns the rays through the points `(x, y)` of the lens, in the unit disk, to the right and
+    /// upward. The other arguments are those of [`PerspectiveCamera::rays`].
     ///
-    /// Let d be the direction of the ray through the eye, scaled to length 1 along the view
-    /// direction. Let o be the vector from the eye to the point of the lens, and f the distance of
-    /// the plane in focus. The ray starts at eye + o in the direction d - o / f. In the plane in
-    /// focus it crosses the ray through the eye (Cook, Porter and Carpenter 1984, *Distributed Ray
-    /// Tracing*, section 4.2).
+    /// The ray starts at eye + o, where o is the vector to the point of the lens, in the direction
+    /// d - o / f. It crosses the ray through the eye in the plane in focus (Cook, Porter and
+    /// Carpenter 1984, *Distributed Ray Tracing*, section 4.2).
     #[inline(never)]
     pub fn lens_rays<L: SimdFloat>(
         &self,
@@ -177,7 +152,7 @@ impl PerspectiveCamera {
         base: Vec3<L>,
         (dx, dy): (L, L),
         (x, y): (L, L),
-    ) -> (Vec3<L>, Vec3<L>) {
+    ) -> Ray<L> {
         let axis = |v: DVec3| Vec3::of(v.to_array());
         let (u, v) = (axis(self.u), axis(self.v));
         let across = u.mul_add(x, v * y);
@@ -188,6 +163,6 @@ impl PerspectiveCamera {
         if self.near > 0.0 {
             origin = direction.mul_add(L::from_f64(self.near), origin);
         }
-        (origin, direction.normalize())
+        Ray { origin, direction: direction.normalize() }
     }
 }

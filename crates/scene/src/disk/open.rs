@@ -6,8 +6,7 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Opens the regular file at `path` for reading. Never blocks, whereas a plain open of a pipe
-/// blocks until the other end of the pipe is open.
+/// Opens the regular file at `path` for reading, without blocking as a plain open of a pipe does.
 ///
 /// # Errors
 /// Fails if the file cannot be opened or is not a regular file.
@@ -15,11 +14,9 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true), path)
 }
 
-/// Opens the regular file at `path` as [`open_regular`] does, but with the access that `options`
-/// requests.
+/// Opens the regular file at `path` with the access that `options` requests.
 pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    // The type is checked before the file is opened, because opening a device may have side
-    // effects.
+    // Opening a device may have side effects.
     require_regular(fs::metadata(path)?.file_type())?;
     let file = options.custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
     // The file at `path` may have been replaced between the check and the opening.

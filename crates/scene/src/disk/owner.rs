@@ -6,10 +6,9 @@ use std::fs::{self, Metadata};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// Returns `true` if a file in `folder` with this metadata belongs to the user of this process.
-/// Some file systems, such as network mounts, give all files one owner, who may be another user. A
-/// file therefore also counts as the user's own if its owner is the owner that a new file of this
-/// process in `folder` gets.
+/// Returns `true` if a file in `folder` with this metadata belongs to the user of this process, or to
+/// the owner that a new file of this process in `folder` gets: some file systems, such as network
+/// mounts, give all files one owner.
 pub fn is_own(metadata: &Metadata, folder: &Path) -> bool {
     let owner = metadata.uid();
     let owner_of_new_file = || {
@@ -28,8 +27,7 @@ pub fn user_name(id: u32) -> String {
     name_in(&users, id).map_or_else(|| id.to_string(), String::from)
 }
 
-/// Finds the name of the user with number `id` in `users`, which consists of lines of the form
-/// `name:password:id:…`. Returns `None` if no line has this number.
+/// Finds the name of the user with number `id` in lines of the form `name:password:id:…`.
 fn name_in(users: &str, id: u32) -> Option<&str> {
     users.lines().find_map(|line| {
         let mut fields = line.split(':');

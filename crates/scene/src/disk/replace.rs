@@ -11,7 +11,7 @@ use tempfile::NamedTempFile;
 
 /// Prefix and suffix of the names of the program's temporary files.
 pub const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
-/// Largest number of symbolic links that are followed to find a file. Linux has the same limit.
+/// Largest number of symbolic links that are followed, as in Linux.
 const MAX_LINKS: usize = 40;
 
 /// Reason for which a file cannot be written.
@@ -19,7 +19,7 @@ const MAX_LINKS: usize = 40;
 pub struct WriteError {
     /// Path of the file as requested.
     pub path: PathBuf,
-    /// Kind of the problem, as the operating system classifies it.
+    /// Kind of the problem.
     pub kind: ErrorKind,
     /// Description of the problem, as a clause of a sentence.
     pub what: String,
@@ -44,21 +44,19 @@ impl WriteError {
 /// Action if the file to be written exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Replaces the file. The new file gets the permissions of the old one. If the path is a
-    /// symbolic link, the link stays and its target is replaced.
+    /// Replaces the file, which keeps its permissions. If the path is a symbolic link, its target is
+    /// replaced.
     Replace,
     /// Fails if the file exists, even if another program creates it in the meantime.
     Refuse,
 }
 
-/// New content of a file. It is written to a temporary file in the same folder.
-/// [`Replacement::commit`] renames the temporary file to the path of the file. If the value is
-/// dropped without a commit, the temporary file is removed.
+/// New content of a file, in a temporary file in the same folder. [`Replacement::commit`] renames it
+/// to the path of the file; without a commit it is removed.
 #[derive(Debug)]
 pub struct Replacement {
-    /// Path of the file as requested.
     path: PathBuf,
-    /// Path of the file that is replaced, with symbolic links followed.
+    /// Path with symbolic links followed.
     target: PathBuf,
     folder: PathBuf,
     existing: Existing,
@@ -71,9 +69,7 @@ impl Replacement {
     /// Creates the temporary file for the new content of the file at `path`.
     ///
     /// # Errors
-    /// Fails if the file could not be replaced now. This is the case if the file is read-only or
-    /// not a regular file, if it exists although `existing` demands a new file, if the folder is
-    /// not writable, or if the path is a symbolic link that `may_follow` does not permit.
+    /// Fails if the file could not be replaced now.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
         let error = |kind, what: &str, remedy: &str| WriteError::new(path, kind, what, remedy);
         let target = match existing {
@@ -117,19 +113,17 @@ impl Replacement {
         }
     }
 
-    /// Returns the temporary file, to which the caller writes the new content.
+    /// Returns the temporary file.
     pub fn temporary(&mut self) -> &mut NamedTempFile {
         &mut self.temporary
     }
 
-    /// Converts `error`, which occurred while the temporary file was written, to an error with a
-    /// remedy for the user.
+    /// Converts an error of writing the temporary file to one with a remedy for the user.
     pub fn explain(&self, error: &io::Error) -> WriteError {
         explain(&self.path, &self.folder, self.exists, error)
     }
 
-    /// Stores the content of the temporary file on the disk, then renames this file to the path of
-    /// the file that is replaced or created.
+    /// Stores the content of the temporary file on the disk, then renames it.
     ///
     /// # Errors
     /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is
@@ -143,8 +137,7 @@ impl Replacement {
             Existing::Refuse => temporary.persist_noclobber(&target),
         };
         renamed.map_err(|e| explain(&path, &folder, exists, &e.error))?;
-        // Stores the new name on the disk. Errors are ignored, because some systems cannot open or
-        // synchronise a directory, and the content of the file is already on the disk.
+        // Stores the new name on the disk. Some systems cannot open or synchronise a directory.
         if let Ok(directory) = File::open(&folder) {
             let _ = directory.sync_all();
         }
@@ -152,14 +145,12 @@ impl Replacement {
     }
 }
 
-/// Locks a temporary file until it is closed. Other processes remove a temporary file only if they
-/// can lock it. On a file system without locks they therefore never remove one.
+/// Locks a temporary file until it is closed. Other processes remove only files that they can lock.
 pub fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
 
-/// Replaces the content of the file at `path` by `bytes`. If `path` leads to a pipe, a device, a
-/// socket, or an open file of a process such as `/dev/stdout`, appends `bytes` there instead.
+/// Replaces the content of the file at `path` by `bytes`, or appends them to a stream.
 ///
 /// # Errors
 /// Fails if the file cannot be written; an existing regular file is then unchanged.
@@ -173,13 +164,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     replace_file(path, Existing::Replace, |file| file.write_all(bytes))
 }
 
-/// Writes the file at `path`. `write` fills a temporary file, which is renamed to `path` when it is
-/// complete and stored on the disk. If a file exists at `path`, `existing` decides whether it is
-/// replaced or the call fails.
+/// Writes the file at `path` by a [`Replacement`], which `write` fills.
 ///
 /// # Errors
-/// Fails if the file cannot be written, if it exists and `existing` does not permit replacing it,
-/// or if `write` fails. An existing file is then unchanged.
+/// Fails if `write` fails or the file cannot be written; an existing file is then unchanged.
 pub fn replace_file(
     path: &Path,
     existing: Existing,
@@ -191,25 +179,23 @@ pub fn replace_file(
     replacement.commit()
 }
 
-/// Checks, without changing the file at `path`, that [`write()`] could write it now.
+/// Checks that [`write()`] could write the file at `path` now.
 ///
 /// # Errors
-/// Returns the error that writing would return now.
+/// Returns the error that writing would return.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if is_stream(path) { Ok(()) } else { Replacement::begin(path, Existing::Replace).map(drop) }
 }
 
-/// Returns `true` if `path` leads to a pipe, a device, a socket, or an open file of a process.
-/// Bytes are written to such a target directly: a replacement of `/dev/stdout`, for example, would
-/// not reach the open file behind it.
+/// Returns `true` if `path` leads to a stream: a pipe, a device, a socket, or an open file of a
+/// process. A replacement of `/dev/stdout`, for example, would not reach the open file behind it.
 fn is_stream(path: &Path) -> bool {
     let is_other = |m: Metadata| !m.is_file() && !m.is_dir();
     fs::metadata(path).is_ok_and(is_other)
         || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
 }
 
-/// Follows the symbolic links at `path`. Returns the path at the end of the links. This path is no
-/// link itself, and there need not be a file at it.
+/// Returns the path at the end of the symbolic links at `path`. There need not be a file at it.
 ///
 /// # Errors
 ///
@@ -252,11 +238,9 @@ impl Owner {
     }
 }
 
-/// Returns `true` if the user with the id `user` may write through a symbolic link. `link` and
-/// `folder` describe the link and the folder that contains it. In a sticky folder that everybody
-/// may write to, only links of `user` and of the folder's owner are followed. This is the rule of
-/// Linux's `fs.protected_symlinks` (proc_sys_fs(5)); it applies here on every system and with every
-/// setting.
+/// Returns `true` if the user with the id `user` may write through the symbolic link `link` in
+/// `folder`. In a sticky folder that everybody may write to, only links of `user` and of the folder's
+/// owner are followed, as by Linux's `fs.protected_symlinks` (proc_sys_fs(5)).
 fn may_follow(link: &Owner, folder: &Owner, user: u32) -> bool {
     const STICKY_AND_WRITABLE_BY_ALL: u32 = 0o1002;
     let is_shared = folder.mode & STICKY_AND_WRITABLE_BY_ALL == STICKY_AND_WRITABLE_BY_ALL;
@@ -276,8 +260,8 @@ fn exists(path: &Path) -> WriteError {
     WriteError::new(path, ErrorKind::AlreadyExists, what, "name another one or remove it first")
 }
 
-/// Converts an I/O error of writing the file `path` in `folder` to an error with a remedy for the
-/// user. `exists` is `true` if the file existed before the write began.
+/// Converts an error of writing `path` in `folder` to one with a remedy. `exists` is `true` if the
+/// file existed before.
 fn explain(path: &Path, folder: &Path, exists: bool, error: &io::Error) -> WriteError {
     let shown = folder.display();
     let kept = if exists { "the old file is unchanged" } else { "no file was written" };

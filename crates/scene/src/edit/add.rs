@@ -3,12 +3,11 @@
 #![deny(clippy::wildcard_enum_match_arm)]
 
 use crate::edit::bounds::{BoundingSphere, scene_bounds};
-use crate::edit::convert::{LIGHT_KINDS, set_kind};
 use crate::edit::placement::place_for;
 use crate::edit::properties::{Word, words};
 use crate::edit::unique_name::{free_light, free_material, free_object};
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{Falloff, Light};
+use crate::light::{Falloff, Light, LightKind, Placement};
 use crate::material::Material;
 use crate::shape::{KINDS, Shape, compose};
 use crate::value::{
@@ -26,11 +25,10 @@ pub fn object_kinds() -> Vec<Word> {
 
 /// Returns the name and a description of each kind of light that can be added.
 pub fn light_kinds() -> Vec<Word> {
-    words(LIGHT_KINDS)
+    words(crate::light::KINDS)
 }
 
-/// Colours of new materials, linear red, green and blue. A new material gets the first colour that
-/// no other material has.
+/// Linear colours of new materials: the first that no other material has.
 const PALETTE: [[f64; 3]; 6] = [
     [0.85, 0.16, 0.11],
     [0.13, 0.28, 0.8],
@@ -40,8 +38,7 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// Returns a material with the first palette colour that no material of the scene has. If all are
-/// used, the number of materials modulo the number of colours is the index of the colour.
+/// Returns a material with the first free palette colour, or the next one in turn.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -50,13 +47,9 @@ fn fresh_material(scene: &Scene) -> Material {
     Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
 }
 
-/// Adds an object of the kind `kind`. The object rests on a surface, as near as possible to the
-/// middle of the camera's view, and is somewhat smaller than most other objects. A plane is put
-/// below all objects. `material` is the name of an existing material for the object; `None` creates
-/// a new material.
-///
-/// # Errors
-/// Fails if there is no such kind of object, or the scene has no such material.
+/// Adds an object. It rests on a surface, as near as possible to the middle of the view, and is
+/// somewhat smaller than most others. A plane is put below all objects. Without `material` the
+/// object gets a new one. Fails if there is no such kind or material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
@@ -94,9 +87,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns transform steps for `shape`, which has no key for its position. The steps scale the
-/// longest side of its bounding box to `size` and place the shape upright on the point `base`. The
-/// list is empty if the shape has no bounds.
+/// Returns steps that scale the longest side of `shape`, which has no key for its position, to
+/// `size` and place it upright on `base`. Empty if the shape has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     let mut steps: Vec<_> = shape.upright().into_iter().collect();
     let Some((low, high)) = shape.form().transformed(&compose(&steps)).bounds() else {
@@ -109,10 +101,9 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object in scene units, rounded to one significant digit. It is 0.6
-/// times the median length of the solids, the objects that are not flat. The median is limited to
-/// the range from 0.01 R to R, where R is the radius of the scene's bounding sphere. If there are
-/// no solids, the length is 0.15 R. In an empty scene it is 0.6.
+/// Returns the length of a new object, rounded to one digit: 0.6 times the median length of the
+/// solids, limited to 0.01 R to R, where R is the radius of the scene. It is 0.15 R without solids,
+/// and 0.6 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -130,8 +121,8 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Rotates a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
-/// camera. Other shapes and flat shapes that are nearly horizontal stay unchanged.
+/// Rotates a flat shape that is not level about the vertical, to a multiple of 5 degrees, so that
+/// its front faces the camera.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
     let front = u.cross(v).normalize();
@@ -163,15 +154,15 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
     let toward = if lit > 0.0 { -right } else { right };
     let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
-    let mut light = Light::default();
     let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
-    set_kind(&mut light, kind, position, direction, radius / 5.0);
-    if light.kinds().is_empty() {
+    let placement = Placement { position, direction, radius: radius / 5.0 };
+    let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
-        let kinds = crate::light::KINDS.join(", ");
+        let kinds = names(crate::light::KINDS);
         return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
-    }
+    };
+    let mut light = Light::new(placed);
     let name = match kind {
         "directional" => "sun",
         "spot" => "spot",
@@ -286,7 +277,7 @@ mod tests {
                 (Some(position), _) => position[0],
                 (None, Some(direction)) => -direction[0],
                 (None, None) => {
-                    assert!(light.environment.is_some() && light.name == "sky");
+                    assert!(light.environment().is_some() && light.name == "sky");
                     continue;
                 }
             };

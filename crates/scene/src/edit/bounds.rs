@@ -1,5 +1,4 @@
-//! Bounds of objects and scenes. They serve to frame objects with the camera, to choose the length
-//! of the arrow keys' steps, and to place new objects.
+//! Bounds of objects and scenes: to frame objects, to step coordinates, and to place new objects.
 
 use crate::edit::Target;
 use crate::value::floor_log10;
@@ -18,11 +17,9 @@ pub struct BoundingSphere {
 /// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// Returns a bounding sphere for `subject`, a part of the scene. The sphere of a finite object
-/// contains the object. The sphere of a plane is centred on the plane's position and has the radius
-/// R of [`scene_bounds`]. The sphere of a light with a position has the radius of the light, at
-/// least R / 10. The sphere of a material contains all finite objects that use it. Returns `None`
-/// for any other target.
+/// Returns a bounding sphere. That of a plane is centred on its position and has the radius R of
+/// [`scene_bounds`]. That of a light has the radius of the light, at least R / 10. That of a
+/// material contains all finite objects that use it. Other targets have none.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
         Target::Object(i) => {
@@ -50,15 +47,13 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     }
 }
 
-/// Returns the bounding sphere of all solids in the scene, the finite objects that are not flat. If
-/// there are no solids, it is that of all finite objects. If there are no finite objects either, it
-/// is the unit sphere about the origin.
+/// Returns the bounding sphere of all solids; without solids, of all finite objects; without these,
+/// the unit sphere about the origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
-/// Returns the bounding box of all solids in the scene, the finite objects that are not flat.
-/// Without solids it is that of all finite objects. Returns `None` if there are no finite objects.
+/// Returns the bounding box of all solids or, without solids, of all finite objects.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let solids = forms.iter().filter(|form| form.is_solid()).filter_map(|form| form.bounds());
@@ -69,26 +64,23 @@ pub(super) fn union(a: Extent, b: Extent) -> Extent {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Returns the sphere through the corners of a box, which is given by its lowest and highest
-/// corner.
+/// Returns the sphere through the corners of a box.
 fn ball((low, high): Extent) -> BoundingSphere {
     let radius = (high - low).length() / 2.0;
     let center = low + (high - low) / 2.0;
     BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
 }
 
-/// Returns the coarse step, in scene units, by which arrow keys change a coordinate: the power of
-/// ten between a hundredth and a tenth of the diameter of [`scene_bounds`]. It is 0.1 in a room
-/// with objects a few units apart. A fine step is a tenth of it.
+/// Returns the coarse step of a coordinate by arrow keys: the power of ten between a hundredth and
+/// a tenth of the diameter of [`scene_bounds`]. A fine step is a tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
-/// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
-/// the camera's target. For a camera with a direction it is the point of the view axis closest to
-/// the centre of [`scene_bounds`]. If this point is behind the eye or close to the eye, the
-/// distance is the radius of [`scene_bounds`].
+/// Returns the distance from the eye to the pivot of camera movements, greater than 0: the target,
+/// or the point of the view axis closest to the centre of [`scene_bounds`]. If that is not well
+/// ahead, it is the radius of [`scene_bounds`].
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

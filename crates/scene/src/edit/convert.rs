@@ -1,5 +1,5 @@
-//! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
-//! brightness are kept where possible.
+//! Conversion between kinds of shapes, lights, textures and cameras, which keeps position, size,
+//! direction and brightness where possible.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -9,9 +9,7 @@ use crate::edit::bounds::scene_bounds;
 use crate::edit::lens;
 use crate::edit::set::{label, replace};
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{
-    Directional, EmitterSurface, Environment, Falloff, Light, LightUnit, Point, Spot,
-};
+use crate::light::{EmissiveSurface, Falloff, Light, LightKind, LightUnit, Placement};
 use crate::material::{Bump, Material, Texture};
 use crate::shape::Shape;
 use crate::value::{
@@ -21,17 +19,6 @@ use crate::value::{
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Kinds of light, each with its name and description.
-pub(super) const LIGHT_KINDS: &[Field] = &[
-    kind("point", "Light from one point, such as a lamp."),
-    kind("directional", "Light from infinitely far away, such as the sun."),
-    kind("spot", "Light from one point into a cone, such as a spotlight."),
-    kind("sphere", "Light from a sphere, such as a bulb: soft shadows."),
-    kind("rectangle", "Light from one side of a rectangle, such as a window."),
-    kind("disk", "Light from one side of a disk."),
-    kind("environment", "Light from all directions, such as the sky."),
-];
-
 const fn kind(name: &'static str, doc: &'static str) -> Field {
     Field::required(name, ValueType::Text, "", doc)
 }
@@ -39,10 +26,9 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
 /// Field for the kind of a light. The inspector shows it as a row, but it is not a key of scene
 /// files.
 pub(super) const KIND: Field =
-    Field::required("kind", ValueType::OneOf(LIGHT_KINDS), "", "Kind of light source.");
+    Field::required("kind", ValueType::OneOf(crate::light::KINDS), "", "Kind of light source.");
 
-/// Field for the choice between `target` and `direction` of a camera. The inspector shows it as a
-/// row, but it is not a key of scene files.
+/// Choice between `target` and `direction` of a camera, a row of the inspector but no key of files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -53,8 +39,7 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
-/// another shape or light. Nothing changes if it has this kind already.
+/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -92,14 +77,12 @@ pub(super) fn switch(
     Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
 }
 
-/// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
-/// there is no such kind.
+/// Returns a shape of the kind `name` with the place, size and rotation of `shape`.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The size is that of the bounding box before rotation, because the bounding box of a
-            // rotated shape is larger than the shape.
+            // The bounding box of a rotated shape is larger than the shape.
             let mut straight = shape.clone();
             straight.rotate_y(-shape.rotation());
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
@@ -120,38 +103,13 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     Some(next)
 }
 
-/// Angle between the axis and the edge of the cone of a spot light that is added or converted
-/// \[degrees\].
-const SPOT_ANGLE: f64 = 30.0;
-
-/// Gives `light`, which has no kind, the kind `name`. Of `position`, `direction` and `radius`, the
-/// light takes the values for which the kind has keys. Nothing changes if there is no such kind.
-pub(super) fn set_kind(
-    light: &mut Light,
-    name: &str,
-    position: [f64; 3],
-    direction: [f64; 3],
-    radius: f64,
-) {
-    match name {
-        "point" => light.point = Some(Point { position }),
-        "directional" => light.directional = Some(Directional { direction }),
-        "spot" => {
-            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
-            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
-        }
-        "environment" => light.environment = Some(Environment::default()),
-        _ => light.set_surface(name, position.into(), direction, radius),
-    }
-}
-
 /// Converts a light to the kind `name`. The light keeps its position, direction and size where the
 /// new kind has them. A light that had no direction is aimed at the centre of the scene; one that
 /// had no position is placed at a distance of three scene radii from the centre. The irradiance at
 /// the centre is kept if the range of intensities allows it. Returns a note if this irradiance
 /// requires another intensity, otherwise `None`.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
-    if light.kinds() == [name] {
+    if light.kind.key() == name {
         return None;
     }
     let ball = scene_bounds(scene);
@@ -166,17 +124,20 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     let far = || (center - along * (3.0 * ball.radius)).map(|x| round_nice(x, ball.radius));
     let position = light.position().unwrap_or_else(|| far().to_array());
     let radius = match light.surface() {
-        Some(EmitterSurface::Rectangle(rectangle)) => {
-            0.5 * (rectangle.size[0] * rectangle.size[1]).sqrt()
+        Some(EmissiveSurface::Rectangle { size: [width, height], .. }) => {
+            0.5 * (width * height).sqrt()
         }
         Some(surface) => surface.radius(),
         None => ball.radius / 5.0,
     };
+    let kind = LightKind::placed(name, &Placement { position, direction, radius })?;
     let old = light.clone();
-    light.clear_kind();
-    set_kind(light, name, position, direction, radius);
+    light.kind = kind;
     if light.surface().is_none() {
-        (light.unit, light.visible) = (LightUnit::Radiance, true);
+        light.unit = LightUnit::Radiance;
+    }
+    if !light.has_radiance() {
+        light.visible = true;
     }
     if light.apex().is_none() {
         light.falloff = Falloff::None;
@@ -200,12 +161,7 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
                 LightUnit::Radiance => 1.0,
                 LightUnit::Power => 1.0 / (PI * surface.area()),
             };
-            // A sphere shows a quarter of its area to a distant point.
-            let shown = match surface {
-                EmitterSurface::Sphere(_) => 0.25 * surface.area(),
-                EmitterSurface::Rectangle(_) | EmitterSurface::Disk(_) => surface.area(),
-            };
-            radiance * (shown / squared).min(PI)
+            radiance * (surface.frontal_area() / squared).min(PI)
         }
     }
 }
@@ -245,8 +201,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Sets the kind of a material's texture or bump map to `name`. `key` is `texture` or `bump`. The
-/// placement of a texture on the shape is kept.
+/// Sets the kind of `texture` or `bump`. The placement of a texture is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -258,8 +213,8 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts the value of the camera's `key` to the kind `name`, such as `target` to `direction`.
-/// The picture stays the same, except for rounding.
+/// Converts the value of `key`, such as `target` to `direction`. The picture stays the same, except
+/// for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -286,8 +241,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
             if camera.lens_radius() > 0.0 && camera.focus.is_none() {
-                // So far the target was in focus. A focus distance keeps it in focus without a
-                // target.
+                // The target was in focus; a focus distance keeps it so.
                 let distance = round_significant(camera.focus_depth(), 5);
                 camera.focus = Some(Focus::Distance(distance));
             }
@@ -349,14 +303,14 @@ mod tests {
         let center = DVec3::from_array(scene_bounds(&scene).center);
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
         for from in crate::light::KINDS {
-            let from = set(&scene, &lamp, "kind", from).unwrap().scene;
+            let from = set(&scene, &lamp, "kind", from.name).unwrap().scene;
             for to in crate::light::KINDS {
-                let edit = set(&from, &lamp, "kind", to).unwrap();
+                let edit = set(&from, &lamp, "kind", to.name).unwrap();
                 assert_eq!(edit.scene.faults(), []);
                 let light = &edit.scene.lights[0];
-                assert_eq!(light.kinds(), [*to]);
+                assert_eq!(light.kind.key(), to.name);
                 let ratio = irradiance(light) / irradiance(&from.lights[0]);
-                assert!((ratio - 1.0).abs() < 0.01, "{to}: {ratio}");
+                assert!((ratio - 1.0).abs() < 0.01, "{}: {ratio}", to.name);
             }
         }
     }
@@ -369,15 +323,15 @@ mod tests {
         let lamp = Target::Light(0);
         let edit = set(&scene, &lamp, "kind", "directional").unwrap();
         let light = &edit.scene.lights[0];
-        assert!(light.point.is_none() && light.falloff == Falloff::None);
+        assert!(light.kind.key() == "directional" && light.falloff == Falloff::None);
         let center = DVec3::from_array(scene_bounds(&scene).center);
-        let from = DVec3::from_array(scene.lights[0].point.unwrap().position);
+        let from = scene.lights[0].apex().unwrap();
         let expected = 40.0 / (from - center).length_squared() / std::f64::consts::PI;
         assert!((light.intensity / expected - 1.0).abs() < 0.01, "{}", light.intensity);
         assert!(edit.note.unwrap().starts_with("Intensity 40 became "));
-        let direction = DVec3::from_array(light.directional.unwrap().direction);
+        let direction = DVec3::from_array(light.direction().unwrap());
         let back = set(&edit.scene, &lamp, "kind", "p").unwrap().scene;
-        let at = DVec3::from_array(back.lights[0].point.unwrap().position);
+        let at = back.lights[0].apex().unwrap();
         assert!((center - at).angle_between(direction) < 1e-3);
         let even = set(&scene, &lamp, "falloff", "none").unwrap();
         assert!((even.scene.lights[0].intensity / expected - 1.0).abs() < 0.01);
@@ -395,7 +349,8 @@ mod tests {
         let expected = ["position", "direction", "outer_angle", "inner_angle"];
         assert_eq!(keys[2..6], expected.map(|key| format!("spot.{key}")), "{keys:?}");
         let edit = set(&spot, &lamp, "spot.outer_angle", "40").unwrap();
-        assert_eq!(edit.scene.lights[0].spot.unwrap().outer_angle, 40.0);
+        let LightKind::Spot(wide) = &edit.scene.lights[0].kind else { panic!() };
+        assert_eq!(wide.outer_angle, 40.0);
         assert!(set(&spot, &lamp, "spot.outer_angle", "10").is_err(), "the inner cone has 15");
         let point = set(&spot, &lamp, "kind", "point").unwrap().scene;
         assert_eq!(point.lights, scene.lights);

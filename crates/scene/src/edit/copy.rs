@@ -10,14 +10,9 @@ use crate::edit::{Edit, EditError, Target};
 use crate::value::truncated;
 use glam::DVec3;
 
-/// Duplicates an object, a light, a material or a stored camera. The copy has a unique name such as
-/// `cube 2`. The copy of an object or a light without a name has no name either. The copy of an
-/// object is moved horizontally to a free place, in the camera's view if possible; that of a plane
-/// is moved down. The copy of a light with a position is moved along x.
-///
-/// # Errors
-/// Fails for targets that every scene has exactly once, such as the current camera, and for targets
-/// that do not exist.
+/// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
+/// object is moved to a free place on the same level, a plane down, a light along x. Fails for
+/// targets of which every scene has one.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -76,12 +71,9 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
 }
 
-/// Deletes an object, a light, a stored camera or a material. Objects with a deleted material get
-/// the default material, and parts of compounds that of the whole compound. The edit's note names
-/// these objects and parts.
-///
-/// # Errors
-/// Fails for targets that every scene has.
+/// Deletes an object, a light, a stored camera or a material. Objects without their material get
+/// the default one, parts of compounds that of the whole; the note names them. Fails for targets
+/// that every scene has.
 pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -89,8 +81,7 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let label = format!("delete {}", subject.label(scene));
     let mut next = scene.clone();
     let mut note = None;
-    // Index to select after the deletion of entry `i`: that of the next entry, else of the previous
-    // one. `left` is the number of entries that remain.
+    // Index to select after entry `i` was deleted and `left` remain.
     let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
     let select = match subject {
         Target::Object(i) => {
@@ -118,15 +109,12 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
 }
 
-/// Returns the name to select after the name `gone` was deleted: the first of the sorted `names`
-/// after it, or else the last one. Returns `None` if `names` is empty.
+/// Returns the name to select after `gone`: the next of the sorted `names`, or the last one.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Removes the material `name` from all objects and parts of compounds. The objects get the default
-/// material, the parts that of the whole compound. Returns a note that names these objects and
-/// parts; `None` if nothing used the material.
+/// Removes the material `name` from all objects and parts. Returns a note that names them.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {
@@ -159,11 +147,8 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Renames an object, a light, a material or a stored camera. A renamed material is also renamed in
-/// all objects and parts that use it. The name of an object or a light may be empty.
-///
-/// # Errors
-/// Fails for targets without a name, and for a name that exists already or is not printable.
+/// Renames an object, a light, a material or a stored camera. Fails for a name that exists already
+/// or is not printable. Only objects and lights may have an empty name.
 pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -208,9 +193,6 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
 }
 
 /// Gives an object a copy of its material that no other object uses.
-///
-/// # Errors
-/// Fails for targets other than objects.
 pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects have a material", "Select an object."));
@@ -244,7 +226,7 @@ mod tests {
         assert_eq!(a.0.y, b.0.y);
         let lamp = duplicate(&scene, &Target::Light(0)).unwrap().scene;
         assert_eq!(lamp.lights[1].name, "lamp 2");
-        assert_ne!(lamp.lights[1].point, lamp.lights[0].point);
+        assert_ne!(lamp.lights[1].kind, lamp.lights[0].kind);
         let red = duplicate(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(red.subject, Target::Material("red 2".into()));
         assert!(duplicate(&scene, &Target::Film).is_err());

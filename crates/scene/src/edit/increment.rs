@@ -1,5 +1,5 @@
-//! Steps of a value by arrow keys: a number changes to the next round number up or down, any other
-//! value to the next choice.
+//! Steps by arrow keys: a number changes to the next round number, any other value to the next
+//! choice.
 
 use crate::Scene;
 use crate::edit::bounds::step_length;
@@ -12,21 +12,13 @@ use crate::value::{
     rounded_to,
 };
 
-/// Changes the numbers of `key` by `steps` arrow steps. If `steps` is a whole number, the steps are
-/// coarse. Otherwise `steps` counts fine steps in tenths: 0.1 is one fine step forward, -0.3 is
-/// three fine steps back. `component` is the index of the number to change. If it is `None`, all
-/// numbers change together; in a colour, the brightness changes.
+/// Changes the numbers of `key` by `steps` arrow steps. Whole numbers are coarse steps; otherwise
+/// `steps` counts fine steps in tenths. `component` is the index of the number to change; without
+/// it all change together, in a colour the brightness. A key without numbers changes to the next or
+/// previous choice ([`toggle`]).
 ///
-/// A coarse step changes sizes, intensities and roughness by about a tenth, coordinates by
-/// [`step_length`], angles by 5 degrees, and fractions between 0 and 1 by 0.05. A fine step changes
-/// them by about a tenth of that. A key without numbers changes to the next or previous choice
-/// ([`toggle`]).
-///
-/// The scene stays unchanged at the end of a range. It also stays unchanged if other keys forbid
-/// the new value; the edit's note then states the reason.
-///
-/// # Errors
-/// Fails if there is no such key or number, or no value to start from.
+/// The scene stays unchanged at the end of a range, or if other keys forbid the new value; a note
+/// then states the reason. Fails if there is no such key or number, or no value to start from.
 pub fn step(
     scene: &Scene,
     subject: &Target,
@@ -59,8 +51,7 @@ pub fn step(
             numbers.iter().enumerate().map(moved).collect()
         }
     };
-    // A step that would make all numbers of a direction 0 is dropped, because such a direction is
-    // invalid.
+    // A direction of zeros is invalid.
     let is_zero = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
     let next = if is_zero { numbers } else { next };
     replace(scene, subject, key, KeyValue::Numbers(next)).or_else(|refusal| {
@@ -70,12 +61,9 @@ pub fn step(
     })
 }
 
-/// Changes `key` to the next choice, or to the previous one if `forward` is `false`, cyclically.
-/// The value of `key` may be a word of a list, a switch (`true` or `false`), a kind such as that of
-/// a light, or the material of an object. For an optional key, "no value" is one of the choices.
-///
-/// # Errors
-/// Fails if there is no such key, or it has no choices.
+/// Changes `key` cyclically to the next or previous choice: a word, a switch, a kind, or the
+/// material of an object. For an optional key, "no value" is one of the choices. Fails if there is
+/// no such key, or it has no choices.
 pub fn toggle(
     scene: &Scene,
     subject: &Target,
@@ -113,9 +101,8 @@ pub fn toggle(
     crate::edit::set(scene, subject, key, text)
 }
 
-/// Returns the index of the choice after the choice `index`, or before it if `forward` is `false`.
-/// The `n` choices form a cycle. `None` stands for "no choice", which is part of the cycle if
-/// `optional` is `true`. Returns `None` if `n` is 0.
+/// Returns the index of the next or previous of `n` choices in a cycle. `None` stands for "no
+/// choice", which is part of the cycle if `optional` is `true`.
 fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
     match (index, forward) {
         _ if n == 0 => None,
@@ -129,9 +116,8 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
     }
 }
 
-/// Returns the value from which the first arrow step of a key without a value starts. For `alpha`
-/// or `f0` of a material it is the value that follows from other keys of the material. Returns
-/// `None` for any other key.
+/// Returns the value from which steps of an absent `alpha` or `f0` start: the one that follows from
+/// other keys.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -146,8 +132,7 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
     }
 }
 
-/// Number and kind of arrow steps. The number is negative for steps down. `fine` is `true` for fine
-/// steps, about a tenth as large as coarse ones.
+/// Number of arrow steps, negative for steps down. Fine ones are about a tenth as large.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -168,18 +153,16 @@ impl StepCount {
 /// Rule by which an arrow step changes a number.
 #[derive(Clone, Copy)]
 enum StepRule {
-    /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten), about a tenth larger or
-    /// smaller. Between 0 and `floor` there are no rungs: the step up from 0 leads to `floor`.
+    /// Geometric step along 1, 1.1, 1.2 ... 9 (times a power of ten): the rungs. Between 0 and
+    /// `floor` there are none.
     Rungs { floor: f64, range: NumberRange },
     /// Step by `unit`; a fine step is a tenth of it.
     Units { unit: f64, range: NumberRange },
     /// Step by 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// Step of one component of a direction by 0.05 p, where p is the largest power of ten up to
-    /// the magnitude of the largest component. A fine step is a tenth of it.
+    /// Step of a component by a twentieth of the power of ten of the largest component.
     Direction,
-    /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten) of the magnitude; the sign
-    /// is kept.
+    /// Geometric step: the magnitude moves along the rungs; the sign stays.
     Factor,
     /// Step by 10, or by 1 in fine steps.
     Tens { range: NumberRange },
@@ -200,12 +183,10 @@ impl StepRule {
                 } else if range == NumberRange::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
                 } else if field.name == "height" {
-                    // Height of a bump map. The step is small, because useful heights are at most a
-                    // hundredth of the size of the surface.
+                    // Useful bumps are at most a hundredth of the size of the surface high.
                     Self::Units { unit: 0.005, range }
                 } else if matches!(field.name, "roughness" | "alpha") {
-                    // The step up from 0 leads to 0.001, the smallest value whose blur is visible
-                    // at the far end of a room.
+                    // The blur of 0.001 is the smallest that is visible at the far end of a room.
                     Self::Rungs { floor: 0.001, range }
                 } else if field.name == "offset"
                     || [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range)
@@ -234,8 +215,7 @@ impl StepRule {
         })
     }
 
-    /// Returns the number `x` after `count` arrow steps. `all` has all numbers of the value to
-    /// which `x` belongs, such as the three coordinates of a direction.
+    /// Returns `x`, one of the numbers `all` of the value, after `count` steps.
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
@@ -246,8 +226,7 @@ impl StepRule {
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
                 let moved = added(x, 5.0, count);
-                // The range of an opening angle excludes its ends. Steps stop a fine step of 0.5
-                // degrees before them.
+                // The range of an opening angle excludes its ends.
                 let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
                 if range.low.is_finite() { within(moved, ends, x) } else { moved }
             }
@@ -269,15 +248,13 @@ impl StepRule {
     }
 }
 
-/// Returns `x` plus `steps` times `unit` (a tenth of `unit` for fine steps), rounded to a hundredth
-/// of a fine step.
+/// Returns `x + steps * unit`, rounded to a hundredth of a fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
-/// Returns `x` if it is in `range`, otherwise the nearest end of `range`. If `range` excludes this
-/// end, returns `old`.
+/// Returns `x` limited to `range`; `old` if `range` excludes the nearest end.
 fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
@@ -290,8 +267,7 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Returns `x` after doubling or halving it per coarse step, or adding or subtracting 1 per fine
-/// step. The result is in `range`.
+/// Returns `x` after doubling or halving it per coarse step, or a change by 1 per fine step.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
@@ -301,26 +277,20 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Rungs: round numbers between 1 and 10 to which coarse steps lead, in hundredths. Successive
-/// rungs differ by about a tenth. The whole numbers from 1 to 9 are among them.
+/// Mantissas of coarse steps, in thousandths. Successive ones differ by about a tenth.
 const RUNGS: [i64; 23] = [
-    100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
-    650, 700, 800, 900,
+    1000, 1100, 1200, 1300, 1400, 1600, 1800, 2000, 2200, 2500, 2800, 3000, 3300, 3600, 4000, 4500,
+    5000, 5500, 6000, 6500, 7000, 8000, 9000,
 ];
 
-/// Returns the width of a fine step at the mantissa `hundredths`. Both are in hundredths. Fine
-/// steps lead to 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
-fn fine_width(hundredths: i64) -> i64 {
-    match hundredths {
-        ..200 => 1,
-        200..500 => 2,
-        _ => 5,
-    }
+/// Returns the mantissas of fine steps: 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
+fn fine_rungs() -> Vec<i64> {
+    let parts = [(1000..2000).step_by(10), (2000..5000).step_by(20), (5000..10_000).step_by(50)];
+    parts.into_iter().flatten().collect()
 }
 
-/// Returns the number that is `steps` rungs (round numbers such as 1, 1.1, 1.2) above `x`, or below
-/// it for negative `steps`. `x` must be at least 0. Between 0 and `floor` there are no rungs. The
-/// result is always a rung or an end of `range`; steps up and down therefore undo each other.
+/// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is a rung or
+/// an end of `range`, so that steps up and down undo each other.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
@@ -336,41 +306,23 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
     x
 }
 
-/// Returns the next round number above `x` if `up` is `true`, otherwise the next one below. `x` is
-/// greater than 0. `fine` selects the round numbers of fine steps.
+/// Returns the next rung above or below `x`, which is greater than 0.
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
-    let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
-    let mantissa = x * scale;
-    // Rounding errors of the scaling may move a number slightly off its rung.
-    let nearest = mantissa.round();
-    let on_rung = (mantissa - nearest).abs() < 1e-6;
-    let below = if on_rung { nearest as i64 } else { mantissa.floor() as i64 };
-    let hundredths = match (up, fine) {
-        (true, true) => {
-            let width = fine_width(below);
-            (below / width + 1) * width
-        }
-        (false, true) => {
-            let reach = if on_rung { below - 1 } else { below };
-            let width = fine_width(reach.max(100));
-            // Below 1.00, the next rung of fine steps is 9.95 times the next lower power of ten.
-            if reach < 100 {
-                return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
-            } else {
-                reach / width * width
-            }
-        }
-        (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
-        (false, false) => {
-            let under = |r: &i64| if on_rung { *r < below } else { *r <= below };
-            RUNGS.iter().rev().copied().find(under).unwrap_or(90)
+    let mantissa = x * format!("1e{}", 3 - e).parse().unwrap_or(1.0);
+    let rungs = if fine { fine_rungs() } else { RUNGS.to_vec() };
+    // Rounding errors may move a number slightly off its rung.
+    let next = match up {
+        true => rungs.into_iter().find(|r| *r as f64 > mantissa + 1e-5).unwrap_or(10_000),
+        false => {
+            let below = if fine { 995 } else { 900 };
+            rungs.into_iter().rfind(|r| (*r as f64) < mantissa - 1e-5).unwrap_or(below)
         }
     };
-    format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
+    format!("{next}e{}", e - 3).parse().unwrap_or(x)
 }
 
-/// Returns a colour with its brightness changed by `count` arrow steps. Black becomes a dark grey.
+/// Returns a colour with its brightness changed; black becomes a dark grey.
 fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };
@@ -381,14 +333,13 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     if largest == 0.0 {
         return vec![next; channels.len()];
     }
-    // Black has no hue. The brightness of the darkest step is therefore above 0.
+    // Black has no hue: the darkest step stays above 0.
     let next = if next <= 0.0 { largest.min(0.005) } else { next };
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
-/// Returns a picture size with width and height changed together by `count` arrow steps. A coarse
-/// step doubles or halves them, a fine step changes the width by 16 pixels. The aspect ratio is
-/// kept as far as whole numbers allow.
+/// Returns a picture size with about the same aspect ratio. A fine step changes the width by 16
+/// pixels.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

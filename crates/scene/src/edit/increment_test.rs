@@ -182,7 +182,7 @@ fn choices_cycle() {
     let edit = toggle(&scene, &ball, "shape", true).unwrap();
     assert_eq!(edit.scene.objects[2].shape.key(), "cube");
     let edit = toggle(&scene, &Target::Light(0), "kind", true).unwrap();
-    assert!(edit.scene.lights[0].directional.is_some());
+    assert_eq!(edit.scene.lights[0].kind.key(), "directional");
     let edit = toggle(&scene, &Target::Camera, "aim", false).unwrap();
     assert!(edit.scene.camera.direction.is_some());
     let edit = toggle(&scene, &Target::Light(0), "on", true).unwrap();

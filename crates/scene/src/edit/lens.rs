@@ -7,19 +7,16 @@ use crate::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::DVec3;
 
-/// Radius of the lens to which a pinhole is opened, as a fraction of the distance from the eye to
-/// the plane in focus. With 0.02, objects at twice that distance and farther are visibly blurred.
+/// Radius to which a pinhole is opened, as a fraction of the distance of the plane in focus.
+/// Objects at twice that distance are then visibly blurred.
 const FIRST_RADIUS: f64 = 0.02;
-/// Radius below which a lens becomes a pinhole, as a fraction of the distance from the eye to the
-/// plane in focus.
+/// Fraction of that distance below which a lens becomes a pinhole.
 const LAST_RADIUS: f64 = 5e-4;
 /// Smallest and largest f-number to which [`change_aperture`] leads.
 const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
 
-/// Sets the focus of the camera to `point`. The kind of the focus, distance or point, is kept.
-///
-/// # Errors
-/// Fails if `point` is the eye, or out of range.
+/// Sets the focus of the camera to `point`. A focus by distance stays one. Fails if `point` is the
+/// eye.
 pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     let to = DVec3::from_array(point) - DVec3::from_array(camera.eye);
@@ -33,13 +30,9 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
     edited(scene, camera, "focus")
 }
 
-/// Opens the camera's lens by `stops`; negative stops close it. One stop doubles the area of the
-/// lens. A pinhole opens to a lens whose radius is a fiftieth of the distance from the eye to the
-/// plane in focus. A lens that is given by its radius, not by an f-number, becomes a pinhole if it
-/// is closed far enough. A camera without a plane in focus gets one.
-///
-/// # Errors
-/// Returns the first validation error of the edited scene.
+/// Opens the lens by `stops`; negative stops close it. One stop doubles the area of the lens. A
+/// pinhole opens to a fiftieth of the distance of the plane in focus, which a camera without one
+/// gets. A lens that is given by its radius becomes a pinhole if it is closed far enough.
 pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     if camera.focus.is_none() && camera.target.is_none() {
@@ -63,8 +56,7 @@ pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     edited(scene, camera, "aperture")
 }
 
-/// Rounds `x` to the nearest power of √2, multiplies it by √2^`stops`, and returns the product
-/// rounded to two digits, such as 1, 1.4, 2 or 2.8.
+/// Returns `x` times √2^`stops`, rounded to 1, 1.4, 2, 2.8 and so on.
 fn stopped(x: f64, stops: f64) -> f64 {
     let position = (2.0 * x.log2()).round() + stops;
     round_significant((0.5 * position).exp2(), 2)
@@ -75,9 +67,8 @@ fn edited(scene: &Scene, camera: Camera, label: &str) -> Result<Edit, EditError>
     Edit::checked(next, Target::Camera, format!("{label} of the camera"))
 }
 
-/// Converts the camera's aperture or its focus to the kind `name`. `key` states which of them: it
-/// is `aperture` or `focus`. The picture stays the same, except for rounding. A pinhole, however,
-/// becomes a lens if its aperture is converted.
+/// Converts `aperture` or `focus` to the kind `name`. The picture stays the same, except for
+/// rounding and for a pinhole that becomes a lens.
 pub(super) fn switch(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     let seen = Scene { camera: camera.clone(), ..scene.clone() };
     let distance = camera.focus_depth();

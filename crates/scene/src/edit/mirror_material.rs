@@ -1,5 +1,4 @@
-//! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
-//! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
+//! Edits of the scene's mirror: a material that reflects.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 
@@ -8,17 +7,14 @@ use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
 use crate::shape::Shape;
 
-/// Returns the name of the material that the mirror commands change: the first of the following
-/// that reflects.
+/// Returns the name of the material that the mirror commands change: the first of the following.
 ///
-/// - The material that is selected, or that of the selected object. Glass counts even if it only
-///   transmits.
-/// - The material with the largest reflection coefficient in the selected object and its parts.
-/// - The material with the largest reflection coefficient in the first rectangle that reflects.
-/// - The material with the largest reflection coefficient in all objects and parts.
-///
-/// If none reflects, returns the selected material, or else that of the first rectangle, so that
-/// the reflection can be increased from 0 again. Returns `None` if there is neither.
+/// - The selected material, or that of the selected object, if it reflects or transmits.
+/// - The most reflecting material of the selected object and its parts.
+/// - The most reflecting material of the first rectangle that reflects.
+/// - The most reflecting material of all objects and parts.
+/// - The selected material, or that of the first rectangle, so that a reflection can be increased
+///   from 0.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| {
@@ -51,11 +47,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
 }
 
-/// Changes the value of `key` of the material that [`mirror`] finds for `selected`, such as its
-/// `roughness`, `reflection` or `lobe`, by `steps` presses of an arrow key, as [`step`] does.
-///
-/// # Errors
-/// Fails if [`mirror`] finds no material.
+/// Changes `key` of the [`mirror`] by arrow steps, as [`step`] does. Fails if there is no mirror.
 pub fn step_mirror(
     scene: &Scene,
     selected: Option<&Target>,

@@ -1,8 +1,5 @@
-//! Edits of scenes, as pure functions from a scene to a scene. They use no terminal and no clock.
-//! They read only the files that a scene names, each of them once.
-//!
-//! Every function takes a valid scene and returns an [`Edit`] whose scene is valid, or an
-//! [`EditError`] with the reason.
+//! Edits of scenes, as pure functions from a valid scene to an [`Edit`], or to an [`EditError`]
+//! with the reason. They use no terminal and no clock, and read only the files that a scene names.
 
 mod add;
 mod bounds;
@@ -47,11 +44,10 @@ use std::fmt;
 pub struct Edit {
     /// Edited scene, which is valid.
     pub scene: Scene,
-    /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
-    /// one.
+    /// Target to select after the edit.
     pub subject: Target,
-    /// Short description for the undo history: `move cube`, `radius of ball`. Successive edits can
-    /// be merged into one undo step only if they have the same label.
+    /// Label in the undo history, such as `move cube`. Only edits with the same label are
+    /// coalesced.
     pub label: String,
     /// Sentence about a side effect of the edit; `None` if there is none.
     pub note: Option<String>,
@@ -93,9 +89,7 @@ impl EditError {
 }
 
 impl Edit {
-    /// Creates the edit whose result is `scene`, if `scene` is valid; otherwise returns the first
-    /// validation error. `subject` is selected after the edit. `label` is the name of the edit in
-    /// the undo history.
+    /// Creates the edit whose result is `scene`, or returns the first validation error.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {

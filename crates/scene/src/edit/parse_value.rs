@@ -4,8 +4,7 @@ use crate::edit::EditError;
 use crate::format::suggest::did_you_mean;
 use crate::value::{Color, Field, KeyValue, NumberRange, ValueType, number, sanitized, truncated};
 
-/// Parses `text` as a value of `field`. A whole number must be in its range. The ranges of other
-/// numbers are checked later, by the validation of the edited scene.
+/// Parses `text` as a value of `field`. The ranges of numbers that are not whole are checked later.
 pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
     let text = text.trim();
     let wrong = || {
@@ -58,9 +57,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
     }
 }
 
-/// Returns the index in `words` of the word that equals `text`, or else of the only word that
-/// starts with `text`. Case is ignored. Returns `None` if no word or more than one word starts with
-/// `text`.
+/// Returns the index of the word that equals `text`, or else of the only one that starts with it.
+/// Case is ignored.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -91,7 +89,7 @@ pub(super) fn word<'a>(
     })
 }
 
-/// Validates `text` as a name, which must be printable. `what` is the key in the error.
+/// Returns `text` as a name, if it is printable. `what` is the key in the error.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
@@ -105,8 +103,8 @@ fn unquoted(text: &str) -> &str {
     text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
 }
 
-/// Parses numbers that are separated by commas, semicolons or spaces (or the `x` of `640x480` and
-/// `640 x 480`), with or without brackets. Returns `None` if one of them is not a number.
+/// Parses numbers that are separated by commas, semicolons, spaces or the `x` of `640x480`, with or
+/// without brackets.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
@@ -123,15 +121,14 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
-/// Returns `true` if `part` has at least one digit, and apart from digits only signs, points, `e`
-/// and `E`. The words `inf` and `nan` are excluded, because no field accepts them.
+/// Returns `true` if `part` may be a number; no field accepts `inf` and `nan`.
 fn digits(part: &str) -> bool {
     part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// Formats a value of the type `takes`: numbers with the shortest digits, lists without brackets. A
-/// colour is formatted as `#rrggbb` if that is exact, and shorter than its three numbers.
+/// Formats numbers with the shortest digits, lists without brackets, and a colour as `#rrggbb` if
+/// that is exact and shorter.
 pub(super) fn show(takes: ValueType, value: &KeyValue) -> String {
     let list = match value {
         KeyValue::Switch(on) => return on.to_string(),

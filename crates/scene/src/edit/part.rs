@@ -21,12 +21,11 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Returns the mutually exclusive keys of `subject`, of which at most one may be given; empty if it
-/// has none.
+/// Returns the keys of which at most one may be given.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
-        Target::Light(_) => light::KINDS,
+        Target::Light(_) => light::KIND_KEYS,
         Target::Material(_) => &["f0", "metal"],
         Target::Ambient
         | Target::Background
@@ -36,20 +35,27 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     }
 }
 
+/// Expands to the part of `$scene` that `$subject` names.
+macro_rules! part {
+    ($scene:ident, $subject:ident, $get:ident, $($reference:tt)+) => {{
+        let part: Option<$($reference)+ dyn KeyNode> = match $subject {
+            Target::Camera => Some($($reference)+ $scene.camera),
+            Target::View(name) => $scene.cameras.$get(name).map(|camera| camera as _),
+            Target::Ambient => Some($($reference)+ $scene.ambient),
+            Target::Background => Some($($reference)+ $scene.background),
+            Target::Light(i) => $scene.lights.$get(*i).map(|light| light as _),
+            Target::Object(i) => $scene.objects.$get(*i).map(|object| object as _),
+            Target::Material(name) => $scene.materials.$get(name).map(|material| material as _),
+            Target::Film => Some($($reference)+ $scene.film),
+            Target::IntegratorSettings => Some($($reference)+ $scene.trace),
+        };
+        part.ok_or_else(|| EditError::gone($subject))
+    }};
+}
+
 /// Returns the part of `scene` that `subject` names.
 pub(super) fn part<'a>(scene: &'a Scene, subject: &Target) -> Result<&'a dyn KeyNode, EditError> {
-    let part: Option<&dyn KeyNode> = match subject {
-        Target::Camera => Some(&scene.camera),
-        Target::View(name) => scene.cameras.get(name).map(|camera| camera as _),
-        Target::Ambient => Some(&scene.ambient),
-        Target::Background => Some(&scene.background),
-        Target::Light(i) => scene.lights.get(*i).map(|light| light as _),
-        Target::Object(i) => scene.objects.get(*i).map(|object| object as _),
-        Target::Material(name) => scene.materials.get(name).map(|material| material as _),
-        Target::Film => Some(&scene.film),
-        Target::IntegratorSettings => Some(&scene.trace),
-    };
-    part.ok_or_else(|| EditError::gone(subject))
+    part!(scene, subject, get, &)
 }
 
 /// Returns [`part`] as a mutable reference.
@@ -57,29 +63,16 @@ pub(super) fn part_mut<'a>(
     scene: &'a mut Scene,
     subject: &Target,
 ) -> Result<&'a mut dyn KeyNode, EditError> {
-    let part: Option<&mut dyn KeyNode> = match subject {
-        Target::Camera => Some(&mut scene.camera),
-        Target::View(name) => scene.cameras.get_mut(name).map(|camera| camera as _),
-        Target::Ambient => Some(&mut scene.ambient),
-        Target::Background => Some(&mut scene.background),
-        Target::Light(i) => scene.lights.get_mut(*i).map(|light| light as _),
-        Target::Object(i) => scene.objects.get_mut(*i).map(|object| object as _),
-        Target::Material(name) => scene.materials.get_mut(name).map(|material| material as _),
-        Target::Film => Some(&mut scene.film),
-        Target::IntegratorSettings => Some(&mut scene.trace),
-    };
-    part.ok_or_else(|| EditError::gone(subject))
+    part!(scene, subject, get_mut, &mut)
 }
 
-/// Returns the given one of the mutually exclusive keys of `subject`, such as the kind `point` of a
-/// light.
+/// Returns the given one of the [`exclusive_keys`].
 pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static str> {
     let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
     exclusive_keys(subject).iter().find(is_given).copied()
 }
 
-/// Returns the description (type, range, help) of the dotted key `key`, whose parts are keys and
-/// list indices. Returns `None` if there is no such key.
+/// Returns the description of the dotted key `key`; its parts are keys and list indices.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),

@@ -11,13 +11,9 @@ use crate::{Object, Scene, TransformOp};
 use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
-/// Lowers an object until its lowest point rests on the highest surface below it. If there is none
-/// below, raises the object to the lowest surface above. Surfaces are searched on vertical lines
-/// through the centre and the lowest corners of the object.
-///
-/// # Errors
-/// Fails for targets other than objects, and for a plane, because it has no lowest point. Also
-/// fails if there is no surface below or above the object.
+/// Lowers an object onto the highest surface below its centre and its lowest corners, or raises it
+/// to the lowest surface above. Fails for targets other than objects, for planes, and without such
+/// a surface.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
@@ -38,8 +34,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
             let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
             others.iter().filter_map(move |form| {
                 let t = form.cast(from, direction)?;
-                // This sum has a rounding error, which would leave a gap. Rounding to 13 digits
-                // removes the error.
+                // Rounding removes the error of the sum, which would leave a gap.
                 Some(round_significant(from.y + direction.y * t, 13))
             })
         });
@@ -53,7 +48,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
-    // The second and third pass remove the gap that rounding leaves after the first one.
+    // Later passes remove the gap that rounding leaves after the first.
     for _ in 0..3 {
         let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
         lift(dropped, support_height - lowest);
@@ -62,8 +57,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Moves an object up by `by` scene units. The new height is exact, not rounded to a short decimal
-/// number.
+/// Moves an object up by exactly `by`.
 fn lift(object: &mut Object, by: f64) {
     if by == 0.0 {
         return;
@@ -77,8 +71,7 @@ fn lift(object: &mut Object, by: f64) {
     }
 }
 
-/// Returns the points (x, z) at which an object can be supported: the centre of its bounding box,
-/// and its lowest corners.
+/// Returns the points (x, z) that may be supported: the middle and the lowest corners.
 fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
@@ -86,16 +79,13 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let corners = form.corners();
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
-    // Corners are moved slightly inwards, so that other objects that only touch the sides of this
-    // object do not count as its support.
+    // Objects that only touch the sides are no support: corners are moved slightly inwards.
     support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
     support_points
 }
 
-/// Returns a position for a new object: the point for the centre of its underside. `size` has the
-/// object's lengths along x, y and z. The position is on a surface, in a place that is free of
-/// other objects and as near as possible to the middle of the camera's view. Places that the camera
-/// sees are preferred.
+/// Returns a position for the centre of the underside of a new object of `size`: on a surface, free
+/// of other objects, near the middle of the view, and visible if possible.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -126,8 +116,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         !walls.iter().any(|wall| intersects(wall, room))
             && !solids.iter().any(|solid| overlap(*solid, room))
     });
-    // A visible position is best. The second choice is a hidden position inside the picture, and
-    // the third is one outside of the picture.
+    // A hidden position inside the picture is second best.
     let (mut hidden, mut outside) = (None, None);
     for base in free {
         let middle = base + DVec3::Y * (size.y / 2.0);
@@ -142,15 +131,12 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Returns `true` if an object is flat and its slope is less than 60 degrees, so that others can
-/// rest on it.
+/// Returns `true` if an object is flat and its slope is less than 60 degrees.
 fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the ground on the vertical line through the point `at`. It is the height
-/// of the highest of the flat objects `floors` below the point, or of the lowest above it if there
-/// is none below. Returns `None` if there is neither.
+/// Returns the height of the highest of `floors` below `at`, or else of the lowest above.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
@@ -158,7 +144,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if the flat object `form` (a wall) intersects the inside of a box.
+/// Returns `true` if the flat object `form` intersects the inside of a box.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
@@ -176,8 +162,7 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Returns `true` if `point` is inside a picture of `size` pixels, and farther from each edge than
-/// 7.5 % of the width or height. Occlusion by objects is not considered.
+/// Returns `true` if `point` is inside the picture, with a margin of 7.5 %.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
@@ -188,7 +173,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
         && to.dot(up).abs() < 0.85 * half_height * depth
 }
 
-/// Returns `true` if none of the objects `forms` occludes `point` from the eye.
+/// Returns `true` if nothing occludes `point` from the eye.
 fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
     !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
 }

@@ -1,5 +1,4 @@
-//! Properties of an edit target (camera, light, object, material, ...), as an inspector shows them:
-//! one row per key.
+//! Properties of an edit target as an inspector shows them: one row per key.
 
 use crate::Scene;
 use crate::edit::convert::{AIM, KIND};
@@ -13,40 +12,33 @@ use crate::value::{
 /// Word that a property accepts as its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Text of the word. If it is the name of a material, it may contain any character that files
-    /// allow.
+    /// Text of the word. The name of a material may contain any character.
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,
 }
 
-/// Kind of a property's value, by which an inspector chooses the input element.
+/// Kind of a property's value, by which an inspector chooses the input element. Choices, kinds and
+/// lists take [`Property::words`].
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Widget {
-    /// Widget for free text, such as a name.
     Text,
-    /// Widget for a switch: the value is `true` or `false`.
     Switch,
-    /// Widget for a choice: the value is one of [`Property::words`].
     Choice,
-    /// Widget for the kind of a shape or a light: the value is one of [`Property::words`]. The kind
-    /// determines which other properties exist.
+    /// Kind of a shape or a light, which determines the other properties.
     Kind,
-    /// Widget for a list of transform steps. Typing one of [`Property::words`] appends a step of
-    /// that kind.
+    /// List of transform steps, to which a word appends a step.
     List,
-    /// Widget for a number, or for a list of numbers such as a position.
     #[default]
     Numbers,
-    /// Widget for a colour: three numbers, the linear red, green and blue.
     Color,
 }
 
 /// Property of an edit target: one row of an inspector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Property {
-    /// Dotted key, as [`set`](crate::edit::set) requires it: `shape.sphere.radius`,
-    /// `transform.0.rotate_y`.
+    /// Dotted key, such as `shape.sphere.radius`.
     pub key: String,
     /// Label of the property: the last part of the key, with spaces.
     pub label: String,
@@ -56,8 +48,7 @@ pub struct Property {
     pub entry: Widget,
     /// Value as text, in the form in which it can be typed; empty if the key has no value.
     pub value: String,
-    /// Each number of the value as text: the numbers of a list, or the three channels of a colour.
-    /// Empty for other values.
+    /// Each number of the value as text.
     pub components: Vec<String>,
     /// Linear red, green and blue of a colour; `None` for other values.
     pub color: Option<[f64; 3]>,
@@ -75,12 +66,8 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject`, in the order in which the manual of the scene format lists
-/// its keys. The properties of an object's material are not included; they belong to the target
-/// [`Target::material`].
-///
-/// # Errors
-/// Fails if the scene has no such target.
+/// Returns the properties of `subject` in the order of the manual, without those of an object's
+/// material.
 pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
     let part = part(scene, subject)?;
     let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
@@ -95,18 +82,15 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         | Target::IntegratorSettings => None,
     };
     let given = given_key(part, subject);
-    let has_size = match subject {
-        Target::Light(i) => scene.lights[*i].surface().is_some(),
-        _ => true,
+    let light = match subject {
+        Target::Light(i) => scene.lights.get(*i),
+        _ => None,
     };
+    let hidden_key = |name: &str| light.is_some_and(|light| !light.has_key(name));
     for field in fields(subject) {
-        let is_environment = given == Some("environment");
-        if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
-            // Only lights with a size have the key `unit`. Only these lights and environments have
-            // the key `visible`.
+        if hidden_key(field.name) {
             continue;
         }
-        let Some(node) = part.child(field.name) else { continue };
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {
@@ -114,12 +98,14 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
             if exclusive_keys(subject)[0] == field.name {
                 walk.kind(kind, given, kind.name.to_string(), 0);
             }
-            if given == Some(field.name) {
+            if given == Some(field.name)
+                && let Some(node) = part.child(field.name)
+            {
                 walk.field(field, node, field.name.to_string(), 1);
             }
-            continue;
+        } else if let Some(node) = part.child(field.name) {
+            walk.field(field, node, field.name.to_string(), 0);
         }
-        walk.field(field, node, field.name.to_string(), 0);
     }
     Ok(walk.rows)
 }
@@ -264,9 +250,7 @@ pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// Returns a phrase for the accepted values of the type `takes`, such as `3 numbers, not all zero`.
-/// The phrase describes the notation that users type. The manual of the scene format has another
-/// phrase for types whose notation in files differs.
+/// Returns a phrase for the accepted values in the notation that users type.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),

@@ -6,15 +6,12 @@ use crate::value::{floor_log10, rotated_y, rounded_to, sin_cos_degrees};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
-/// Rotates `subject` by `degrees` about the vertical, counter-clockwise seen from above: an object
-/// about its own centre, a light about the centre of the scene.
+/// Rotates an object about its own centre, or a light about that of the scene, by `degrees` about
+/// the vertical, counter-clockwise seen from above.
 ///
-/// An object without a transform is rotated by the keys of its shape, if the shape has such keys.
-/// Any other object gets two steps at the end of its transform, a rotation and a translation. Later
-/// rotations change these two steps.
-///
-/// # Errors
-/// Fails for targets that cannot be rotated.
+/// An object with a transform, or with a shape that has no keys for the rotation, gets a rotation
+/// and a translation at the end of its transform, which later rotations change. Fails for other
+/// targets.
 pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("the angle is not a finite number", ""));
@@ -29,13 +26,11 @@ pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, Edi
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
-            if let Some(direction) = light.direction_mut() {
+            let handles = light.kind.handles();
+            for direction in [handles.direction, handles.up].into_iter().flatten() {
                 *direction = rotated_y(*direction, degrees);
             }
-            if let Some(rectangle) = &mut light.rectangle {
-                rectangle.up = rotated_y(rectangle.up, degrees);
-            }
-            if let Some(position) = light.position_mut() {
+            if let Some(position) = handles.position {
                 let pivot = scene_bounds(scene).center;
                 let offset = std::array::from_fn(|i| position[i] - pivot[i]);
                 let offset = rotated_y(offset, degrees);
@@ -53,9 +48,8 @@ pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, Edi
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Rotates the object about the vertical through its centre. The rotation is written as the steps
-/// `rotate_y` and `translate` at the end of the object's transform. If the transform already ends
-/// with such steps, they are replaced. Steps without effect are removed.
+/// Rotates the object by the steps `rotate_y` and `translate` at the end of its transform, which
+/// are replaced. Steps without effect are removed.
 fn rotate_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
@@ -159,7 +153,7 @@ mod tests {
         for _ in 0..72 {
             round = rotate(&round, &Target::Light(0), 5.0).unwrap().scene;
         }
-        let [a, b] = [&scene, &round].map(|s| DVec3::from(s.lights[0].point.unwrap().position));
+        let [a, b] = [&scene, &round].map(|s| s.lights[0].apex().unwrap());
         assert!((a - b).length() < 1e-4, "{a} {b}");
         assert!(rotate(&scene, &Target::Camera, 5.0).is_err());
         assert!(rotate(&scene, &Target::Light(0), f64::NAN).is_err());

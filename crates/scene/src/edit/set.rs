@@ -10,14 +10,9 @@ use crate::edit::properties::is_material;
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, KeyNode, KeyValue, ValueType, node_at, node_at_mut};
 
-/// Sets `key` of `subject` to the value in `text`. `key` is the key of one of the
-/// [`Property`](crate::edit::Property) rows of `subject`. For the list of transform steps,
-/// `text` is the kind of a step, which is appended. An empty `text` sets an optional key to its
-/// default, and removes a step of a transform, such as `transform.0.rotate_y`.
-///
-/// # Errors
-/// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
-/// be invalid.
+/// Sets `key` of `subject` to the value in `text`. A kind of transform step is appended to a list.
+/// An empty `text` sets an optional key to its default, and removes a transform step. Returns the
+/// reason and the accepted values if this is refused.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     part(scene, subject)?;
@@ -49,11 +44,7 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
     replace(scene, subject, key, value)
 }
 
-/// Sets one number of the value of `key` to `text`; `component` is the number's index, counted from
-/// 0.
-///
-/// # Errors
-/// Returns the errors of [`set`].
+/// Sets the number at index `component` of the value of `key`.
 pub fn set_component(
     scene: &Scene,
     subject: &Target,
@@ -69,8 +60,7 @@ pub fn set_component(
         return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
-    // The whole list is parsed again, so that the rules and error messages for lists apply to the
-    // new number, too.
+    // Parsing the whole list applies its rules and messages to the new number.
     let parts: Vec<_> = list
         .iter()
         .enumerate()
@@ -83,8 +73,7 @@ pub fn set_component(
     set(scene, subject, key, &parts.join(" "))
 }
 
-/// Returns the field of `key`, including `kind` of a light and `aim` of a camera, which are no keys
-/// of scene files. Fails if `subject` has no such key.
+/// Returns the field of `key`, including [`KIND`] and [`AIM`].
 pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, EditError> {
     match (subject, key) {
         (Target::Light(_), "kind") => Ok(&KIND),
@@ -94,8 +83,7 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, Edit
     }
 }
 
-/// Sets `key` to `value`, removes the keys that cannot be given together with `key`, and validates
-/// the edited scene.
+/// Sets `key` to `value` and removes the keys that cannot be given together with it.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
@@ -122,11 +110,7 @@ pub(super) fn replace(
     Ok(Edit::checked(next, subject.clone(), label(scene, subject, key))?.with_note(note))
 }
 
-/// Gives the optional `key`, which `field` describes, its default. If `key` is a step of a
-/// transform, such as `transform.0.rotate_y`, removes this step from the list instead.
-///
-/// # Errors
-/// Fails if the key is required, if there is no such step, or if the edited scene would be invalid.
+/// Gives the optional `key` its default, or removes the transform step that it names.
 fn clear(scene: &Scene, subject: &Target, key: &str, field: &Field) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     if let (Target::Object(object), Some(step)) = (subject, key.strip_prefix("transform.")) {

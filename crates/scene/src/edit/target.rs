@@ -1,55 +1,46 @@
 //! Edit targets: parts of a scene that can be selected and edited.
 
+use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
 
 /// Target of an edit: a part of the scene that can be selected and edited.
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Target {
-    /// Current camera of the scene.
+    /// Current camera.
     #[default]
     Camera,
     /// Stored camera, by its name.
     View(String),
-    /// Ambient light of the scene.
     Ambient,
-    /// Background: the radiance of rays that hit no surface.
     Background,
-    /// Light, by its index in the scene's list of lights, counted from 0.
+    /// Light, by its index.
     Light(usize),
-    /// Object, by its index in the scene's list of objects, counted from 0.
+    /// Object, by its index.
     Object(usize),
     /// Material, by its name.
     Material(String),
-    /// Film settings, such as the size of the picture.
     Film,
-    /// Integrator settings, such as the largest number of reflections.
     IntegratorSettings,
 }
 
-/// Section of the outline: the list of all editable parts of a scene in the dashboard. An edit has
-/// a [`Target`], never a section; sections only group the targets on the screen.
+/// Section of the outline of all targets.
+#[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// Section of the outline that lists the current camera and the stored cameras.
     Camera,
-    /// Section of the outline that lists the ambient light and the background.
     Surroundings,
-    /// Section of the outline that lists all lights of the scene.
     Lights,
-    /// Section of the outline that lists the objects of which a part or the whole has a reflecting
-    /// material.
+    /// Objects with a material that reflects.
     Mirrors,
-    /// Section of the outline that lists the objects without a reflecting material.
     Objects,
-    /// Section of the outline that lists all materials of the scene.
     Materials,
-    /// Section of the outline that lists the settings of film and integrator.
     Picture,
 }
 
 impl Section {
-    /// Returns the heading of this section in the dashboard's list of all parts of the scene.
+    /// Returns the heading of the section.
     pub fn title(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -63,8 +54,7 @@ impl Section {
     }
 }
 
-/// Returns all edit targets of the scene, each once, in the order in which the dashboard lists
-/// them. Each is a pair `(section of the list, target)`.
+/// Returns all targets, each once, with their sections, in the order of the dashboard's list.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
@@ -87,9 +77,8 @@ pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
     mirror_of(scene, index).is_some()
 }
 
-/// Returns `(name, coefficient)`: the material with the largest reflection coefficient in the
-/// object at `index` and its parts, and this coefficient. Returns `None` if none of its materials
-/// reflects.
+/// Returns the material with the largest reflection coefficient in an object and its parts, and
+/// this coefficient; `None` if none reflects.
 pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
     let known =
@@ -98,24 +87,12 @@ pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
 }
 
 impl Target {
-    /// Returns `true` if `scene` contains the light, object, material or stored camera that this
-    /// target names. Every scene has the other targets.
+    /// Returns `true` if `scene` has the target.
     pub fn exists(&self, scene: &Scene) -> bool {
-        match self {
-            Self::View(name) => scene.cameras.contains_key(name),
-            Self::Light(i) => *i < scene.lights.len(),
-            Self::Object(i) => *i < scene.objects.len(),
-            Self::Material(name) => scene.materials.contains_key(name),
-            Self::Camera
-            | Self::Ambient
-            | Self::Background
-            | Self::Film
-            | Self::IntegratorSettings => true,
-        }
+        part(scene, self).is_ok()
     }
 
-    /// Returns the path of the target in a scene file: keys and list indices (from 0), such as
-    /// `object`, `3`.
+    /// Returns the path in a scene file: keys and list indices, such as `object`, `3`.
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
@@ -131,9 +108,8 @@ impl Target {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// Returns the name of the target in the dashboard's list: `lamp`, `light 2`. An object without
-    /// a name is named by its kind and its number among all objects: `sphere 3` is the third
-    /// object. Names from files are sanitised and truncated to 40 characters.
+    /// Returns the name in the dashboard's list: `lamp`, `light 2`, or `sphere 3` for the third
+    /// object.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {

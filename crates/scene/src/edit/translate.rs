@@ -2,20 +2,15 @@
 
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
-use crate::light::{Directional, Light};
+use crate::light::Light;
 use crate::value::{floor_log10, rounded_to, unit};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
-/// Moves an object, a light, the current camera or a stored camera by the vector `by`, in scene
-/// units. If an object has no transform, the coordinates in its shape change. Otherwise, or if its
-/// shape has no coordinates (a mesh), a translation by `by` is added as the last step of its
-/// transform, or added to a translation that is the last step. A directional light changes its
-/// direction: it is treated as a lamp that moves by `by` and stays aimed at the origin. The lamp's
-/// distance from the origin is three times the radius of the scene's bounding sphere.
-///
-/// # Errors
-/// Fails for targets that cannot be moved, and for new coordinates beyond the largest valid one.
+/// Moves an object, a light or a camera by a vector in scene units. An object with a transform, or
+/// without coordinates in its shape, gets a translation as the last step. A directional light is
+/// treated as a lamp that moves by `by` and stays aimed at the origin, from three radii of the
+/// scene. Fails for other targets, and for coordinates out of range.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("the distance is not a finite number", ""));
@@ -48,8 +43,7 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Returns the point `at + by`. Each coordinate that changes is rounded to a multiple of `p /
-/// 1000`, where `p` is the largest power of ten that is at most the absolute change.
+/// Returns `at + by`, where changes are rounded to a thousandth of their power of ten.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],
@@ -76,15 +70,14 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
 }
 
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
-    if let Some(position) = light.position_mut() {
+    let handles = light.kind.handles();
+    if let Some(position) = handles.position {
         *position = moved(*position, by);
-    }
-    if let Some(Directional { direction }) = &mut light.directional {
+    } else if let Some(direction) = handles.direction {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
-        // If the lamp is at the origin, it has no direction towards the origin. The light then
-        // stays unchanged.
+        // A lamp at the origin has no direction to it.
         if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }
@@ -94,6 +87,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::Directional;
     use crate::shape::Shape;
     use crate::testing::mirror_room;
 
@@ -120,11 +114,10 @@ mod tests {
         let mut scene = mirror_room();
         let lamp = Target::Light(0);
         let edit = move_by(&scene, &lamp, [0.0, 0.1, 0.0]).unwrap();
-        assert_eq!(edit.scene.lights[0].point.unwrap().position, [2.0, 4.1, 3.0]);
-        scene.lights[0].point = None;
-        scene.lights[0].directional = Some(Directional { direction: [0.0, -2.0, 0.0] });
+        assert_eq!(edit.scene.lights[0].position(), Some([2.0, 4.1, 3.0]));
+        scene.lights[0].kind = Directional::along([0.0, -2.0, 0.0]).into();
         let edit = move_by(&scene, &lamp, [1.0, 0.0, 0.0]).unwrap();
-        let [x, y, z] = edit.scene.lights[0].directional.unwrap().direction;
+        let [x, y, z] = edit.scene.lights[0].direction().unwrap();
         assert!(x < 0.0 && y < 0.0 && z == 0.0, "{x} {y} {z}");
     }
 

@@ -2,9 +2,8 @@
 
 use crate::Scene;
 
-/// Returns `wanted` if `taken(wanted)` is `false`. Otherwise returns `wanted` with the smallest
-/// number from 2 for which `taken` is `false`: `cube`, `cube 2`, `cube 3`. A number at the end of
-/// `wanted` is replaced.
+/// Returns `wanted` if it is free, otherwise with the smallest free number from 2: `cube 2`. A
+/// number at its end is replaced.
 pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     if !wanted.is_empty() && !taken(wanted) {
         return wanted.to_string();

@@ -5,11 +5,8 @@ use crate::edit::parse_value::name;
 use crate::edit::unique_name::free_view;
 use crate::edit::{Edit, EditError, Target};
 
-/// Stores the current camera under the name `given`. A stored camera of that name is replaced. If
-/// `given` is `None`, the name is the first free one of `view`, `view 2` and so on.
-///
-/// # Errors
-/// Fails if the name is empty, longer than 60 characters or not printable.
+/// Stores the current camera under the name `given`, or under the first free one of `view`, `view
+/// 2` and so on. Fails if the name is empty or not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
     let name = match given {
         Some(given) => name("name", given)?,
@@ -27,9 +24,6 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
 }
 
 /// Makes the stored camera `name` the current camera.
-///
-/// # Errors
-/// Fails if there is no stored camera of that name.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
     let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;

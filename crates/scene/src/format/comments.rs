@@ -1,21 +1,18 @@
-//! Order of the tables in scene files, and comments above removed tables. An empty line between a
-//! comment and the table below it means that the comment belongs to the file, not to the table.
+//! Order of the tables in scene files, and comments above removed tables. An empty line below a
+//! comment means that it belongs to the file, not to the table.
 
 use crate::value::sort_by_number;
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Comments that stay in a scene file although the tables below them are removed. A comment stays
-/// if an empty line separates it from its table.
+/// Comments of the file above removed tables.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// One pair for each removed table with a comment that stays: `(ordinal number of the table in
-    /// the file, comment)`.
+    /// Position of each removed table, and its comment.
     comments: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
-    /// Records the comments that stay in the file when `item` is removed: those that an empty line
-    /// separates from the tables below them in `item`.
+    /// Records the comments that stay when `item` is removed.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -36,8 +33,8 @@ impl CommentKeeper {
         }
     }
 
-    /// Restores each recorded comment above the first table that remains after the comment's
-    /// removed table. If none remains, puts the comment at the end of the file.
+    /// Restores each comment above the first table that remains after the removed one, or at the
+    /// end.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         sort_by_number(&mut comments, |(position, _)| -*position as i64);
@@ -66,7 +63,7 @@ impl CommentKeeper {
     }
 }
 
-/// Calls `act` for every table inside of `table`, at any depth, that has a header in the file.
+/// Calls `act` for every table inside `table` that has a header in the file.
 fn for_each_table(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
     for (_, item) in table.iter_mut() {
         match item {
@@ -91,8 +88,7 @@ fn prefix(table: &Table) -> &str {
     table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
 }
 
-/// Splits `above`, the text above a table, after its last empty line. Returns `(first part, second
-/// part)`: comments in the first part belong to the file, those in the second part to the table.
+/// Splits the text above a table into the comments of the file and those of the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;
@@ -112,9 +108,8 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Sets the positions of `tables` in the file so that they are written in the order of the slice.
-/// `from` has one entry for each table: its index before the edit, or `None` for a new table.
-/// Nothing changes if the old tables keep their order and new tables come last.
+/// Lets the file have `tables` in the order of the slice. `from` has their indices before the edit,
+/// `None` for new ones. Nothing changes if the old order is kept and new tables come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);
@@ -125,8 +120,7 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let Some(top) = tables.iter().position(|t| t.position() == first && first.is_some()) else {
         return;
     };
-    // An empty line may separate a comment from the first table. This comment stays at the top when
-    // the table moves.
+    // A comment of the file above the first table stays at the top.
     let (separate, table_comment) = split(prefix(&tables[top]));
     let (separate, table_comment) = (separate.to_string(), table_comment.to_string());
     if top > 0 && separate.contains('#') {
@@ -139,8 +133,8 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     tables[0].set_position(first);
 }
 
-/// Removes the positions of `table` and of its inner tables in the file. A table without a position
-/// is written after the previous table.
+/// Removes the positions of `table` and its inner tables, which are then written after the previous
+/// table.
 fn forget_place(table: &mut Table) {
     table.set_position(None);
     for_each_table(table, &mut |inner| inner.set_position(None));

@@ -1,12 +1,10 @@
-//! Writing of new parts of a scene file. Only values that differ from the defaults are written, in
-//! the layout of the manual.
+//! Writing of new parts of a scene file, without default values, in the layout of the manual.
 
 use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, InlineTable, Item, Table};
 
-/// Returns the TOML item for a new `value` in a scene file. `takes` is the type of `value`. If
-/// `headers` is `true`, tables may have `[headers]`; otherwise they are inline.
+/// Returns the item for a new `value`. Tables may have `[headers]` if `headers` is `true`.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     let item = |table: Table| match headers {
         true => Item::Table(table),
@@ -42,28 +40,25 @@ fn inline_list(fields: &'static [Field], list: &[Value]) -> Item {
     Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
 }
 
-/// Returns a colour as a TOML value: a list of three numbers. If some of them are not whole numbers
-/// and `#rrggbb` represents the colour exactly, returns this form instead.
+/// Returns a colour as a list, or as `#rrggbb` if that is exact and the numbers are not whole.
 fn color_leaf(value: &Value) -> toml_edit::Value {
     let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
     code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
 }
 
-/// Returns a value of three numbers as a colour; `None` for any other value.
+/// Returns a value of three numbers as a colour.
 pub(crate) fn color(value: &Value) -> Option<Color> {
     let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
     channels.try_into().ok().map(Color)
 }
 
-/// Returns the table for `value`, an entry of a list in a scene file. `fields` are the keys that
-/// the entry may have. The table can be converted to an inline table.
+/// Returns the table for `value`, an entry of a list.
 pub(crate) fn fresh_entry(fields: &'static [Field], value: &Value) -> Table {
     value.as_table().map_or_else(Table::new, |table| fresh_table(fields, table))
 }
 
-/// Returns a table with the entries of `values` that differ from the defaults of their keys. Inner
-/// tables are inline. The exceptions are tables in which exactly one key may be given (`shape`,
-/// `view_angle`): they have dotted keys.
+/// Returns a table with the `values` that differ from their defaults. Inner tables are inline,
+/// except for kinds (`shape`, `view_angle`), which have dotted keys.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
     for field in fields {
@@ -76,8 +71,7 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
     table
 }
 
-/// Parses `text`, the TOML notation of a key's default value. Returns `None` if `text` is not valid
-/// TOML.
+/// Parses the TOML notation of a default value.
 pub(crate) fn preset(text: &str) -> Option<Value> {
     format!("value = {text}").parse::<toml::Table>().ok()?.remove("value")
 }
@@ -90,7 +84,7 @@ fn is_default(field: &Field, value: &Value) -> bool {
     }
 }
 
-/// Returns `value`, which is not a table, as a TOML value. Lists have the layout `[1.0, 2.0]`.
+/// Returns `value`, which is not a table, in the layout `[1.0, 2.0]`.
 pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     match value {
         Value::String(text) => text.as_str().into(),
@@ -109,8 +103,7 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// Returns `number` with the shortest digits that are read back exactly. Very large and very small
-/// numbers have an exponent.
+/// Returns the shortest digits that are read back exactly, with an exponent if it saves zeros.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

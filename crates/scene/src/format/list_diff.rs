@@ -1,20 +1,16 @@
-//! Alignment of lists in scene files: finds the entries of an edited list in the list before the
-//! edit.
+//! Alignment of a list of a scene file before and after an edit.
 
 use std::collections::{BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use toml::Value;
 
 /// Returns for each entry of `new` the index of its origin in `old`, or `None` for an added entry.
-/// No index occurs twice. The origin of an entry is the first of the following that exists:
+/// No index occurs twice. The origin is the first of the following, in time n log n:
 ///
 /// - an old entry of the same name,
-/// - an old entry that is equal to it,
-/// - the first old entry that differs from it only in the name, or that has no name if the new
-///   entry has none either. It must lie between two origins: those of the previous and of the next
-///   new entry that has one.
-///
-/// The time is n log n for n entries.
+/// - an old entry that is equal,
+/// - the first old entry, between the origins of the neighbours, that differs only in the name, or
+///   that has no name either.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = Free::of(old);
     let mut from = vec![None; new.len()];
@@ -24,8 +20,7 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     for (origin, entry) in from.iter_mut().zip(new).filter(|(origin, _)| origin.is_none()) {
         *origin = free.take_equal(entry);
     }
-    // `next[j]` is the origin of the first new entry after entry j that has an origin, or else the
-    // length of `old`.
+    // Origin of the first later entry that has one, or the length of `old`.
     let mut next = vec![old.len(); new.len()];
     for j in (1..new.len()).rev() {
         next[j - 1] = from[j].unwrap_or(next[j]);
@@ -40,8 +35,7 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     from
 }
 
-/// Entries of the old list that are not yet the origin of a new entry. They can be found by name
-/// and by contents.
+/// Old entries that are not an origin yet.
 struct Free<'a> {
     entries: &'a [Value],
     named: HashMap<&'a str, BTreeSet<usize>>,
@@ -72,24 +66,21 @@ impl<'a> Free<'a> {
         free
     }
 
-    /// Takes the first unmatched old entry with the name of `entry`. Returns its index; `None` if
-    /// there is no such entry.
+    /// Takes the first old entry with the name of `entry`.
     fn take_named(&mut self, entry: &Value) -> Option<usize> {
         let first = *self.named.get(name(entry)?)?.first()?;
         Some(self.take(first))
     }
 
-    /// Takes the first unmatched old entry that is equal to `entry`. Returns its index; `None` if
-    /// there is no such entry.
+    /// Takes the first old entry that is equal to `entry`.
     fn take_equal(&mut self, entry: &Value) -> Option<usize> {
         let alike = self.equal.get(&hash(entry, true))?;
         let first = alike.iter().copied().find(|i| self.entries[*i] == *entry)?;
         Some(self.take(first))
     }
 
-    /// Takes the first unmatched old entry with an index in `after..before` that fits `entry`: it
-    /// differs from `entry` only in its name, or neither of the two has a name. Returns its index;
-    /// `None` if there is no such entry.
+    /// Takes the first old entry in `after..before` that differs only in its name, or has none
+    /// either.
     fn take_edited(&mut self, entry: &Value, after: usize, before: usize) -> Option<usize> {
         let renamed = self.equal_but_name.get(&hash(entry, false)).and_then(|alike| {
             let mut between = alike.range(after..before).copied();

@@ -1,13 +1,10 @@
-//! Parts of a scene file. Only one part is parsed at a time, as a TOML document of its own, because
-//! a parsed document takes about a hundred times the memory of its text.
-//!
-//! A part consists of whole `[[object]]` sections, or of everything else in the file.
+//! Parts of a scene file: whole `[[object]]` sections, or everything else. Only one part is parsed
+//! at a time, because a parsed document takes about a hundred times the memory of its text.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Smallest length in bytes of a part of a scene file. Once a part has this length, the next
-/// `[[object]]` begins a new one. Files up to this length have one part.
+/// Smallest length in bytes of a part; the next `[[object]]` then begins a new one.
 pub(crate) const PART_BYTES: usize = 256 << 10;
 
 /// Part of a scene file that is parsed as a TOML document of its own.
@@ -44,8 +41,7 @@ impl Part {
         }
     }
 
-    /// Returns the index in the whole file of this part's first entry of the list at `path`. Only
-    /// the list of objects is divided among parts; for all other lists the index is 0.
+    /// Returns the index of this part's first entry of the list at `path` in the whole file.
     pub fn first_index(&self, path: &[String]) -> usize {
         match path {
             [list] if list == "object" => self.first_object,
@@ -65,11 +61,9 @@ impl Part {
     }
 }
 
-/// Divides a file into parts. The first part has everything except the objects; each other part has
-/// consecutive objects. A part of objects has at least `part_bytes` bytes, unless the file ends or
-/// a section follows that is no object. Returns a single part if the file has at most `part_bytes`
-/// bytes or no objects. Also returns a single part if a table of an object, such as
-/// `[object.shape]`, follows a section of another kind.
+/// Divides a file into parts: everything except the objects, then consecutive objects of at least
+/// `part_bytes` bytes. A file has a single part if it is short, or if a table of an object follows
+/// a section of another kind.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text);
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
@@ -105,8 +99,7 @@ pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     parts
 }
 
-/// Returns the sections of a TOML document, each as `(byte offset of its first line, kind of its
-/// header)`. A section is the text from one header to the next. The first one begins at 0.
+/// Returns the first byte and the kind of header of each section of a TOML document.
 fn sections(text: &str) -> Vec<(usize, Header)> {
     let bytes = text.as_bytes();
     let mut sections = vec![(0, Header::Other)];
@@ -160,8 +153,7 @@ fn end_of_line(bytes: &[u8], at: usize) -> usize {
     bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length)
 }
 
-/// Returns the byte offset after the TOML string that begins with the quotation mark at `at`. A
-/// single-line string without an end is taken to end with the line.
+/// Returns the byte offset after the TOML string at `at`. A single-line string ends with its line.
 fn end_of_string(bytes: &[u8], at: usize) -> usize {
     let quote = bytes[at];
     let is_quoted = |at: usize, marks: usize| {
@@ -174,8 +166,8 @@ fn end_of_string(bytes: &[u8], at: usize) -> usize {
             b'\\' if quote == b'"' => at += 1,
             b'\n' if marks == 1 => return at,
             _ if is_quoted(at, marks) => {
-                // The content of a multi-line string may end with one or two quotation marks,
-                // before the three that close it.
+                // A multi-line string may end with one or two quotation marks before the three that
+                // close it.
                 let more = if marks == 3 {
                     (3..5).take_while(|n| is_quoted(at, n + 1)).count()
                 } else {

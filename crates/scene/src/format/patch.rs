@@ -1,10 +1,6 @@
-//! Patches of the text of a scene file by the difference between two scenes.
-//!
-//! Scenes are compared as trees of TOML values; text of equal values is not touched. A key that is
-//! not in the text has its default; it is written only when its value differs from the default.
-//!
-//! The comparison is needed because saving does not know which keys have changed. Undo, redo and
-//! recovery of edits restore whole scenes, and one save covers any number of edits.
+//! Patches of the text of a scene file by the difference between two scenes, as trees of TOML
+//! values. Undo, redo and recovery restore whole scenes, so that saving does not know which keys
+//! have changed. A key that is not in the text is written only if it differs from its default.
 
 use crate::format::comments::CommentKeeper;
 use crate::format::emit::{color, fresh, fresh_entry, leaf};
@@ -21,8 +17,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     patch_table(&mut keeper, document.as_table_mut(), true, old, new, scene);
     keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
-        // A file without any key is not a valid scene. At least the size of the picture is
-        // therefore written.
+        // A file without any key is not a valid scene.
         if let Some(size) = new.get("film").and_then(|film| film.get("size")) {
             let mut film = toml_edit::Table::new();
             film.insert("size", Item::Value(leaf(size)));
@@ -31,8 +26,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     }
 }
 
-/// Returns `true` if `item` adds nothing to the text: it is missing, an empty list of tables, or a
-/// table without header and values.
+/// Returns `true` if `item` adds nothing to the text.
 fn is_nothing(item: &Item) -> bool {
     match item {
         Item::None => true,
@@ -42,9 +36,7 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Returns the keys whose values are compared between the tables `old` and `new` of the type
-/// `takes`, each with the type of its value: all keys of the type, or the names that occur in
-/// either table. Keys that only `new` has are added to the file in this order.
+/// Returns the keys of a table of the type `takes`, each with the type of its value.
 fn keys(takes: ValueType, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
     match takes {
         ValueType::Table(fields) | ValueType::OneOf(fields) => {
@@ -58,9 +50,8 @@ fn keys(takes: ValueType, old: &toml::Table, new: &toml::Table) -> Vec<(String, 
     }
 }
 
-/// Changes `table`, which describes `old`, to describe `new`. `takes` is the type of the table.
-/// Inner tables may have `[headers]` if `headers` is `true`. The comments of removed tables go to
-/// `keeper`.
+/// Changes `table`, which describes `old`, to describe `new`. Inner tables may have `[headers]` if
+/// `headers` is `true`.
 fn patch_table(
     keeper: &mut CommentKeeper,
     table: &mut dyn TableLike,
@@ -82,8 +73,7 @@ fn patch_table(
             _ => {}
         }
     }
-    // If exactly one key was removed, the first new key takes over its comments. Examples are the
-    // key of a shape that was converted to another kind, and `direction` in place of `target`.
+    // A new key takes over the comments of a single removed one, such as the kind of a shape.
     let successor = added.first().filter(|_| removed.len() == 1);
     for key in removed {
         let decor = table.key(&key).map(|k| k.leaf_decor().clone());
@@ -199,10 +189,8 @@ fn patch_list(
     }
 }
 
-/// Finds the inner tables of `table` that were renamed between `old` and `new`, renames them in
-/// place and keeps their comments. A table counts as renamed if its name is only in `old`, and
-/// `new` has a table with equal values under a name that is only in `new`. Returns `old` with the
-/// new names.
+/// Renames the inner tables of `table` that have equal values under a name only in `old` and one
+/// only in `new`. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -223,10 +211,7 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes the comment after the last comma of `list`, which follows the last entry, and returns
-/// the comment. Callers set `followed` to `true` if they append another entry, before which they
-/// write the comment. If `followed` is `false` or there is no such comment, returns an empty string
-/// and changes nothing.
+/// Removes and returns the comment after the last comma of `list`, if an entry follows.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {
@@ -248,8 +233,7 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// Replaces the value of `item`, which is not a table, by `new`. In a list of numbers, only the
-/// numbers that differ from `old` are replaced.
+/// Replaces the value of `item`, which is not a table; in a list, only the numbers that differ.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
         *item = Item::Value(leaf(new));

@@ -14,47 +14,33 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Size of the largest scene file that is read [bytes]. A file of this size has about four million
-/// objects.
+/// Size of the largest scene file [bytes]: about four million objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
-/// Estimated peak memory per byte of a scene file, in bytes. The peak occurs while the file is read
-/// and its objects are converted for rendering. A million spheres in 53 MB take 768 MB. Files with
-/// shorter objects take more per byte.
+/// Estimated peak memory per byte of a scene file, while its objects are converted for rendering. A
+/// million spheres in 53 MB take 768 MB; shorter objects take more per byte.
 const SCENE_BYTES: u64 = 20;
 
 impl Scene {
-    /// Reads and validates the scene file at `path`.
-    ///
-    /// # Errors
-    /// Returns the first 100 errors, with line and column: not readable, not UTF-8, not TOML,
-    /// unknown keys, wrong types, values out of range, undefined names. Values are validated only
-    /// if there are no errors in keys and types.
+    /// Reads and validates the scene file at `path`. Returns the first 100 errors, with line and
+    /// column. Values are validated only without errors in keys and types.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         Document::read(path, Arc::default()).map(Document::into_scene)
     }
 
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
-    /// in the scene are relative to the folder of `name`.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics, to whose folder file
+    /// names are relative. Returns the errors of [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    /// Parses and validates a scene like [`Scene::parse`]. `resolver` reads the files that the
-    /// scene refers to.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses a scene like [`Scene::parse`]; `resolver` reads the files that it refers to.
     pub fn parse_in(text: &str, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         SourceScene::parse(text, name, resolver).map(|source| source.scene)
     }
 }
 
-/// Valid scene and the text that describes it. The text has been parsed once, part by part, and the
-/// scene has been validated once.
+/// Valid scene, and the text that describes it.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     name: &'a str,
@@ -63,10 +49,7 @@ pub(crate) struct SourceScene<'a> {
 }
 
 impl<'a> SourceScene<'a> {
-    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics.
     pub(crate) fn parse(
         text: &'a str,
         name: &'a str,
@@ -84,8 +67,7 @@ impl<'a> SourceScene<'a> {
     ) -> Result<Self, SceneErrors> {
         let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
-            // The objects outside of `[[object]]` sections belong to the same list; the file is
-            // therefore parsed again as a whole.
+            // The other objects belong to the same list: the file is parsed again as a whole.
             return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
@@ -100,9 +82,8 @@ impl<'a> SourceScene<'a> {
         Err(SceneErrors::new(errors.located((name, text))))
     }
 
-    /// Reads the scene from the parts of the text and checks keys and types. Values are validated
-    /// later. Returns `false` if the file has objects outside of `[[object]]` sections and must
-    /// therefore be read as a whole.
+    /// Reads the parts and checks keys and types. Returns `false` if the file has objects outside
+    /// `[[object]]` sections and must be read as a whole.
     fn read_parts(&mut self) -> Result<bool, SceneErrors> {
         let (name, text) = (self.name, self.text);
         let mut errors = FirstDiagnostics::default();
@@ -210,8 +191,7 @@ pub(crate) fn read_text(
         return Err(fail(&format!("the scene {missing}"), help));
     }
     let mut bytes = Vec::new();
-    // Reading stops one byte above the limit: this byte shows that a file is too large, and an
-    // endless device is not read for ever.
+    // The byte above the limit shows that a file is too large, or an endless device.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(

@@ -1,5 +1,5 @@
-//! Schema validation of a scene file against the tables that list its keys and their types: unknown
-//! keys, values of a wrong type, missing keys. One pass finds all errors.
+//! Schema validation of a scene file: unknown keys, values of a wrong type, missing keys, in one
+//! pass.
 
 use crate::camera;
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
@@ -68,15 +68,14 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Adds the schema errors (unknown keys, wrong types, missing keys) in `root` to `errors`. `root`
-/// is the parsed `part` of the scene file.
+/// Adds the schema errors of `root`, the parsed `part` of the file.
 pub(crate) fn check(root: &Spanned<DeTable>, part: &Part, errors: &mut FirstDiagnostics) {
     let mut walk = SchemaChecker { part, root: root.get_ref(), path: Vec::new(), errors };
     walk.table(root.get_ref(), 0..0, FIELDS);
 }
 
-/// Formats a path of keys as a phrase: `shape.sphere`, `step 2 of transform`,
-/// `shape.cube of part 1 of shape.union`.
+/// Formats a path as a phrase: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
+/// shape.union`.
 fn phrase(keys: &[String]) -> String {
     let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
     if let Some(of) = keys.iter().rposition(|key| key == "of")
@@ -111,8 +110,7 @@ impl SchemaChecker<'_> {
         });
     }
 
-    /// Returns the keys of the current path below the table that diagnostics name (an object,
-    /// light, material, camera or another table): `shape.sphere` for the path
+    /// Returns the current path below the table that diagnostics name: `shape.sphere` for
     /// `object.3.shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
@@ -122,8 +120,7 @@ impl SchemaChecker<'_> {
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
-    /// Adds an error about `value`, which has the wrong type. `span` is its byte range in this part
-    /// of the file. `expected` describes valid values.
+    /// Adds an error about `value`, which has the wrong type.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         if self.errors.skips(self.part.in_file(span.start)) {
             return;
@@ -135,9 +132,7 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about the unknown key `key`. The error suggests the most similar name in
-    /// `fields`. Returns this name. Returns `None` if no name is similar, or if the error is only
-    /// counted, because enough errors earlier in the file are stored.
+    /// Adds an error about an unknown key, and returns the most similar name in `fields`.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -205,15 +200,29 @@ impl SchemaChecker<'_> {
         }
     }
 
+    /// Adds an error if the table of a light, whose byte range is `span`, has no kind or several.
+    fn kind_of_light(&mut self, table: &DeTable, span: ops::Range<usize>) {
+        let is_known = |key: &str| light::FIELDS.iter().any(|field| field.name == key);
+        let is_kind = |key: &str| light::KIND_KEYS.contains(&key);
+        let mut given: Vec<_> = table.keys().filter(|key| is_kind(key.get_ref())).collect();
+        sort_by_number(&mut given, |key| key.span().start as i64);
+        let names: Vec<&str> = given.iter().map(|key| key.get_ref().as_ref()).collect();
+        let may_be_mistyped = given.is_empty() && !table.keys().all(|key| is_known(key.get_ref()));
+        if let Err((found, expected)) = light::check_kinds(&names)
+            && !may_be_mistyped
+        {
+            let span = given.get(1).map_or(span, |second| second.span());
+            self.add(span, found, format!("Expected {expected}."));
+        }
+    }
+
     fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>) {
         self.path.push(field.name.to_string());
         self.value(field, value);
         self.path.pop();
     }
 
-    /// Validates a list of tables. Calls `each` for every entry that is a table; during the call,
-    /// the current path ends with the index of the entry. Adds an error for any other entry;
-    /// `expected` describes valid entries.
+    /// Validates a list of tables: calls `each` for every table, with the path of the entry.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],
@@ -241,7 +250,12 @@ impl SchemaChecker<'_> {
                 self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
             }
             (ValueType::Tables(fields), DeValue::Array(list)) => {
-                self.entries(list, "a table", |w, t, s| w.table(t, s, fields()));
+                self.entries(list, "a table", |w, t, s| {
+                    w.table(t, s.clone(), fields());
+                    if field.name == "light" {
+                        w.kind_of_light(t, s);
+                    }
+                });
             }
             (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {
@@ -272,9 +286,8 @@ impl SchemaChecker<'_> {
     }
 }
 
-/// Returns `true` if a value that is not a table has the type `takes`. A whole number must also be
-/// within its range, because the unsigned integers in a scene's fields cannot store other numbers.
-/// Other ranges are checked in [`Scene::faults`](crate::Scene::faults).
+/// Returns `true` if a value that is not a table has the type `takes`. Whole numbers must be in
+/// range, because the fields of scenes cannot store others.
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),

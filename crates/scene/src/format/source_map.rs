@@ -7,8 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Returns line and column of the byte offset `at` in `text`. Both are counted from 1; columns
-/// count characters.
+/// Returns line and column of the byte offset `at`, counted from 1 in characters.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     LineCounter::new(text).line_column(at)
 }
@@ -26,8 +25,7 @@ impl<'a> LineCounter<'a> {
         Self { text, counted: 0, lines: 0 }
     }
 
-    /// Returns line and column of the byte offset `at`. Both are counted from 1; columns count
-    /// characters. `at` must not be less than in the previous call.
+    /// Returns line and column of `at`, which must not be less than in the previous call.
     pub fn line_column(&mut self, at: usize) -> (usize, usize) {
         let mut at = at.min(self.text.len());
         while !self.text.is_char_boundary(at) {
@@ -43,8 +41,7 @@ impl<'a> LineCounter<'a> {
     }
 }
 
-/// Returns the byte range of the value at `path` in a scene file. If the file does not have this
-/// value, returns the range of its nearest ancestor.
+/// Returns the byte range of the value at `path`, or of its nearest ancestor.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let mut keys = path.iter();
     let Some(mut value) = keys.next().and_then(|key| root.get(key.as_str())) else { return 0..0 };
@@ -60,8 +57,7 @@ fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     value.span()
 }
 
-/// Adds diagnostics for `problems` of the scene to `found`. `text` is the text of the scene file,
-/// which consists of `parts`. The parts that contain the problems are parsed again.
+/// Adds diagnostics for `problems`. The parts that contain them are parsed again.
 pub(crate) fn locate(
     text: &str,
     parts: &[Part],
@@ -96,9 +92,8 @@ pub(crate) fn locate(
     }
 }
 
-/// Returns the name that diagnostics use for the table at `path` in the file: `object "queen"`.
-/// `root` is a part of the file. `first_object` is the index of the first object of this part among
-/// all objects of the file.
+/// Returns the name of the table at `path` in diagnostics. `root` is a part of the file, whose
+/// objects begin with `first_object`.
 pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
     subject(path, |list, index| {
         let index = if list == "object" { index.checked_sub(first_object)? } else { index };

@@ -2,8 +2,7 @@
 
 use crate::value::truncated;
 
-/// Returns the word of `words` most similar to `given`. Returns `None` if `given` is unlikely to be
-/// that word with typing errors.
+/// Returns the word most similar to `given`, if typing errors may explain the difference.
 pub(crate) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
@@ -18,16 +17,14 @@ pub(crate) fn nearest<'a>(
     (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
-/// Returns the question ` Did you mean "word"?` with the word of `words` most similar to `given`,
-/// or an empty string if `given` is unlikely to be one of them.
+/// Returns ` Did you mean "word"?` with the [`nearest`] word, or an empty string.
 pub(crate) fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
     let word = nearest(given, words).map(truncated);
     word.map_or(String::new(), |word| format!(" Did you mean \"{word}\"?"))
 }
 
-/// Returns the optimal string alignment distance of `a` and `b`, ignoring case: the smallest number
-/// of insertions, deletions, replacements and transpositions of adjacent characters that turn `a`
-/// into `b`.
+/// Returns the optimal string alignment distance, ignoring case: insertions, deletions,
+/// replacements and transpositions of adjacent characters.
 fn distance(a: &str, b: &str) -> usize {
     strsim::osa_distance(&a.to_lowercase(), &b.to_lowercase())
 }

@@ -1,252 +1,419 @@
-//! Compiled lights with a size (emitters): ray intersection, sampling by solid angle or area,
-//! densities.
+//! Emitters: surfaces that emit light, compiled for the kernels. A light with a size is an emissive
+//! surface without a body; an emissive object is one with a body.
+//!
+//! A point that is sampled on an object is lifted off its surface to the side of the receiver, so
+//! that the object does not occlude its own points. The lift is along the normal and larger than
+//! the rounding errors of the surface. It therefore suffices for rays at any angle.
 
-use crate::light::area::EmitterSurface;
-use crate::light::{Light, LightSample, LightUnit};
+use crate::light::solid_angle::{Cone, SphericalRectangle, density_of_area};
+use crate::light::triangles::{FacesSeen, MAX_FACES, Triangle};
+use crate::light::{EmissiveSurface, LightSample, LightUnit};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
-use zerkalo_kernel::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{Float, Frame, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp;
 
-/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle, as a
-/// multiple of the rounding error (epsilon) of the number type. Surfaces of smaller solid angle are
-/// sampled by area. At this solid angle, rounding moves the sampled points by 1e-5 of the surface's
-/// size.
-pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
+/// Radius of a sphere around all points of every scene.
+const EVERYWHERE: f64 = 1e30;
 
-/// Surface of a compiled light with a size.
-#[derive(Clone, Copy, Debug)]
+/// Distance of a distant disk, as a fraction of the largest finite number, which is the distance of
+/// rays that hit nothing.
+const DISTANT: f64 = 0.5;
+
+/// Surface that emits light of intensity 1, white and the same at every point and in every
+/// direction.
+#[derive(Clone, Debug)]
+pub struct Emitter<S> {
+    surface: Surface<S>,
+    sides: Sides<S>,
+    pub radiance: S,
+    /// Centre of a bounding sphere of all sampled points, relative to the scene's centre.
+    pub center: DVec3,
+    /// Radius of that bounding sphere.
+    pub radius: f64,
+    pub area: f64,
+}
+
+#[derive(Clone, Debug)]
 enum Surface<S> {
     Sphere {
+        center: [S; 3],
         radius: S,
     },
-    /// Rectangle with three axes: across, up, and the normal of the side that emits light.
     Rectangle {
+        center: [S; 3],
         axes: [[S; 3]; 3],
         size: [S; 2],
     },
     Disk {
+        center: [S; 3],
         axes: [[S; 3]; 3],
         radius: S,
     },
+    /// Up to [`MAX_FACES`] triangles, chosen in proportion to their solid angles.
+    Faces {
+        triangles: Vec<Triangle<S>>,
+        /// `true` if the triangles enclose a convex solid; no triangle then occludes another.
+        convex: bool,
+    },
+    /// Disk at an infinite distance: a cone of directions.
+    DistantDisk {
+        axis: [S; 3],
+        /// 1 - cos(angular radius).
+        one_minus_cos: S,
+    },
+    /// More than [`MAX_FACES`] triangles, chosen in proportion to their areas.
+    Mesh(Vec<Triangle<S>>),
 }
 
-/// Emitter: a light of finite size, compiled for the kernels. It emits white light of intensity 1.
-/// Colour and intensity are applied later, by the weights of its light group (the lights that share
-/// sums in the film).
+/// Sides of a surface that emit light, and the height above them at which points are sampled.
 #[derive(Clone, Copy, Debug)]
-pub struct Emitter<S> {
-    surface: Surface<S>,
-    center: [S; 3],
-    /// Area of the surface that emits light \[scene units²\].
-    area: S,
-    /// Radiance of the emitter for white colour and intensity 1, the same at every point and in
-    /// every direction.
-    pub radiance: S,
+pub(super) struct Sides<S> {
+    pub lift: S,
+    /// `true` if the back emits light, too. The back is the other side of a flat surface, or the
+    /// inner side of the surface of a solid.
+    pub both: bool,
+}
+
+impl<S: Float> Sides<S> {
+    /// Lifts a point of a flat surface to the side of the receiver. [x, y, height] are the point's
+    /// coordinates across, up and along the normal, relative to the receiver. The result has two
+    /// parts: the coordinates of the lifted point, and the lanes of `backs` whose receiver is behind
+    /// the surface. In these lanes the sign of the height is reversed, so that it is negative in all
+    /// lanes whose receiver gets light.
+    #[inline(always)]
+    pub fn lifted<L: SimdFloat<Scalar = S>>(
+        &self,
+        [x, y, height]: [L; 3],
+        backs: L::Mask,
+    ) -> ([L; 3], L::Mask) {
+        let behind = backs & height.gt(L::zero());
+        let height = L::select(behind, -height, height) + L::splat(self.lift);
+        ([x, y, height], behind)
+    }
+
+    /// Returns the density \[1/sr\] of directions that are sampled uniformly in the cone that a
+    /// sphere subtends. It is zero for receivers inside a sphere that emits outwards only.
+    #[inline(always)]
+    fn cone_density<L: SimdFloat<Scalar = S>>(&self, cone: &Cone<L>) -> L {
+        let density = cone.density();
+        if self.both { density } else { density.masked(!cone.inside) }
+    }
+}
+
+/// Sampled point of an emitter, as seen from the receiver.
+pub(super) struct PointSample<L: SimdFloat> {
+    pub wi: Vec3<L>,
+    pub distance: L,
+    /// Density \[1/sr\] of the directions that other triangles share with this one.
+    pub density: L,
+    /// Density \[1/sr\] by which the radiance is divided; zero if no light arrives.
+    pub pdf: L,
 }
 
 impl<S: Float> Emitter<S> {
-    /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
-    /// if the light has no size or no direction.
+    /// Compiles the surface of a light, in coordinates relative to `origin`, the scene's centre.
     ///
-    /// Rounding could hide an emitter that touches an object. The surface is therefore lifted by
-    /// `lift`. A flat emitter moves in the direction that its emitting side faces. A sphere grows
-    /// and keeps its power.
-    pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
-        let surface = light.surface()?;
-        let frame = surface.frame()?;
-        let vector = |v: DVec3| v.to_array().map(S::from_f64);
-        let mut radiance = match light.unit {
-            LightUnit::Radiance => 1.0,
-            LightUnit::Power => 1.0 / (PI * surface.area()),
-        };
+    /// Rounding could hide a surface that touches an object. It is therefore lifted by `lift`. A
+    /// flat surface moves to its front. A sphere grows and keeps its power. Returns `None` if the
+    /// surface has no area.
+    pub fn without_body(
+        mut surface: EmissiveSurface,
+        unit: LightUnit,
+        origin: DVec3,
+        lift: f64,
+    ) -> Option<Self> {
         let mut area = surface.area();
-        let mut center = surface.center() - origin;
-        let axes = frame.map(vector);
-        let surface = match surface {
-            EmitterSurface::Sphere(sphere) => {
-                let radius = sphere.radius + lift;
-                let growth = (radius / sphere.radius).powi(2);
-                (area, radiance) = (area * growth, radiance / growth);
-                Surface::Sphere { radius: S::from_f64(radius) }
-            }
-            EmitterSurface::Rectangle(rectangle) => {
-                center += frame[2] * lift;
-                Surface::Rectangle { axes, size: rectangle.size.map(S::from_f64) }
-            }
-            EmitterSurface::Disk(disk) => {
-                center += frame[2] * lift;
-                Surface::Disk { axes, radius: S::from_f64(disk.radius) }
-            }
+        let mut radiance = match unit {
+            LightUnit::Radiance => 1.0,
+            LightUnit::Power => 1.0 / (PI * area),
         };
+        let rounded = |x: f64| S::from_f64(x).to_f64();
+        let mut both_sides = false;
+        match &mut surface {
+            EmissiveSurface::Sphere { center, radius } => {
+                let lifted = *radius + lift;
+                let growth = (lifted / *radius).powi(2);
+                (area, radiance) = (area * growth, radiance / growth);
+                (*center, *radius) = ((*center - origin).map(rounded), rounded(lifted));
+                both_sides = true;
+            }
+            EmissiveSurface::Rectangle { center, axes, size } => {
+                *center = (*center - origin + axes[2] * lift).map(rounded);
+                *size = size.map(rounded);
+            }
+            EmissiveSurface::Disk { center, axes, radius } => {
+                *center = (*center - origin + axes[2] * lift).map(rounded);
+                *radius = rounded(*radius);
+            }
+            EmissiveSurface::Triangles(triangles) | EmissiveSurface::ConvexTriangles(triangles) => {
+                triangles.iter_mut().flatten().for_each(|corner| *corner -= origin);
+            }
+        }
         Some(Self {
-            surface,
-            center: vector(center),
-            area: S::from_f64(area),
             radiance: S::from_f64(radiance),
+            area: rounded(area),
+            ..Self::of_object(&surface, both_sides, 0.0)?
         })
     }
 
-    /// Returns the centre of the surface, relative to the scene's centre.
-    pub fn center(&self) -> DVec3 {
-        DVec3::from(self.center.map(S::to_f64))
+    /// Compiles the surface of an emissive object of radiance 1, in coordinates relative to the
+    /// scene's centre. Its back emits light, too, if `both_sides` is `true`. `lift` is the height of
+    /// sampled points above the surface, at most 1e-4 of the surface's thickness. Returns `None` if
+    /// the surface has no area.
+    pub fn of_object(surface: &EmissiveSurface, both_sides: bool, lift: f64) -> Option<Self> {
+        let (area, radius) = (surface.area(), surface.radius());
+        if !(area > 0.0 && area.is_finite() && radius.is_finite()) {
+            return None;
+        }
+        let lift = lift.min(1e-4 * surface.thickness());
+        Some(Self {
+            surface: Surface::new(surface),
+            sides: Sides { lift: S::from_f64(lift), both: both_sides },
+            radiance: S::from_f64(1.0),
+            center: surface.center(),
+            radius: radius + lift,
+            area,
+        })
     }
 
-    /// Returns the radius of a sphere around the centre that contains the surface.
-    pub fn radius(&self) -> f64 {
-        match &self.surface {
-            Surface::Sphere { radius } | Surface::Disk { radius, .. } => radius.to_f64(),
-            Surface::Rectangle { size: [width, height], .. } => {
-                0.5 * width.to_f64().hypot(height.to_f64())
-            }
+    /// Creates a disk at an infinite distance around the direction `wi`, with the angular radius
+    /// `angle`. The irradiance on a surface that faces it is pi.
+    pub fn distant_disk(wi: DVec3, angle: f64) -> Self {
+        let one_minus_cos = S::from_f64(2.0 * (0.5 * angle).sin().powi(2));
+        let axis = wi.to_array().map(S::from_f64);
+        Self {
+            surface: Surface::DistantDisk { axis, one_minus_cos },
+            sides: Sides { lift: S::default(), both: false },
+            radiance: S::from_f64(angle.sin().powi(-2)),
+            center: DVec3::ZERO,
+            radius: EVERYWHERE,
+            area: f64::INFINITY,
         }
     }
 
-    /// Returns the area that emits light \[scene units²\].
-    pub fn area(&self) -> f64 {
-        self.area.to_f64()
+    pub fn is_distant(&self) -> bool {
+        self.area == f64::INFINITY
     }
 
-    /// Returns the distance at which each ray hits the side that emits light; the largest finite
-    /// number for rays that miss it. `direction` must be of unit length.
+    /// Returns the distance at which each ray hits the front of a surface without a body; the
+    /// largest finite number for rays that miss it. `direction` must be of unit length. Triangles
+    /// have bodies, which are parts of the geometry: rays miss them here.
     #[inline(always)]
     pub fn hit<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, direction: Vec3<L>) -> L {
-        let to_center = Vec3::splat(self.center) - origin;
         let missed = L::from_f64(L::MAX);
         match &self.surface {
-            Surface::Sphere { radius } => {
+            Surface::Sphere { center, radius } => {
+                let to_center = Vec3::splat(*center) - origin;
                 let radius2 = L::splat(*radius) * L::splat(*radius);
                 let along = to_center.dot(direction);
                 let across = to_center - direction * along;
                 let root2 = radius2 - across.length_squared();
                 let root = root2.max(L::zero()).sqrt();
                 // Power of the ray's origin with respect to the sphere: squared distance to the
-                // centre minus squared radius. It is positive outside of the sphere.
+                // centre minus squared radius. It is positive outside the sphere.
                 let power = to_center.length_squared() - radius2;
                 let outside = power.gt(L::zero());
                 let t = L::select(outside, power / (along + root), along + root);
                 let hits = root2.ge(L::zero()) & (!outside | along.gt(L::zero()));
                 L::select(hits & t.ge(L::zero()), t, missed)
             }
-            Surface::Rectangle { axes, size } => {
-                let (t, [x, y]) = plane_hit(axes, to_center, direction);
+            Surface::Rectangle { center, axes, size } => {
+                let (t, [x, y]) = plane_hit(axes, Vec3::splat(*center) - origin, direction);
                 let half = L::from_f64(0.5);
                 let inside = x.abs().le(L::splat(size[0]) * half)
                     & y.abs().le(L::splat(size[1]) * half)
                     & t.ge(L::zero());
                 L::select(inside, t, missed)
             }
-            Surface::Disk { axes, radius } => {
-                let (t, [x, y]) = plane_hit(axes, to_center, direction);
+            Surface::Disk { center, axes, radius } => {
+                let (t, [x, y]) = plane_hit(axes, Vec3::splat(*center) - origin, direction);
                 let radius = L::splat(*radius);
                 let inside = (x * x + y * y).le(radius * radius) & t.ge(L::zero());
                 L::select(inside, t, missed)
             }
+            Surface::DistantDisk { axis, one_minus_cos } => {
+                let inside =
+                    warp::cone_pdf(Vec3::splat(*axis), direction, L::splat(*one_minus_cos));
+                L::select(inside.gt(L::zero()), L::from_f64(DISTANT * L::MAX), missed)
+            }
+            Surface::Faces { .. } | Surface::Mesh(_) => missed,
         }
     }
 
-    /// Samples a point of the emitter for each of the surface points `origin`. `u` and `v` are
-    /// uniform in [0, 1). A sphere is sampled uniformly in the cone of directions that it subtends.
-    /// A rectangle is sampled by solid angle, or by area if its solid angle is tiny. A disk is
-    /// sampled by area.
-    #[inline(always)]
+    /// Samples a point of the surface for each of the receivers at `origin`. `u` and `v` are uniform
+    /// in [0, 1).
+    ///
+    /// A sphere or distant disk is sampled by the cone that it subtends, a rectangle by solid
+    /// angle, a disk by area. Of at most 32 triangles, one is chosen in proportion to its solid
+    /// angle, of more in proportion to its area. The chosen triangle is sampled by solid angle.
+    /// Rectangles and triangles whose solid angle is too small for this are sampled by area.
+    #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
         origin: Vec3<L>,
         (u, v): (L, L),
     ) -> LightSample<L> {
-        let to_center = Vec3::splat(self.center) - origin;
-        match &self.surface {
-            Surface::Sphere { radius } => {
-                let radius = L::splat(*radius);
-                let cone = Cone::new(to_center, radius);
-                let local = warp::cone(u, v, cone.one_minus_cos);
-                let wi = Frame::around(cone.axis).to_world(local).renormalize();
-                let sin2 = local.x * local.x + local.y * local.y;
-                let root2 = radius * radius - cone.distance2 * sin2;
-                let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
-                let distance = if cone.inside.any() {
-                    let along = to_center.dot(wi);
-                    let root2 = along * along + radius * radius - cone.distance2;
-                    L::select(cone.inside, along + root2.max(L::zero()).sqrt(), near)
-                } else {
-                    near
-                };
-                self.with_density(wi, distance, cone.density())
+        let point = match &self.surface {
+            Surface::Sphere { center, radius } => {
+                self.sample_sphere(Vec3::splat(*center) - origin, L::splat(*radius), (u, v))
             }
-            Surface::Rectangle { axes, size } => {
-                let size = size.map(L::splat);
-                let rectangle = SphericalRectangle::new(size, local_of(axes, to_center));
+            Surface::Rectangle { center, axes, size } => {
+                let to_center = Vec3::splat(*center) - origin;
+                let ([x, y, height], behind) =
+                    self.sides.lifted(local_of(axes, to_center), L::mask(self.sides.both));
+                let rectangle = SphericalRectangle::new(size.map(L::splat), [x, y, height]);
                 let [x, y] = rectangle.sample(u, v);
-                let (wi, distance) = towards(axes, [x, y, rectangle.height]);
+                let height = L::select(behind, -height, height);
+                let (wi, distance) = towards(axes, [x, y, height]);
                 let density = rectangle.density(distance);
-                self.with_density(wi, distance, density)
+                PointSample { wi, distance, density, pdf: density }
             }
-            Surface::Disk { axes, radius } => {
-                let local = local_of(axes, to_center);
+            Surface::Disk { center, axes, radius } => {
+                let local = local_of(axes, Vec3::splat(*center) - origin);
                 let (x, y, _) = warp::disk(u, v);
                 let radius = L::splat(*radius);
                 let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
                 let (wi, distance) = towards(axes, [x, y, local[2]]);
-                let density = density_of_area(L::splat(self.area), distance, local[2]);
-                self.with_density(wi, distance, density)
+                let density = density_of_area(L::from_f64(self.area), distance, local[2]);
+                PointSample { wi, distance, density, pdf: density }
             }
-        }
+            Surface::DistantDisk { axis, one_minus_cos } => {
+                let local = warp::cone(u, v, L::splat(*one_minus_cos));
+                let wi = Frame::around(Vec3::splat(*axis)).to_world(local).renormalize();
+                let distance = L::from_f64(DISTANT * L::MAX);
+                let density = density_of_cone(L::splat(*one_minus_cos));
+                PointSample { wi, distance, density, pdf: density }
+            }
+            Surface::Faces { triangles, convex } => {
+                FacesSeen::new(triangles, *convex, &self.sides, origin).sample((u, v))
+            }
+            Surface::Mesh(triangles) => {
+                Triangle::sample_by_area(triangles, &self.sides, origin, (u, v))
+            }
+        };
+        let PointSample { wi, distance, density, pdf } = point;
+        let arrives = pdf.gt(L::zero());
+        // Finite, because an infinite irradiance times a black reflectance would be NaN.
+        let irradiance = (L::splat(self.radiance) / pdf).min(L::from_f64(L::MAX));
+        LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
     }
 
-    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction of a ray
-    /// that hits the emitter at `distance`.
     #[inline(always)]
-    pub fn density<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, distance: L) -> L {
-        let to_center = Vec3::splat(self.center) - origin;
+    fn sample_sphere<L: SimdFloat<Scalar = S>>(
+        &self,
+        to_center: Vec3<L>,
+        radius: L,
+        (u, v): (L, L),
+    ) -> PointSample<L> {
+        let lift = L::splat(self.sides.lift);
+        let cone = Cone::new(to_center, radius);
+        let local = warp::cone(u, v, cone.one_minus_cos);
+        let wi = Frame::around(cone.axis).to_world(local).renormalize();
+        // Distance to the lifted point in the sampled direction. The lifted point is on a concentric
+        // sphere, which is larger by the lift if the receiver is outside, and smaller by the lift if
+        // the receiver is inside.
+        let sin2 = local.x * local.x + local.y * local.y;
+        let outer = radius + lift;
+        let root2 = outer * outer - cone.distance2 * sin2;
+        let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
+        let (along, inner) = (to_center.dot(wi), radius - lift);
+        let root2 = along * along + inner * inner - cone.distance2;
+        let far = along + root2.max(L::zero()).sqrt();
+        let distance = L::select(cone.inside, far, near).max(L::zero());
+        let density = self.sides.cone_density(&cone);
+        PointSample { wi, distance, density, pdf: density }
+    }
+
+    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction of a ray from
+    /// `origin` that hits the surface at `distance`. If the surface is a mesh, `triangle` is the
+    /// index of the hit triangle, encoded by [`SimdFloat::from_id`].
+    #[inline(never)]
+    pub fn density<L: SimdFloat<Scalar = S>>(
+        &self,
+        origin: Vec3<L>,
+        distance: L,
+        triangle: L,
+    ) -> L {
         match &self.surface {
-            Surface::Sphere { radius } => Cone::new(to_center, L::splat(*radius)).density(),
-            Surface::Rectangle { axes, size } => {
-                let local = local_of(axes, to_center);
+            Surface::Sphere { center, radius } => {
+                let to_center = Vec3::splat(*center) - origin;
+                self.sides.cone_density(&Cone::new(to_center, L::splat(*radius)))
+            }
+            Surface::Rectangle { center, axes, size } => {
+                let to_center = Vec3::splat(*center) - origin;
+                let (local, _) =
+                    self.sides.lifted(local_of(axes, to_center), L::mask(self.sides.both));
                 SphericalRectangle::new(size.map(L::splat), local).density(distance)
             }
-            Surface::Disk { axes, .. } => {
-                let [_, _, height] = local_of(axes, to_center);
-                density_of_area(L::splat(self.area), distance, height)
+            Surface::Disk { center, axes, .. } => {
+                let [_, _, height] = local_of(axes, Vec3::splat(*center) - origin);
+                density_of_area(L::from_f64(self.area), distance, height)
+            }
+            Surface::DistantDisk { one_minus_cos, .. } => density_of_cone(L::splat(*one_minus_cos)),
+            Surface::Faces { triangles, convex } => {
+                FacesSeen::new(triangles, *convex, &self.sides, origin).density()
+            }
+            Surface::Mesh(triangles) => {
+                Triangle::density_by_area(triangles, &self.sides, origin, (distance, triangle))
             }
         }
-    }
-
-    /// Creates the sample of direction `wi` with the given density. The irradiance of the sample is
-    /// the emitter's radiance divided by `density`. It is limited to the largest finite number,
-    /// because an infinite irradiance times a black reflectance would be NaN.
-    #[inline(always)]
-    fn with_density<L: SimdFloat<Scalar = S>>(
-        &self,
-        wi: Vec3<L>,
-        distance: L,
-        density: L,
-    ) -> LightSample<L> {
-        let arrives = density.gt(L::zero());
-        let irradiance = (L::splat(self.radiance) / density).min(L::from_f64(L::MAX));
-        LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
     }
 }
 
-/// Returns the components of `v` along the three unit vectors `axes`.
+impl<S: Float> Surface<S> {
+    fn new(surface: &EmissiveSurface) -> Self {
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        match surface {
+            EmissiveSurface::Sphere { center, radius } => {
+                Self::Sphere { center: vector(*center), radius: S::from_f64(*radius) }
+            }
+            EmissiveSurface::Rectangle { center, axes, size } => Self::Rectangle {
+                center: vector(*center),
+                axes: axes.map(vector),
+                size: size.map(S::from_f64),
+            },
+            EmissiveSurface::Disk { center, axes, radius } => Self::Disk {
+                center: vector(*center),
+                axes: axes.map(vector),
+                radius: S::from_f64(*radius),
+            },
+            EmissiveSurface::Triangles(corners) | EmissiveSurface::ConvexTriangles(corners) => {
+                let triangles = Triangle::list(corners);
+                let convex = matches!(surface, EmissiveSurface::ConvexTriangles(_));
+                match triangles.len() <= MAX_FACES {
+                    true => Self::Faces { triangles, convex },
+                    false => Self::Mesh(triangles),
+                }
+            }
+        }
+    }
+}
+
+/// Returns the density \[1/sr\] of uniform directions in a cone with the half-angle theta, where
+/// `one_minus_cos` is 1 - cos(theta).
 #[inline(always)]
-pub(super) fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
+fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
+    L::one() / (one_minus_cos * L::from_f64(TAU))
+}
+
+#[inline(always)]
+fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
     axes.map(|axis| Vec3::splat(axis).dot(v))
 }
 
-/// Returns two values: the unit vector in the direction of the vector with the components [x, y, z]
-/// along `axes`, and the length of this vector.
+/// Returns the direction and the length of the vector with the components [x, y, z] along `axes`.
 #[inline(always)]
-pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
+fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
     let [across, up, normal] = axes.map(Vec3::splat);
     let inverse = L::one() / distance;
     ((across * x + up * y + normal * z) * inverse, distance)
 }
 
-/// Returns two values: the distance at which each ray hits the plane of a flat emitter, and the
-/// local coordinates (across, up) of the hit point. `to_center` is the vector from the rays' origin
-/// to the emitter's centre. The distance is negative for rays that do not hit the front.
+/// Hit of each ray with the plane of a flat emitter: the distance, negative for rays that do not hit
+/// the front, and the coordinates of the hit point across and up. `to_center` is the vector from the
+/// rays' origin to the emitter's centre.
 #[inline(always)]
 fn plane_hit<L: SimdFloat>(
     axes: &[[L::Scalar; 3]; 3],
@@ -260,142 +427,147 @@ fn plane_hit<L: SimdFloat>(
     (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])
 }
 
-/// Returns the density \[1/sr\] of the directions to a flat surface on which points are sampled
-/// uniformly: distance^2 / (area cos(angle to the normal)). `distance` is the distance of the
-/// surface in the sampled direction. `height` is the coordinate of the surface along its normal,
-/// relative to the receiver. It is negative if the receiver is in front of the surface. Otherwise
-/// the density is zero.
-#[inline(always)]
-pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
-    let density = distance * distance * distance / (area * -height);
-    density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Cone of the directions from a receiver point to a spherical emitter. From a point inside of the
-/// sphere it contains all directions.
-pub(super) struct Cone<L: SimdFloat> {
-    pub axis: Vec3<L>,
-    pub one_minus_cos: L,
-    /// Squared distance from the receiver point to the centre of the sphere.
-    pub distance2: L,
-    /// Lanes whose receiver point is inside of the sphere.
-    pub inside: L::Mask,
-}
+    const LIFT: f64 = 1e-10;
 
-impl<L: SimdFloat> Cone<L> {
-    #[inline(always)]
-    pub fn new(to_center: Vec3<L>, radius: L) -> Self {
-        let distance2 = to_center.length_squared();
-        let sin2 = radius * radius / distance2;
-        let inside = sin2.ge(L::one()) | !distance2.gt(L::zero());
-        // Form of 1 - cos without cancellation at small angles.
-        let drop = sin2 / ((L::one() - sin2).max(L::zero()).sqrt() + L::one());
-        let z = Vec3::of([0.0, 0.0, 1.0]);
-        Self {
-            axis: Vec3::select(inside, z, to_center * (L::one() / distance2.sqrt())),
-            one_minus_cos: L::select(inside, L::from_f64(2.0), drop),
-            distance2,
-            inside,
+    /// Returns one light-emitting surface of every kind. The points of [`points`] are in front of,
+    /// behind, beside and inside of these surfaces.
+    fn surfaces() -> Vec<EmissiveSurface> {
+        let tetrahedron = [
+            DVec3::new(0.0, 0.0, 0.0),
+            DVec3::new(1.0, 0.1, 0.0),
+            DVec3::new(0.2, 0.9, 0.1),
+            DVec3::new(0.3, 0.2, 1.1),
+        ];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let [x, y, z] = DVec3::AXES;
+        vec![
+            EmissiveSurface::Sphere { center: DVec3::ZERO, radius: 0.6 },
+            EmissiveSurface::Rectangle { center: DVec3::ZERO, axes: [x, y, z], size: [1.0, 0.4] },
+            EmissiveSurface::Triangles(vec![[x, y, -x - y]]),
+            EmissiveSurface::ConvexTriangles(faces.map(|face| face.map(|i| tetrahedron[i])).into()),
+            EmissiveSurface::Triangles(grid()),
+        ]
+    }
+
+    /// Returns a bent sheet of more than [`MAX_FACES`] triangles.
+    fn grid() -> Vec<[DVec3; 3]> {
+        let corner = |i: usize, j: usize| {
+            let (x, y) = (0.2 * i as f64 - 0.5, 0.3 * j as f64 - 0.6);
+            DVec3::new(x, y, 0.4 * x * y - 0.1)
+        };
+        let squares = (0..5).flat_map(|i| (0..4).map(move |j| (i, j)));
+        let halves = squares.flat_map(|(i, j)| {
+            let [a, b, c, d] =
+                [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        halves.collect()
+    }
+
+    /// Returns the receiver points for which the tests sample the surfaces of [`surfaces`].
+    fn points() -> Vec<DVec3> {
+        let points = [[0.1, 0.2, 1.5], [0.3, -0.1, -0.8], [2.0, 0.1, 0.2], [0.25, 0.2, 0.05]];
+        [points.map(DVec3::from).into(), vec![DVec3::new(40.0, 30.0, 20.0)]].concat()
+    }
+
+    fn numbers(i: u32) -> (f64, f64) {
+        let unit = |x: f64| x - x.floor();
+        // R2 sequence of Roberts (2018): points that cover the unit square evenly.
+        (
+            unit(0.5 + f64::from(i) * 0.754_877_666_246_69),
+            unit(0.5 + f64::from(i) * 0.569_840_290_998_05),
+        )
+    }
+
+    #[test]
+    fn density_of_a_hit_is_that_of_the_sample() {
+        for surface in surfaces() {
+            let emitter = Emitter::<f64>::of_object(&surface, true, LIFT).unwrap();
+            for point in points() {
+                let origin = Vec3::<f64>::of(point.to_array());
+                for i in 0..200 {
+                    let (u, v) = numbers(i);
+                    let sample = emitter.sample(origin, (u, v));
+                    let triangle = match &emitter.surface {
+                        Surface::Mesh(triangles) => Triangle::index_of(triangles, u),
+                        _ => 0,
+                    };
+                    let triangle = f64::from_id(triangle as u32);
+                    let found = emitter.density(origin, sample.distance, triangle);
+                    assert!(
+                        (found - sample.density).abs() <= 1e-6 * sample.density,
+                        "{surface:?} from {point}, sample {i}: {found}, sampled {}",
+                        sample.density
+                    );
+                    assert!((sample.density * sample.irradiance.x - 1.0).abs() < 1e-9);
+                }
+            }
         }
     }
 
-    /// Returns the density \[1/sr\] of uniform directions in the cone.
-    #[inline(always)]
-    pub fn density(&self) -> L {
-        (L::one() / (self.one_minus_cos * L::from_f64(TAU))).min(L::from_f64(L::MAX))
-    }
-}
-
-/// Rectangle as seen from a receiver point, sampled by solid angle.
-///
-/// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
-pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Interval of the rectangle's coordinates along its width, relative to the receiver point.
-    x: [L; 2],
-    y: [L; 2],
-    /// Coordinate of the rectangle's plane along its normal, relative to the receiver point;
-    /// negative if the point is in front of the rectangle.
-    height: L,
-    area: L,
-    solid_angle: L,
-    /// Lanes in which the rectangle is sampled by solid angle; in the others it is too small and is
-    /// sampled by area.
-    by_angle: L::Mask,
-}
-
-impl<L: SimdFloat> SphericalRectangle<L> {
-    /// Creates the rectangle with the given width and height. [center_x, center_y, z] is its centre
-    /// relative to the receiver point, in the rectangle's frame: across, up and along the normal.
-    #[inline(always)]
-    pub fn new([width, height]: [L; 2], [center_x, center_y, z]: [L; 3]) -> Self {
-        let half = L::from_f64(0.5);
-        let (a, b) = (width * half, height * half);
-        let (x, y) = ([center_x - a, center_x + a], [center_y - b, center_y + b]);
-        let area = width * height;
-        let solid_angle = solid_angle(x, y, z, area);
-        let by_angle = solid_angle.ge(L::from_f64(MIN_SOLID_ANGLE * L::EPSILON));
-        Self { x, y, height: z, area, solid_angle, by_angle }
-    }
-
-    /// Samples a point of the rectangle. Returns its coordinates across and up, relative to the
-    /// receiver point. `u` and `v` are uniform in [0, 1).
-    #[inline(always)]
-    pub fn sample(&self, u: L, v: L) -> [L; 2] {
-        let ([x0, x1], [y0, y1]) = (self.x, self.y);
-        let by_area = [u.mul_add(x1 - x0, x0), v.mul_add(y1 - y0, y0)];
-        if self.by_angle.none() {
-            return by_area;
+    /// Checks the mean of 1 / density over the sampled directions. It must be the sum of the solid
+    /// angles of all triangles, because both sides emit light. For a convex solid seen from outside
+    /// it must be half of this sum, because only the fronts emit to the receiver.
+    #[test]
+    fn samples_of_triangles_cover_their_solid_angle() {
+        for surface in surfaces() {
+            let (triangles, convex) = match &surface {
+                EmissiveSurface::Triangles(triangles) => (triangles, false),
+                EmissiveSurface::ConvexTriangles(triangles) => (triangles, true),
+                _ => continue,
+            };
+            let emitter = Emitter::<f64>::of_object(&surface, true, LIFT).unwrap();
+            for point in points() {
+                let origin = Vec3::<f64>::of(point.to_array());
+                let solid_angle = |corners: &[DVec3; 3]| {
+                    let [a, b, c] = corners.map(|corner| (corner - point).normalize());
+                    let below = 1.0 + a.dot(b) + b.dot(c) + c.dot(a);
+                    2.0 * a.cross(b).dot(c).abs().atan2(below)
+                };
+                let mut expected: f64 = triangles.iter().map(solid_angle).sum();
+                let in_front = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a).dot(point - a) > 0.0;
+                if convex && triangles.iter().any(in_front) {
+                    expected *= 0.5;
+                }
+                let count = 20_000;
+                let sum: f64 =
+                    (0..count).map(|i| emitter.sample(origin, numbers(i)).irradiance.x).sum();
+                let mean = sum / f64::from(count);
+                let limit = if triangles.len() > MAX_FACES { 1e-2 } else { 1e-9 };
+                assert!(
+                    (mean - expected).abs() < limit * expected,
+                    "{surface:?} from {point}: {mean}, expected {expected}"
+                );
+            }
         }
-        let one = L::one();
-        let h2 = self.height * self.height;
-        // Each side of the rectangle spans a plane with the receiver point. These are the
-        // components of the planes' unit normals along the rectangle's normal: `b0` and `b1` for
-        // the lower and the upper side, `left` for the left side.
-        let b0 = -y0 / (h2 + y0 * y0).sqrt();
-        let b1 = y1 / (h2 + y1 * y1).sqrt();
-        let left = -x0 / (h2 + x0 * x0).sqrt();
-        let angle = |cos: L| (one - cos * cos).max(L::zero()).sqrt().atan2(cos);
-        let k = L::from_f64(TAU) - angle(-(b1 * left)) - angle(-(left * b0));
-        let (sin, cos) = u.mul_add(self.solid_angle, k).sin_cos();
-        let f = (cos * b0 - b1) / sin;
-        let c2 = one / (f * f + b0 * b0);
-        // Lower bound of the divisors 1 - c2 and 1 - s^2. It prevents a division by zero.
-        let tiny = L::from_f64(L::EPSILON * L::EPSILON);
-        let x = (c2 * h2 / (one - c2).max(tiny)).sqrt().copysign(f).max(x0).min(x1);
-        let d2 = x * x + h2;
-        let [s0, s1] = [y0, y1].map(|y| y / (d2 + y * y).sqrt());
-        let s = v.mul_add(s1 - s0, s0);
-        let y = (s * (d2 / (one - s * s).max(tiny)).sqrt()).max(y0).min(y1);
-        [L::select(self.by_angle, x, by_area[0]), L::select(self.by_angle, y, by_area[1])]
     }
 
-    /// Returns the density \[1/sr\] with which [`Self::sample`] draws a direction that hits the
-    /// rectangle at `distance`.
-    #[inline(always)]
-    pub fn density(&self, distance: L) -> L {
-        let by_area = density_of_area(self.area, distance, self.height);
-        let in_front = self.height.lt(L::zero());
-        L::select(self.by_angle, (L::one() / self.solid_angle).masked(in_front), by_area)
+    #[test]
+    fn one_sided_surfaces_are_dark_from_behind() {
+        let [front, back] = [DVec3::new(0.1, 0.2, 1.5), DVec3::new(0.1, 0.2, -1.5)];
+        for surface in &surfaces()[1..3] {
+            let emitter = Emitter::<f64>::of_object(surface, false, LIFT).unwrap();
+            let irradiance = |point: DVec3| {
+                emitter.sample(Vec3::<f64>::of(point.to_array()), (0.3, 0.6)).irradiance.x
+            };
+            assert!(irradiance(front) > 0.0 && irradiance(back) == 0.0, "{surface:?}");
+        }
+        let ball = Emitter::<f64>::of_object(&surfaces()[0], false, LIFT).unwrap();
+        let irradiance =
+            |x: f64| ball.sample(Vec3::<f64>::of([x, 0.0, 0.0]), (0.3, 0.6)).irradiance.x;
+        assert!(irradiance(0.7) > 0.0 && irradiance(0.5) == 0.0);
     }
-}
 
-/// Returns the solid angle of a rectangle as the sum of the solid angles of two triangles. The
-/// formula of Van Oosterom and Strackee (1983) for a triangle is an arc tangent, which has no
-/// cancellation at small angles. `[x0, x1]` and `[y0, y1]` are the intervals of the rectangle's
-/// coordinates relative to the receiver point, and `z` is the coordinate of its plane.
-#[inline(always)]
-fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
-    let corner = |x: L, y: L| {
-        let inverse = L::one() / (x * x + y * y + z * z).sqrt();
-        (Vec3::new(x, y, z) * inverse, inverse)
-    };
-    let [a, b, c, d] = [corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)];
-    let diagonal = a.0.dot(c.0);
-    let volume = z.abs() * area * a.1 * c.1;
-    let triangle = |third: (Vec3<L>, L)| {
-        let below = L::one() + diagonal + a.0.dot(third.0) + c.0.dot(third.0);
-        let half = (volume * third.1).atan2(below);
-        half + half
-    };
-    triangle(b) + triangle(d)
+    #[test]
+    fn surfaces_without_area_are_no_emitters() {
+        let point = EmissiveSurface::Triangles(vec![[DVec3::X; 3]]);
+        assert!(Emitter::<f32>::of_object(&point, true, LIFT).is_none());
+        assert!(
+            Emitter::<f32>::of_object(&EmissiveSurface::Triangles(vec![]), true, LIFT).is_none()
+        );
+    }
 }

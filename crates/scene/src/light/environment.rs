@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::{Light, LightSample};
+use crate::light::{Handles, LightDesc, LightForm, LightSample, Placement};
 use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -36,7 +36,6 @@ description! {
 }
 
 impl Environment {
-    /// Returns the name of the image file; `None` for a gradient.
     pub fn file(&self) -> Option<&str> {
         (!self.file.is_empty()).then_some(self.file.as_str())
     }
@@ -52,11 +51,6 @@ impl Environment {
         self.map.resolve(&self.file, load);
     }
 
-    /// Returns the error of reading the environment image; `None` if there was none.
-    pub(super) fn fault(&self) -> Option<ValidationError> {
-        self.map.fault()
-    }
-
     /// Returns an image of the gradient, with a single column, because the radiance depends on the
     /// elevation alone.
     fn gradient(&self) -> RadianceMap {
@@ -70,18 +64,34 @@ impl Environment {
     }
 }
 
+impl LightDesc for Environment {
+    fn form(&self) -> LightForm<'_> {
+        LightForm::Environment(self)
+    }
+
+    /// Returns the error of reading the image, if there was one.
+    fn faults(&self) -> Vec<ValidationError> {
+        self.file().and_then(|_| self.map.fault()).into_iter().collect()
+    }
+
+    fn handles(&mut self) -> Handles<'_> {
+        Handles::default()
+    }
+
+    fn placed(_: &Placement) -> Self {
+        Self::default()
+    }
+}
+
 /// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
-    /// Sine and cosine of the environment's rotation about the vertical.
     rotation: (f64, f64),
 }
 
 impl EnvironmentLight {
-    /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
-    /// its image is not loaded.
-    pub fn new(light: &Light) -> Option<Self> {
-        let environment = light.environment.as_ref()?;
+    /// Compiles `environment`. Returns `None` if its image is not loaded.
+    pub fn new(environment: &Environment) -> Option<Self> {
         let map = match environment.file() {
             Some(_) => environment.map()?.clone(),
             None => Arc::new(environment.gradient()),
@@ -89,23 +99,19 @@ impl EnvironmentLight {
         Some(Self { map, rotation: environment.rotation.to_radians().sin_cos() })
     }
 
-    /// Returns the image of the environment. For a gradient, this is the image of one column that
-    /// represents it.
     pub fn map(&self) -> &RadianceMap {
         &self.map
     }
 
-    /// Rotates `direction` of lane `lane` from scene coordinates into the coordinates of the
-    /// environment image.
+    /// Rotates a direction from scene coordinates into those of the image.
     fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
         let (sin, cos) = self.rotation;
         let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
         [x * cos - z * sin, y, x * sin + z * cos]
     }
 
-    /// Returns two values for the unit vectors `direction`: the radiance that arrives from them,
-    /// and the density \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero
-    /// outside of `lanes`.
+    /// Returns the radiance that arrives from the unit vectors `direction`, and the density
+    /// \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero outside `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
         let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
@@ -128,11 +134,11 @@ impl EnvironmentLight {
         let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
         let mut density = [1.0; MAX_WIDTH];
         for_each(lanes, |lane| {
-            let (direction, p) = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
-            let [x, y, z] = direction;
+            let sample = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
+            let [x, y, z] = sample.direction;
             wi[lane] = [x * cos + z * sin, y, z * cos - x * sin];
-            irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
-            density[lane] = p;
+            irradiance[lane] = self.map.radiance(sample.direction).map(|l| l / sample.density);
+            density[lane] = sample.density;
         });
         LightSample {
             wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),
@@ -159,8 +165,7 @@ mod tests {
     use zerkalo_kernel::lanes::Double;
 
     fn light(environment: Environment) -> EnvironmentLight {
-        let light = Light { environment: Some(environment), ..Light::default() };
-        EnvironmentLight::new(&light).expect("an environment")
+        EnvironmentLight::new(&environment).expect("an environment")
     }
 
     fn radiance(light: &EnvironmentLight, direction: [f64; 3]) -> [f64; 3] {

@@ -1,95 +1,53 @@
-//! Lights: points, directions, cones, surfaces with a size, and the emission of objects.
+//! Lights: their descriptions, one kind a file, and the compiled forms that kernels sample.
 
-mod area;
+#![allow(missing_docs, reason = "fields and variants whose names say it")]
+
+mod compiled;
 mod delta;
+mod directional;
+mod disk;
 mod emitter;
 mod environment;
-mod object_emitter;
+mod form;
+mod point;
+mod rectangle;
+mod registry;
 mod sample;
+mod solid_angle;
+mod sphere;
+mod spot;
+mod triangles;
 
-pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
-pub use delta::{DeltaLight, SpotCone, spot_factor};
+pub use compiled::CompiledLight;
+pub use delta::DeltaLight;
+pub use directional::Directional;
+pub use disk::DiskLight;
 pub use emitter::Emitter;
 pub use environment::{Environment, EnvironmentLight};
-pub use object_emitter::{ObjectEmitter, ObjectSurface};
+pub use form::{EmissiveSurface, LightForm};
+pub use point::Point;
+pub use rectangle::RectangleLight;
+pub use registry::{Handles, KIND_KEYS, KINDS, LightDesc, LightKind, Placement, check_kinds};
 pub use sample::LightSample;
+pub use sphere::SphereLight;
+pub use spot::{Spot, SpotCone, spot_factor};
 
+use crate::value::{Color, Description, Field, ValidationError, choices};
 use glam::DVec3;
+use registry::LightTable;
 
-use crate::value::{
-    Color, Description, Field, ValidationError, choices, description, round_nice, round_significant,
-};
-
-description! {
-    /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle`, `disk` and
-    /// `environment`, with a colour and an intensity.
-    pub struct Light: Default {
-        /// Name of the light; every light has a different one.
-        name: String, or "a number";
-        /// Light from one point. A light has exactly one of `point`, `directional`, `spot`,
-        /// `sphere`, `rectangle`, `disk` and `environment`.
-        point: Option<Point>, or "another kind is needed";
-        /// Light from infinitely far away.
-        directional: Option<Directional>, or "another kind is needed";
-        /// Light from one point into a cone.
-        spot: Option<Spot>, or "another kind is needed";
-        /// Light from a sphere.
-        sphere: Option<SphereLight>, or "another kind is needed";
-        /// Light from one side of a rectangle.
-        rectangle: Option<RectangleLight>, or "another kind is needed";
-        /// Light from one side of a disk.
-        disk: Option<DiskLight>, or "another kind is needed";
-        /// Light from all directions.
-        environment: Option<Environment>, or "another kind is needed";
-        /// Colour, by which the intensity is multiplied.
-        color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// Sphere, rectangle or disk: radiance or power, as `unit` says. Environment: factor of its
-        /// radiance. Point or spot: radiant intensity [W/sr], of a spot inside its inner cone, if
-        /// `falloff` is `inverse-square`. Directional light, or point or spot without falloff: the
-        /// brightness of a white diffuse surface that faces the light.
-        intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
-        /// Unit of the intensity of a sphere, rectangle or disk.
-        unit: LightUnit = "radiance";
-        /// Falloff of a point or spot light with the distance.
-        falloff: Falloff = "none";
-        /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from the
-        /// camera and from mirrors. It still lights diffuse surfaces and makes highlights.
-        visible: bool = true;
-        /// `false` switches the light off.
-        on: bool = true;
-    }
-}
-
-description! {
-    /// Light from one point.
-    pub struct Point: Copy {
-        /// Position of the light.
-        position: [f64; 3], in COORDINATE "scene units";
-    }
-}
-
-description! {
-    /// Light from infinitely far away.
-    pub struct Directional: Copy {
-        /// Direction in which the light travels.
-        direction: [f64; 3], as Direction;
-    }
-}
-
-description! {
-    /// Light from one point into a cone. Between the inner and the outer cone it decreases smoothly
-    /// to zero.
-    pub struct Spot: Copy {
-        /// Position of the light: the apex of the cone.
-        position: [f64; 3], in COORDINATE "scene units";
-        /// Direction of the cone's axis, in which the light travels.
-        direction: [f64; 3], as Direction;
-        /// Angle between the axis and the edge of the cone, outside of which there is no light.
-        outer_angle: f64, in above(0.0, 180.0) "degrees";
-        /// Angle between the axis and the edge of the inner cone, inside of which the light has
-        /// its full intensity; at most `outer_angle`.
-        inner_angle: f64 = 0.0, in closed(0.0, 180.0) "degrees";
-    }
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// May be empty.
+    pub name: String,
+    pub kind: LightKind,
+    pub color: Color,
+    /// In the unit that depends on `kind`, `unit` and `falloff`.
+    pub intensity: f64,
+    pub unit: LightUnit,
+    pub falloff: Falloff,
+    pub visible: bool,
+    pub on: bool,
 }
 
 choices! {
@@ -112,185 +70,145 @@ choices! {
     }
 }
 
-/// Keys of the kinds of lights; each light has exactly one of them.
-pub const KINDS: &[&str] =
-    &["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"];
-
 /// Keys of a `[[light]]` table in scene files.
-pub const FIELDS: &[Field] = Light::FIELDS;
+pub const FIELDS: &[Field] = LightTable::FIELDS;
 
 impl Light {
-    /// Returns the position of a point or spot light; `None` for any other light.
-    pub fn apex(&self) -> Option<[f64; 3]> {
-        self.point.map(|point| point.position).or(self.spot.map(|spot| spot.position))
+    /// Returns the canonical form of the light, which must be valid.
+    pub fn form(&self) -> LightForm<'_> {
+        self.kind.form()
+    }
+
+    /// Returns the surface of a light with a size.
+    pub fn surface(&self) -> Option<EmissiveSurface> {
+        match self.form() {
+            LightForm::Surface(surface) => Some(surface),
+            LightForm::Point { .. } | LightForm::Distant { .. } | LightForm::Environment(_) => None,
+        }
+    }
+
+    /// Returns the position of a point or spot light.
+    pub fn apex(&self) -> Option<DVec3> {
+        match self.form() {
+            LightForm::Point { position, .. } => Some(position),
+            LightForm::Distant { .. } | LightForm::Surface(_) | LightForm::Environment(_) => None,
+        }
+    }
+
+    /// Returns `true` if the camera and mirrors can see the light, unless `visible` is `false`.
+    pub fn has_radiance(&self) -> bool {
+        self.form().is_visible()
+    }
+
+    /// Returns `true` if the key `name` has an effect on a light of this kind.
+    pub fn has_key(&self, name: &str) -> bool {
+        match name {
+            "unit" => self.surface().is_some(),
+            "visible" => self.has_radiance(),
+            _ => true,
+        }
+    }
+
+    pub fn environment(&self) -> Option<&Environment> {
+        match self.form() {
+            LightForm::Environment(environment) => Some(environment),
+            LightForm::Point { .. } | LightForm::Distant { .. } | LightForm::Surface(_) => None,
+        }
+    }
+
+    pub fn environment_mut(&mut self) -> Option<&mut Environment> {
+        match &mut self.kind {
+            LightKind::Environment(environment) => Some(environment),
+            LightKind::Point(_)
+            | LightKind::Directional(_)
+            | LightKind::Spot(_)
+            | LightKind::Sphere(_)
+            | LightKind::Rectangle(_)
+            | LightKind::Disk(_) => None,
+        }
+    }
+
+    /// Returns the position of the light, or the centre of its surface.
+    pub fn position(&self) -> Option<[f64; 3]> {
+        self.kind.clone().handles().position.copied()
+    }
+
+    pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
+        self.kind.handles().position
     }
 
     /// Returns the direction in which a directional light travels, the axis of a spot light, or the
-    /// normal of a rectangle or disk light; `None` for any other light.
+    /// normal of a rectangle or disk.
     pub fn direction(&self) -> Option<[f64; 3]> {
-        let directional = self.directional.map(|sun| sun.direction);
-        let rectangle = self.rectangle.map(|rectangle| rectangle.normal);
-        let flat = rectangle.or(self.disk.map(|disk| disk.normal));
-        directional.or(self.spot.map(|spot| spot.direction)).or(flat)
+        self.kind.clone().handles().direction.copied()
     }
 
-    /// Returns [`Light::direction`] as a mutable reference.
     pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
-        let directional = self.directional.as_mut().map(|sun| &mut sun.direction);
-        let rectangle = self.rectangle.as_mut().map(|rectangle| &mut rectangle.normal);
-        let flat = rectangle.or(self.disk.as_mut().map(|disk| &mut disk.normal));
-        directional.or(self.spot.as_mut().map(|spot| &mut spot.direction)).or(flat)
+        self.kind.handles().direction
     }
 
-    /// Returns the validation errors of the light's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let kinds = self.kinds();
-        let kind_fault = match &kinds[..] {
-            [_] => None,
-            [] => Some(ValidationError::new(
-                "",
-                "the light has no kind",
-                "one of point, directional, spot, sphere, rectangle, disk and environment, such as \
-                 point = { position = [2.0, 4.0, 3.0] }",
-            )),
-            [first, second, ..] => Some(ValidationError::new(
-                second,
-                format!("both {first} and {second} are given"),
-                "exactly one kind; a second light needs its own [[light]]",
-            )),
-        };
-        let falls_off = kinds == ["point"] || kinds == ["spot"];
-        let has_size = self.surface().is_some();
-        let other_fault = if kind_fault.is_some() {
-            None
-        } else if self.falloff == Falloff::InverseSquare && !falls_off {
+        let kind_faults = self.kind.faults();
+        let unused_key = if self.falloff == Falloff::InverseSquare && self.apex().is_none() {
             Some(ValidationError::new(
                 "falloff",
                 "falloff is \"inverse-square\", but only a point or spot light has a falloff",
                 "falloff \"none\", or a point or spot light",
             ))
-        } else if self.unit == LightUnit::Power && !has_size {
+        } else if self.unit == LightUnit::Power && self.surface().is_none() {
             Some(ValidationError::new(
                 "unit",
                 "unit is \"power\", but only a sphere, rectangle or disk has one",
                 "unit \"radiance\", or a light with a size",
             ))
-        } else if !self.visible && !has_size && self.environment.is_none() {
+        } else if !self.visible && !self.has_radiance() {
             Some(ValidationError::new(
                 "visible",
                 "visible is false, but no light of this kind is visible",
-                "visible = true, or a sphere, rectangle, disk or environment",
-            ))
-        } else if let Some(Spot { inner_angle, outer_angle, .. }) =
-            self.spot.filter(|spot| spot.inner_angle > spot.outer_angle)
-        {
-            Some(ValidationError::new(
-                "spot.inner_angle",
-                format!("inner_angle is {inner_angle}, but outer_angle is only {outer_angle}"),
-                "an inner_angle of at most outer_angle; both are measured from the axis",
+                "visible = true, or a light with a size or an environment",
             ))
         } else {
             None
         };
-        let file = self.environment.as_ref().and_then(Environment::fault);
-        let file_fault = file.map(|fault| fault.prefixed("environment"));
-        self.validator().and(kind_fault).and(other_fault).and(file_fault).errors()
-    }
-
-    /// Returns the names of the kinds (such as `point`) that the light has. A valid light has
-    /// exactly one.
-    pub fn kinds(&self) -> Vec<&'static str> {
-        let given = [
-            ("point", self.point.is_some()),
-            ("directional", self.directional.is_some()),
-            ("spot", self.spot.is_some()),
-            ("sphere", self.sphere.is_some()),
-            ("rectangle", self.rectangle.is_some()),
-            ("disk", self.disk.is_some()),
-            ("environment", self.environment.is_some()),
-        ];
-        given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
-    }
-
-    /// Returns the surface of a light with a size; `None` for any other light.
-    pub fn surface(&self) -> Option<EmitterSurface> {
-        let sphere = self.sphere.map(EmitterSurface::Sphere);
-        let rectangle = self.rectangle.map(EmitterSurface::Rectangle);
-        sphere.or(rectangle).or(self.disk.map(EmitterSurface::Disk))
-    }
-
-    /// Removes the kind of the light and its values, so that another kind can be set.
-    pub fn clear_kind(&mut self) {
-        (self.point, self.directional, self.spot) = (None, None, None);
-        (self.sphere, self.rectangle, self.disk) = (None, None, None);
-        self.environment = None;
-    }
-
-    /// Gives the light a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the
-    /// given radius; the sides of a rectangle are 2 x `radius` long. `normal` is the normal of a
-    /// rectangle or disk. `radius` is rounded to two significant digits. The coordinates of
-    /// `center` are rounded to multiples of a power of ten that is at most 1e-4 x `radius`. If
-    /// `name` is another word, the light is unchanged.
-    pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
-        let center = center.map(|x| round_nice(x, radius)).to_array();
-        let radius = round_significant(radius, 2);
-        match name {
-            "sphere" => self.sphere = Some(SphereLight { center, radius }),
-            "rectangle" => {
-                let size = [2.0 * radius; 2];
-                self.rectangle = Some(RectangleLight { center, size, normal, up: area::up() });
-            }
-            "disk" => self.disk = Some(DiskLight { center, radius, normal }),
-            _ => {}
-        }
-    }
-
-    /// Returns the position of a point or spot light, or the centre of the surface of a light with
-    /// a size. `None` for a directional or environment light.
-    pub fn position(&self) -> Option<[f64; 3]> {
-        self.apex().or(self.surface().map(|surface| surface.center().to_array()))
-    }
-
-    /// Returns the position of the light as a mutable reference. `None` for a directional or
-    /// environment light.
-    pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
-        let Self { point, spot, sphere, rectangle, disk, .. } = self;
-        let point = point.as_mut().map(|point| &mut point.position);
-        let point = point.or(spot.as_mut().map(|spot| &mut spot.position));
-        let sphere = sphere.as_mut().map(|sphere| &mut sphere.center);
-        let rectangle = rectangle.as_mut().map(|rectangle| &mut rectangle.center);
-        point.or(sphere).or(rectangle).or(disk.as_mut().map(|disk| &mut disk.center))
+        let validator = LightTable::from(self).validator();
+        validator.and(unused_key).nested(self.kind.key(), kind_faults).errors()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Directional, Falloff, Light, Point, Spot};
-    use crate::value::Color;
+    use super::{Directional, Falloff, Light, LightKind, Point, Spot};
+    use crate::value::{Color, TomlValue};
 
     fn keys(light: &Light) -> Vec<String> {
         light.faults().into_iter().map(|f| f.key).collect()
     }
 
+    fn point() -> Light {
+        Light::new(Point { position: [0.0; 3] })
+    }
+
     #[test]
     fn light_has_exactly_one_kind() {
-        let mut light = Light::default();
-        assert_eq!(keys(&light), [""]);
-        light.point = Some(Point { position: [0.0; 3] });
-        assert!(keys(&light).is_empty());
-        light.falloff = Falloff::InverseSquare;
-        assert!(keys(&light).is_empty());
-        light.directional = Some(Directional { direction: [0.0, -1.0, 0.0] });
-        assert_eq!(keys(&light), ["directional"]);
-        light.point = None;
-        assert_eq!(keys(&light), ["falloff"]);
-        light.falloff = Falloff::None;
-        assert!(keys(&light).is_empty());
-        light.spot = Some(SPOT);
-        assert_eq!(keys(&light), ["spot"]);
-        light.directional = None;
-        light.falloff = Falloff::InverseSquare;
-        assert!(keys(&light).is_empty());
+        let read = |text: &str| Light::from_text(text).map_err(|error| error.message().to_string());
+        assert_eq!(read("point.position = [0, 0, 0]"), Ok(point()));
+        assert_eq!(read("intensity = 2.0"), Err("the light has no kind".to_string()));
+        let both = "directional.direction = [0, -1, 0]\npoint.position = [0, 0, 0]";
+        assert_eq!(read(both), Err("both point and directional are given".to_string()));
+    }
+
+    #[test]
+    fn falloff_belongs_to_point_and_spot_lights() {
+        for (kind, has_falloff) in [
+            (LightKind::from(Point { position: [0.0; 3] }), true),
+            (LightKind::from(Directional::along([0.0, -1.0, 0.0])), false),
+            (LightKind::from(SPOT), true),
+        ] {
+            let mut light = Light::new(kind);
+            assert!(keys(&light).is_empty());
+            light.falloff = Falloff::InverseSquare;
+            assert_eq!(keys(&light).is_empty(), has_falloff);
+        }
     }
 
     const SPOT: Spot = Spot {
@@ -302,7 +220,7 @@ mod tests {
 
     #[test]
     fn inner_cone_of_spot_is_inside_the_outer_cone() {
-        let faults = |spot| keys(&Light { spot: Some(spot), ..Light::default() });
+        let faults = |spot: Spot| keys(&Light::new(spot));
         assert!(faults(SPOT).is_empty());
         assert_eq!(faults(Spot { inner_angle: 30.1, ..SPOT }), ["spot.inner_angle"]);
         let pointed = Spot { outer_angle: 0.0, inner_angle: 0.0, ..SPOT };
@@ -314,14 +232,12 @@ mod tests {
     #[test]
     fn light_ranges_are_checked() {
         let light = Light {
-            point: Some(Point { position: [f64::NAN, 0.0, 0.0] }),
             color: Color([-1.0; 3]),
             intensity: -1.0,
-            ..Light::default()
+            ..Light::new(Point { position: [f64::NAN, 0.0, 0.0] })
         };
         assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
-        let no_direction = Directional { direction: [0.0; 3] };
-        let light = Light { directional: Some(no_direction), ..Light::default() };
+        let light = Light::new(Directional::along([0.0; 3]));
         assert_eq!(keys(&light), ["directional.direction"]);
     }
 }

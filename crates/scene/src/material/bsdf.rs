@@ -65,8 +65,7 @@ pub struct Transmission<S> {
     pub index: S,
     /// Absorption coefficients [1 / scene unit] inside of the solid; 0 absorbs nothing.
     pub absorption: [S; 3],
-    /// `true` if Fresnel's equations split the light between reflection and transmission; `false`
-    /// if k_r and k_t alone are the weights.
+    /// `true` if Fresnel's equations split the light; `false` if k_r and k_t alone are the weights.
     pub dielectric: bool,
 }
 
@@ -92,8 +91,7 @@ pub struct Bsdf<S> {
     pub reflection_fresnel: Reflectance<S>,
     /// `true` if the surface has a diffuse part or highlights.
     pub has_direct: bool,
-    /// `true` if the back of a surface has the same material as its front. `false` if the back has
-    /// no diffuse part, no highlights and no reflection lobe.
+    /// `false` if the back has no diffuse part, no highlights and no reflection lobe.
     pub two_sided: bool,
 }
 
@@ -104,11 +102,14 @@ fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material` to a BSDF. `reflects` is `true` if the scene traces reflected and
-    /// transmitted rays; otherwise the BSDF has no reflection and no transmission.
+    /// Compiles `material`. Without `reflects`, the BSDF has no reflection and no transmission.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
-        let facets = |normals| MicrofacetDistribution::new(normals, alpha, material.masking);
+        let normals = match material.lobe {
+            Lobe::Ggx => FacetNormals::Ggx,
+            Lobe::Mirror | Lobe::Cone | Lobe::Square | Lobe::Beckmann => FacetNormals::Beckmann,
+        };
+        let facets = MicrofacetDistribution::new(normals, alpha, material.masking);
         let strength = S::from_f64(material.specular);
         let specular = match material.highlight {
             _ if material.specular == 0.0 => SpecularModel::None,
@@ -117,15 +118,7 @@ impl<S: Float> Bsdf<S> {
                 exponent: S::from_f64(material.exponent),
                 sharp: material.exponent > SHARP_EXPONENT,
             },
-            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution {
-                strength,
-                facets: facets(match material.lobe {
-                    Lobe::Ggx => FacetNormals::Ggx,
-                    Lobe::Mirror | Lobe::Cone | Lobe::Square | Lobe::Beckmann => {
-                        FacetNormals::Beckmann
-                    }
-                }),
-            },
+            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution { strength, facets },
         };
         let r = material.roughness;
         let lobe = match material.lobe {
@@ -140,10 +133,7 @@ impl<S: Float> Bsdf<S> {
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
-            Lobe::Beckmann => {
-                ReflectionLobe::MicrofacetDistribution(facets(FacetNormals::Beckmann))
-            }
-            Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets(FacetNormals::Ggx)),
+            Lobe::Beckmann | Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets),
         };
         let (k_r, k_t) = (material.reflection, material.transmission);
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
@@ -203,11 +193,9 @@ pub struct BsdfValue<L> {
     pub density: L,
 }
 
-/// Returns two values: the component of `h` along the unit vector `n`, and the squared tangent of
-/// the angle between `h` and `n`. `h` may have any length.
-///
-/// The tangent is computed from the part of `h` perpendicular to `n`, which keeps full precision at
-/// small angles. It is limited to 1e15, so that terms computed from it are finite.
+/// Returns the component of `h`, of any length, along the unit vector `n`, and the squared tangent of
+/// the angle between them. The tangent is computed from the part of `h` perpendicular to `n`, which
+/// keeps full precision at small angles. It is at most 1e15, so that terms of it are finite.
 #[inline(always)]
 pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
@@ -215,11 +203,8 @@ pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
 }
 
-/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and
-/// more.
-///
-/// The cosine is clamped to 1. The dot product of two rounded unit vectors may exceed 1 by a few
-/// rounding errors, and 1.000001^1e6 is 2.7.
+/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and more.
+/// The cosine is clamped to 1, which the dot product of rounded unit vectors may exceed.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
@@ -245,9 +230,8 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Samples a unit vector of the lobe `Cone` or `Square` about the direction `axis`. The length of
-/// `axis` is 1 within rounding errors. `u` and `v` are uniform in [0, 1). Returns `axis` for other
-/// lobes.
+/// Samples a unit vector of the lobe `Cone` or `Square` about `axis`, whose length is 1 within
+/// rounding errors. Returns `axis` for other lobes.
 #[inline(always)]
 pub(super) fn spread<L: SimdFloat>(
     lobe: &ReflectionLobe<L::Scalar>,
@@ -263,7 +247,7 @@ pub(super) fn spread<L: SimdFloat>(
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Returns `true` if the surface has highlights, which are reflections of lights.
+    /// Returns `true` if the surface has highlights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
         !matches!(self.specular, SpecularModel::None)
@@ -281,7 +265,7 @@ impl<S: Float> Bsdf<S> {
         matches!(self.lobe, ReflectionLobe::Mirror)
     }
 
-    /// Returns the reflection coefficient k_r; 0 if the material reflects no rays.
+    /// Returns k_r.
     #[inline(always)]
     pub(super) fn strength<L: SimdFloat<Scalar = S>>(&self) -> L {
         L::splat(self.reflection.unwrap_or_default())
@@ -354,10 +338,8 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // The normal of the microfacet that reflects this ray is half-way between the direction to
-        // the viewer and that of the reflected ray. The cosine of its angle to either direction is
-        // half the length of the sum of both directions. This length has no cancellation at grazing
-        // angles.
+        // Half the length of the sum of both directions is the cosine of the angle to the normal
+        // half-way between them, without cancellation at grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }

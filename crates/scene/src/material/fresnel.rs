@@ -23,10 +23,9 @@ pub fn f0_from_index(n: f64) -> f64 {
 pub struct Reflectance<S> {
     mode: Fresnel,
     f0: [S; 3],
-    /// Squared index of refraction minus 1, per channel, for the modes `Exact` and `Dielectric`.
+    /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
-    /// Channels with an infinite index of refraction (F0 = 1), whose reflectance is 1 at every
-    /// angle.
+    /// Channels with an infinite index of refraction (F0 = 1).
     total: [bool; 3],
 }
 
@@ -42,7 +41,9 @@ impl<S: Float> Reflectance<S> {
         let mode = material.fresnel_mode();
         let index2 = match mode {
             Fresnel::Dielectric => [material.ior.powi(2) - 1.0; 3],
-            _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => {
+                f0.map(|f| index_from_f0(f).powi(2) - 1.0)
+            }
         };
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
         Self {
@@ -55,8 +56,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at an angle of incidence. `c` returns the cosine of
-    /// this angle. It is not called if the reflectance is the same at every angle.
+    /// Returns `value` times the reflectance at the angle whose cosine `c` returns. `c` is not called
+    /// if the reflectance is the same at every angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -96,8 +97,7 @@ impl<S: Float> Reflectance<S> {
         }
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
-        // At n = 1 and grazing incidence, g = c = 0: there is no boundary then, and the reflectance
-        // is 0.
+        // At n = 1 and grazing incidence, g = c = 0: there is no boundary.
         let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
         L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)

@@ -10,8 +10,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 
-/// Formula that gives texture coordinates (u, v) at points of texture space, which has x to the
-/// right, y up, z to the front.
+/// Formula of texture coordinates (u, v) in texture space: x to the right, y up, z to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// Planar projection: u = x, v = y.
@@ -28,36 +27,33 @@ pub enum Projection {
     Uv,
 }
 
-/// Distance that v keeps from 0 and 1 in a cylindrical projection. At a flat end of the shape v
-/// would be exactly 0 or 1. Rounding errors could then move v past the edge of the image, to the
-/// colour of the opposite end.
+/// Distance that v keeps from 0 and 1 in a cylindrical projection, so that rounding errors at a flat
+/// end of the shape do not move v past the edge of the image.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor that favours the later of two axes (in the order x, y, z) when a box projection chooses
-/// the side of the box. Without it, rounding errors would decide between axes at equal angles to
-/// the normal.
+/// Factor that favours the later of two axes (in the order x, y, z) at equal angles to the normal,
+/// when a box projection chooses the side of the box.
 const TIE: f64 = 1.001;
 
-/// Upper bound of the error of a surface point, and of a texture coordinate computed from it. The
-/// unit is the rounding error of the largest number in the computation.
+/// Upper bound of the error of a surface point, and of a texture coordinate computed from it, in
+/// rounding errors of the largest number in the computation.
 const POINT_ROUNDINGS: f64 = 16.0;
 
 /// Largest angle between the normal of a surface and the gradient of a texture coordinate at which
-/// the coordinate counts as constant along the surface. The unit is the rounding error of the
-/// number 1.
+/// the coordinate counts as constant along the surface, in rounding errors of 1.
 const ANGLE_ROUNDINGS: f64 = 64.0;
 
-/// Texture coordinates (u, v) of a point, and their gradients with respect to the position in
-/// texture space. One unit of u or v is one repetition of the image.
+/// Texture coordinates of a point, in repetitions of the image, and their gradients with respect to
+/// the position in texture space.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
-    /// Texture coordinate u, which grows to the right in the image.
+    /// Coordinate to the right in the image.
     pub u: L,
-    /// Texture coordinate v, which grows upwards in the image.
+    /// Coordinate upwards in the image.
     pub v: L,
-    /// Gradient of the texture coordinate u with respect to the position in texture space.
+    /// Gradient of u.
     pub grad_u: Vec3<L>,
-    /// Gradient of the texture coordinate v with respect to the position in texture space.
+    /// Gradient of v.
     pub grad_v: Vec3<L>,
 }
 
@@ -70,12 +66,11 @@ pub struct TextureMapping<S> {
     /// Columns of the linear map from texture space to scene space.
     scene_from_texture: [[S; 3]; 3],
     /// Centre, in the scene, of the part of the object that has this texture. Points are mapped
-    /// relative to this centre, so that rounding errors are in proportion to the size of the part.
+    /// relative to it, so that rounding errors are in proportion to the size of the part.
     center: [S; 3],
-    /// Coordinates of the centre of the object's part in texture space, relative to the origin of
-    /// the projection's formula.
+    /// This centre in texture space, relative to the origin of the formula.
     texture_center: [S; 3],
-    /// Edge lengths, in texture space, of the bounding box of the object's part.
+    /// Edge lengths of the part's bounding box in texture space.
     extent: [S; 3],
     scale: [S; 2],
     offset: [S; 2],
@@ -83,9 +78,8 @@ pub struct TextureMapping<S> {
     input_error: S,
 }
 
-/// Returns the rotation from texture space to the coordinates of the projection's formula. The
-/// formula projects along z (planar) or around y (spherical and cylindrical). `axis` is the axis of
-/// texture space along or around which the texture is projected; `None` is the axis of the formula.
+/// Returns the rotation from texture space to the coordinates of the formula, which projects along z
+/// or around y. `axis` replaces this axis.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -93,16 +87,17 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
         (Projection::Planar, Some(Axis::Y)) => [x, -z, y],
         (Projection::Spherical | Projection::Cylindrical, Some(Axis::X)) => [z, x, y],
         (Projection::Spherical | Projection::Cylindrical, Some(Axis::Z)) => [y, z, x],
-        _ => [x, y, z],
+        (Projection::Planar, None | Some(Axis::Z))
+        | (Projection::Spherical | Projection::Cylindrical, None | Some(Axis::Y))
+        | (Projection::Box | Projection::Uv, _) => [x, y, z],
     };
     DMat3::from_cols(rows[0], rows[1], rows[2]).transpose()
 }
 
 impl<S: Float> TextureMapping<S> {
-    /// Compiles the placement of a texture for one part of an object. `projection` is the
-    /// projection that `placement` selects for the part. `low` and `high` are opposite corners of
-    /// the part's bounding box, in texture space. `input_error` is the rounding error of the
-    /// coordinates in the scene file, in scene units.
+    /// Compiles the placement of a texture, with the `projection` that it selects for a part of an
+    /// object. `low` and `high` are corners of the part's bounding box in texture space, and
+    /// `input_error` is the rounding error of coordinates in the scene file.
     pub fn new(
         placement: &Placement,
         projection: Projection,
@@ -144,24 +139,22 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns `true` if the texture uses the shape's own texture coordinates instead of a
-    /// projection.
+    /// Returns `true` if the texture uses the shape's own texture coordinates.
     pub fn wants_uv(&self) -> bool {
         self.projection == Projection::Uv
     }
 
-    /// Maps a normal of any length from scene space to texture space or back. `columns` are the
-    /// columns of the matrix that maps points in the opposite direction, because normals are mapped
-    /// by the transpose of the inverse matrix.
+    /// Maps a normal of any length by the transpose of the inverse matrix: `columns` are those of the
+    /// matrix that maps points in the opposite direction.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
         Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
-    /// Returns the texture coordinates at `point` with the outer normal `normal`, both in scene
-    /// space. If [`TextureMapping::wants_uv`] is `true`, the caller must pass the shape's own
-    /// coordinates to [`TextureMapping::placed`] instead.
+    /// Returns the texture coordinates at `point` with the outer normal `normal`. If
+    /// [`TextureMapping::wants_uv`] is `true`, the caller must pass the shape's own coordinates to
+    /// [`TextureMapping::placed`] instead.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
@@ -186,7 +179,7 @@ impl<S: Float> TextureMapping<S> {
         self.placed(coordinates)
     }
 
-    /// Applies the scale and the offset of the texture's placement to texture coordinates.
+    /// Applies the scale and the offset of the placement.
     pub fn placed<L: SimdFloat<Scalar = S>>(&self, unplaced: TexCoord<L>) -> TexCoord<L> {
         let ([su, sv], [ou, ov]) = (self.scale.map(L::splat), self.offset.map(L::splat));
         TexCoord {
@@ -197,15 +190,14 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns the texture coordinates u and v, moved off edges of the texture if necessary. This
-    /// is for textures whose colour jumps at edges, such as checkers. `coordinates` are those of a
-    /// point with the outer normal `normal`. `rounding` is the rounding error of the point's
-    /// largest coordinate.
+    /// Returns the texture coordinates u and v, moved off edges at which the colour of the texture
+    /// jumps. `coordinates` are those of a point with the outer normal `normal`, and `rounding` is
+    /// the rounding error of its largest coordinate.
     ///
-    /// A flat face of a shape may lie exactly on an edge of the texture. An example is the lid of a
-    /// box whose height is a whole number of squares. One texture coordinate is constant on such a
-    /// face, and rounding would decide between two colours at each point. A constant coordinate is
-    /// therefore increased by its largest rounding error.
+    /// A flat face may lie exactly on an edge of the texture, such as the lid of a box whose height
+    /// is a whole number of squares. One coordinate is constant there, and rounding would decide
+    /// between two colours. A constant coordinate is therefore increased by its largest rounding
+    /// error.
     pub fn beside_edges<L: SimdFloat<Scalar = S>>(
         &self,
         coordinates: &TexCoord<L>,
@@ -224,8 +216,7 @@ impl<S: Float> TextureMapping<S> {
             let constant = across.length_squared().sqrt().le(steepness * angle);
             let largest = value.abs() + offset.abs() + scale;
             let error = largest.mul_add(L::from_f64(POINT_ROUNDINGS * L::EPSILON), moved);
-            // The start and the end of the range of u are the same place on the surface, one full
-            // turn apart. A constant u at the end is replaced by the start.
+            // The start and the end of the range of u are the same place, one turn apart.
             let at_end = if periodic {
                 constant & (value - offset - scale).abs().le(error)
             } else {
@@ -238,11 +229,9 @@ impl<S: Float> TextureMapping<S> {
         (beside(u, grad_u, su, ou, periodic), beside(v, grad_v, sv, ov, false))
     }
 
-    /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in
-    /// texture space. Heights rise along the outer normal: `outward` is 1 if `normal` is the outer
-    /// normal, and -1 otherwise.
-    ///
-    /// The heights are added in texture space, so that bumps are transformed with their object.
+    /// Returns the unit normal perturbed by a bump map, whose height has the gradient `gradient` in
+    /// texture space; bumps are thus transformed with their object. `outward` is 1 if `normal` is
+    /// the outer normal, along which heights rise, and -1 otherwise.
     pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
         normal: Vec3<L>,
@@ -271,12 +260,12 @@ fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
     TexCoord { u: p.x, v: p.y, grad_u: along_axis(0, L::one()), grad_v: along_axis(1, L::one()) }
 }
 
-/// Returns three values: the angle of `p` around the y axis in turns, the gradient of this angle,
-/// and the squared distance from the axis.
+/// Returns the angle of `p` around the y axis in turns, its gradient, and the squared distance from
+/// the axis.
 #[inline(always)]
 fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
-    // The squared distance has a lower bound, because angle and gradient are undefined on the axis.
+    // Angle and gradient are undefined on the axis.
     let across2 = across2.max(p.length_squared() * L::from_f64(1e-12)).max(L::from_f64(1e-30));
     let turns = p.x.atan2(p.z).mul_add(L::from_f64(1.0 / TAU), L::from_f64(0.5));
     let per = L::from_f64(1.0 / TAU) / across2;
@@ -306,8 +295,8 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     }
 }
 
-/// Returns the planar projection on the side of a box that `normal` points out of. The coordinates
-/// are measured from the lower left corner of this side, as seen from outside.
+/// Returns the planar projection on the side of a box that `normal` points out of, from the lower
+/// left corner of this side as seen from outside.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);

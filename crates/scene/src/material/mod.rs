@@ -16,7 +16,7 @@ pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
 pub use microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
 pub use refraction::{FresnelSplit, Interface};
-pub use rough_interface::{InterfaceQuery, InterfaceSample};
+pub use rough_interface::{InterfaceMedia, InterfaceQuery, InterfaceSample};
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,
@@ -168,39 +168,36 @@ impl Metal {
 }
 
 impl Material {
-    /// Returns the reflectance at normal incidence: that of `metal` if it is given, otherwise `f0`.
-    /// If neither is given, it follows from the index of refraction for a dielectric, and is white
-    /// for any other material.
+    /// Returns the reflectance at normal incidence: that of `metal`, `f0`, or the index of refraction
+    /// of a dielectric; otherwise white.
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
-            _ => Color::WHITE,
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => Color::WHITE,
         };
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
-    /// Returns the dependence of the reflectance on the angle: the key `fresnel`, or its default.
+    /// Returns the key `fresnel`, or its default.
     pub fn fresnel_mode(&self) -> Fresnel {
         let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
         self.fresnel.unwrap_or(default)
     }
 
-    /// Returns the alpha of the microfacet distribution. If the key `alpha` is not given, the
-    /// distribution has the same second moment as the reflection cone of `roughness`.
+    /// Returns the alpha of the microfacet distribution. By default, the distribution has the same
+    /// second moment as the reflection cone of `roughness`.
     pub fn microfacet_alpha(&self) -> f64 {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 
-    /// Returns the absorption coefficient of the inside [1 / scene unit] in each channel. By Beer's
-    /// law, the fraction exp(-coefficient x distance) of the light is left after a distance.
-    /// Coefficients are at most 1e30. A channel of `attenuation_color` below 1e-38 counts as 1e-38,
-    /// so that its logarithm is finite.
+    /// Returns the absorption coefficients of Beer's law [1 / scene unit], at most 1e30. Channels of
+    /// `attenuation_color` below 1e-38 count as 1e-38, so that their logarithms are finite.
     pub fn absorption(&self) -> [f64; 3] {
         let coefficient = |c: f64| -c.max(1e-38).ln() / self.attenuation_distance;
         self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))
     }
 
-    /// Returns the radiance that the surface emits; black if it emits nothing.
+    /// Returns the radiance that the surface emits.
     pub fn emitted(&self) -> [f64; 3] {
         self.emission_color.scaled(self.emission).0
     }

@@ -23,23 +23,21 @@ pub struct Interface<L: SimdFloat> {
     n_t: L,
 }
 
-/// Weights of reflected and transmitted rays at the boundary of two media.
+/// Factors of the radiance along reflected and transmitted rays at the boundary of two media.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor by which the radiance along the reflected ray is multiplied. The ray's direction
-    /// comes from the BSDF's reflection lobe.
+    /// Factor of the reflection lobe.
     pub reflected: L,
-    /// Factor by which the radiance along the transmitted ray is multiplied.
+    /// Factor of the transmitted ray.
     pub transmitted: L,
-    /// Factor by which the radiance along a mirror reflection is multiplied. This reflection
-    /// replaces the transmitted ray in total internal reflection.
+    /// Factor of the mirror reflection that replaces the transmitted ray in total internal
+    /// reflection.
     pub tir: L,
 }
 
 impl<L: SimdFloat> Interface<L> {
-    /// Refracts rays with the unit direction `incident` at a boundary. `n` is the unit normal of
-    /// the boundary on the side of the rays. `n_i` is the index of refraction on this side, and
-    /// `n_t` that on the other side.
+    /// Refracts rays with the unit direction `incident` at a boundary with the unit normal `n` on
+    /// their side, where the index of refraction is `n_i`; behind the boundary it is `n_t`.
     ///
     /// The sine of the angle of refraction is sin t = (n_i / n_t) sin i. It is computed from the
     /// part of the direction along the boundary, so that grazing rays keep full precision. With
@@ -64,14 +62,12 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// Returns two values: the reflectance of the boundary for s polarisation, and that for p
-    /// polarisation.
+    /// Returns the reflectances of the boundary for s and p polarisation.
     #[inline(always)]
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
         let reflectance = |a: L, b: L| {
-            // With equal indices and a grazing ray, a and b are zero: there is no boundary then,
-            // and the reflectance is 0.
+            // With equal indices and a grazing ray, a and b are zero: there is no boundary.
             let r = (a - b) / (a + b).max(L::from_f64(1e-30));
             r * r
         };
@@ -87,71 +83,41 @@ impl<L: SimdFloat> Interface<L> {
         (s + p) * L::from_f64(0.5)
     }
 
-    /// Returns the reflectance of a thin pane for unpolarised light: the mean over both
-    /// polarisations of 2 F / (1 + F), with F the reflectance of the boundary for one polarisation.
-    /// The pane is a slab with this boundary on both sides, and all inner reflections are included.
+    /// Returns the reflectance of a thin pane, with all inner reflections, for unpolarised light: the
+    /// mean of 2 F / (1 + F) over both polarisations.
     #[inline(always)]
     pub fn pane_reflectance(&self) -> L {
         let (s, p) = self.polarised();
         s / (L::one() + s) + p / (L::one() + p)
     }
 
-    /// Returns the weights of reflected and transmitted rays. `outer` selects the lanes whose rays
-    /// come from outside of a solid.
+    /// Returns the weights at a boundary. `outer` selects the rays from outside of a solid, and `thin`
+    /// the surfaces of thin panes, which do not refract.
     ///
-    /// If `transmission.dielectric` is `false`, Fresnel's equations are not used. A solid then
-    /// reflects only on its outer side, which prevents endless reflections between its inner walls.
-    /// In total internal reflection all light is reflected, with and without Fresnel's equations.
+    /// Without Fresnel's equations a solid reflects only on its outer side, which prevents endless
+    /// reflections between its inner walls, and in total internal reflection.
     #[inline(always)]
-    pub fn split(&self, transmission: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
-        let k_t = L::splat(transmission.strength);
-        if transmission.dielectric {
-            let f = self.reflectance();
-            return FresnelSplit {
-                reflected: f,
-                transmitted: (k_t * (L::one() - f)).masked(!self.tir),
-                tir: L::zero(),
-            };
-        }
-        FresnelSplit {
-            reflected: L::one().masked(outer.and_not(self.tir)),
-            transmitted: k_t.masked(!self.tir),
-            tir: L::one().masked(self.tir),
-        }
-    }
-
-    /// Returns the weights of reflected and transmitted rays at a thin pane, which does not
-    /// refract.
-    #[inline(always)]
-    pub fn split_thin(&self, transmission: &Transmission<L::Scalar>) -> FresnelSplit<L> {
-        let k_t = L::splat(transmission.strength);
-        if !transmission.dielectric {
-            return FresnelSplit { reflected: L::one(), transmitted: k_t, tir: L::zero() };
-        }
-        let f = self.pane_reflectance();
-        FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), tir: L::zero() }
-    }
-
-    /// Returns the weights of [`Interface::split_thin`] in the lanes of `thin`, and those of
-    /// [`Interface::split`] elsewhere.
-    #[inline(always)]
-    pub fn split_at(
+    pub fn split(
         &self,
         transmission: &Transmission<L::Scalar>,
         outer: L::Mask,
         thin: L::Mask,
     ) -> FresnelSplit<L> {
-        let split = self.split(transmission, outer);
-        if thin.none() {
-            return split;
+        let k_t = L::splat(transmission.strength);
+        let tir = self.tir.and_not(thin);
+        if !transmission.dielectric {
+            return FresnelSplit {
+                reflected: L::one().masked(thin | outer.and_not(self.tir)),
+                transmitted: k_t.masked(!tir),
+                tir: L::one().masked(tir),
+            };
         }
-        let of_thin = self.split_thin(transmission);
-        let choose = |a, b| L::select(thin, a, b);
-        FresnelSplit {
-            reflected: choose(of_thin.reflected, split.reflected),
-            transmitted: choose(of_thin.transmitted, split.transmitted),
-            tir: choose(of_thin.tir, split.tir),
+        let mut f = self.reflectance();
+        if thin.any() {
+            f = L::select(thin, self.pane_reflectance(), f);
         }
+        let transmitted = (k_t * (L::one() - f)).masked(!tir);
+        FresnelSplit { reflected: f, transmitted, tir: L::zero() }
     }
 }
 

@@ -12,7 +12,7 @@ use crate::value::{Color, Description, Field, FieldValue, ValidationError, Value
 use crate::value::{choices, description, one_of};
 use std::sync::Arc;
 
-/// Texture that multiplies a material's colour: one kind of texture with its parameters.
+/// Texture that multiplies a material's colour.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texture {
     /// Image from a file: `texture.image` in scene files.
@@ -25,7 +25,7 @@ one_of! {
     Texture { "image" => Image, "checker" => Checker }
 }
 
-/// Bump map that perturbs shading normals: one kind of bump map with its parameters.
+/// Bump map that perturbs shading normals.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bump {
     /// Heights from an image: `bump.image` in scene files.
@@ -159,14 +159,13 @@ choices! {
 /// Placement of a texture on a shape: the keys that determine its texture coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Source of the texture coordinates, such as a projection.
+    /// Source of the texture coordinates.
     pub mapping: Mapping,
-    /// Axis around or along which the mapping projects; `None` is the default axis of the mapping.
+    /// Axis around or along which the mapping projects; `None` is its default axis.
     pub axis: Option<Axis>,
     /// Repetitions of the image per unit of u and of v.
     pub scale: [f64; 2],
-    /// Offset that is added to the scaled texture coordinates. Its unit is one repetition of the
-    /// image.
+    /// Offset that is added to the scaled texture coordinates, in repetitions.
     pub offset: [f64; 2],
 }
 
@@ -186,24 +185,21 @@ macro_rules! placed {
 placed!(ImageTexture, Checker, HeightImage);
 
 impl ImageTexture {
-    /// Returns the pixels of the texture image; `None` if no file has been loaded, or if it is
-    /// unreadable.
+    /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
 }
 
 impl HeightImage {
-    /// Returns the pixels of the height image; `None` if no file has been loaded, or if it is
-    /// unreadable.
+    /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
 }
 
 impl Texture {
-    /// Creates a texture of the kind `key` with default parameters; `None` if there is no such
-    /// kind.
+    /// Creates a texture with default parameters; `None` if there is no kind `key`.
     pub fn new(key: &str) -> Option<Self> {
         match key {
             "image" => Some(Self::Image(ImageTexture::default())),
@@ -228,8 +224,7 @@ impl Texture {
         }
     }
 
-    /// Returns a texture of the kind `key` with the placement of the texture `self`; `None` if
-    /// there is no such kind.
+    /// Returns a texture of another kind with the same placement; `None` if there is no kind `key`.
     pub fn changed(&self, key: &str) -> Option<Self> {
         let Placement { mapping, axis, scale, offset } = self.placement();
         Some(match Self::new(key)? {
@@ -242,8 +237,7 @@ impl Texture {
         })
     }
 
-    /// Returns `true` if the texture changes colours: a checkerboard, or an image whose file was
-    /// read.
+    /// Returns `true` if the texture changes colours.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
@@ -253,8 +247,7 @@ impl Texture {
 }
 
 impl Bump {
-    /// Creates a bump map of the kind `key` with default parameters; `None` if there is no such
-    /// kind.
+    /// Creates a bump map with default parameters; `None` if there is no kind `key`.
     pub fn new(key: &str) -> Option<Self> {
         (key == "image").then(|| Self::Image(HeightImage::default()))
     }
@@ -265,21 +258,20 @@ impl Bump {
         image.placement()
     }
 
-    /// Returns `true` if the bump map perturbs normals. Returns `false` without a readable file, or
-    /// if the height is 0.
+    /// Returns `true` if the bump map perturbs normals.
     pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
     }
 }
 
-/// Keys of `texture` in scene files, one for each kind of texture.
+/// Keys of `texture` in scene files.
 const TEXTURE_KINDS: &[Field] = &[
     Field::required("image", ImageTexture::TYPE, "", ImageTexture::DOC),
     Field::required("checker", Checker::TYPE, "", Checker::DOC),
 ];
 
-/// Keys of `bump` in scene files, one for each kind of bump map.
+/// Keys of `bump` in scene files.
 const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
 
 impl FieldValue for Texture {
@@ -310,7 +302,7 @@ impl crate::material::Material {
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => Some(image.file.as_str()),
-            _ => None,
+            Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref().map(|Bump::Image(image)| image.file.as_str());
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
@@ -320,7 +312,7 @@ impl crate::material::Material {
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => image.image(),
-            _ => None,
+            Some(Texture::Checker(_)) | None => None,
         };
         let bump = self.bump.as_ref().and_then(|Bump::Image(image)| image.image());
         [texture, bump].into_iter().flatten()

@@ -5,24 +5,24 @@ use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 use zerkalo_kernel::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 
-/// Texture compiled for the kernels. One unit of its coordinates is one repetition of the image.
+/// Texture compiled for the kernels.
 #[derive(Clone, Debug)]
 pub enum CompiledTexture<S> {
     /// Checkerboard with two by two squares per repetition: the colour of the square that begins at
     /// u = v = 0, and the colour of its neighbours.
     Checker([[S; 3]; 2]),
-    /// Image from a file, with its interpolation and its continuation beyond the edges.
+    /// Image from a file.
     Image {
-        /// Pixels of the texture image.
+        /// Pixels.
         image: Arc<Image>,
-        /// Continuation of the image beyond its edges.
+        /// Continuation beyond the edges.
         wrap: Wrap,
         /// Interpolation between the centres of pixels.
         filter: TextureFilter,
     },
 }
 
-/// Bump map compiled for the kernels. One unit of its coordinates is one repetition of the image.
+/// Bump map compiled for the kernels.
 #[derive(Clone, Debug)]
 pub struct BumpMap {
     image: Arc<Image>,
@@ -31,10 +31,9 @@ pub struct BumpMap {
     height: f64,
 }
 
-/// Returns the position of the texture coordinate `x` (in repetitions) along an axis of `size`
-/// pixels, as two values. The first is the index of the last pixel whose centre is at or before
-/// `x`; it may be out of range. The second is the distance of `x` from this centre in pixels, from
-/// 0 to 1. `wrap` is the rule for positions beyond the edges.
+/// Returns the index of the last pixel, along an axis of `size` pixels, whose centre is at or before
+/// the texture coordinate `x`, and the distance of `x` from this centre in pixels, from 0 to 1. The
+/// index may be out of range.
 #[inline(always)]
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
@@ -48,7 +47,7 @@ fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     (x.floor() as i32, x - x.floor())
 }
 
-/// Maps the index `i`, which may be out of range, to one of `size` pixels by the rule `wrap`.
+/// Maps the index `i`, which may be out of range, to one of `size` pixels.
 #[inline(always)]
 fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     match wrap {
@@ -77,8 +76,7 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
     })
 }
 
-/// Calls `f(lane)` for the lanes whose bits are set in `bits`, and returns the results as SIMD
-/// vectors; other lanes are zero.
+/// Returns the results of `f(lane)` for the lanes whose bits are set; other lanes are zero.
 #[inline(always)]
 fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];
@@ -106,8 +104,7 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
-    /// Returns `true` if the colour jumps at edges: in a checkerboard, or in an image whose pixels
-    /// are not interpolated.
+    /// Returns `true` if the colour jumps at edges.
     pub fn has_edges(&self) -> bool {
         match self {
             Self::Checker(_) => true,
@@ -140,8 +137,8 @@ impl BumpMap {
         Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
     }
 
-    /// Returns two values: the derivatives of the bump map's height with respect to u and v, in
-    /// scene units per repetition, in the lanes whose bits are set in `bits`.
+    /// Returns the derivatives of the height with respect to u and v, in scene units per repetition,
+    /// in the lanes whose bits are set.
     ///
     /// Central differences of the heights at the pixels are interpolated bilinearly, so that the
     /// result is continuous. The exact derivatives of bilinearly interpolated heights would jump at
@@ -163,8 +160,7 @@ impl BumpMap {
         let rows: [u32; 4] = array_from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
         let height_at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
         let lerp = |f: f64, a: f64, b: f64| a + f * (b - a);
-        // Central differences of the heights to the right and downwards, each of which is twice the
-        // slope per pixel. They are needed at the four pixels around the point.
+        // Central differences to the right and downwards: twice the slopes per pixel.
         let right = |i: usize, j: usize| height_at(i + 1, j) - height_at(i - 1, j);
         let down = |i: usize, j: usize| height_at(i, j + 1) - height_at(i, j - 1);
         let du = lerp(fy, lerp(fx, right(1, 1), right(2, 1)), lerp(fx, right(1, 2), right(2, 2)));

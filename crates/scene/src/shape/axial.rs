@@ -1,13 +1,11 @@
-//! Solids of revolution around an axis between two points: shared code of cylinder, cone and
-//! tapered cylinder.
+//! Shared code of cylinder, cone and tapered cylinder: an axis between two points.
 
 use crate::shape::texture_space::around_axis;
 use crate::value::{ValidationError, Validator, unit};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::Form;
 
-/// Returns a conical frustum around the axis from `base` to `top`. The two points must differ. The
-/// radii at the ends must be at least 0 and not both 0.
+/// Returns the frustum from `base` to `top`, which differ. The radii are at least 0 and not both 0.
 pub(super) fn frustum_between(
     base: [f64; 3],
     top: [f64; 3],
@@ -27,17 +25,15 @@ pub(super) fn frustum_between(
     Form::conical_frustum(DAffine3::from_mat3_translation(linear, start), narrow / wide)
 }
 
-/// Implements the methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the axis
-/// between the points `$base` and `$top`.
+/// Methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the axis from `$base` to
+/// `$top`.
 macro_rules! by_axis {
     ($base:ident, $top:ident) => {
         fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
             vec![&mut self.$base, &mut self.$top]
         }
 
-        /// Returns `true`, without a change, if the axis is vertical: the solid is then symmetric
-        /// about the vertical. Returns `false` for any other axis, because the solid is not
-        /// rotated.
+        /// Returns `true`, without a change, if the axis is vertical.
         fn rotate_y(&mut self, _: f64) -> bool {
             self.$base[0] == self.$top[0] && self.$base[2] == self.$top[2]
         }
@@ -49,17 +45,14 @@ macro_rules! by_axis {
 }
 pub(super) use by_axis;
 
-/// Returns texture axes whose y axis points from `base` to `top`, as the columns of a rotation
-/// matrix.
+/// Returns texture axes whose y axis points from `base` to `top`.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     let axis = DVec3::from_array(top) - DVec3::from_array(base);
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns the errors of `checks` and the errors of the axis from `base` to `top`. It is an error
-/// if the axis has length 0. It is also an error if a coordinate is too large relative to the
-/// length of the axis or to one of `sizes`, which are pairs `(key, value)`. `name` is the key of
-/// `top` in scene files.
+/// Returns the errors of `checks`, of an axis without length, and of coordinates that are too large
+/// for the axis or one of `sizes`. `name` is the key of `top`.
 pub(super) fn axis_faults(
     checks: Validator,
     [base, top]: [[f64; 3]; 2],

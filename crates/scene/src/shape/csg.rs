@@ -1,8 +1,5 @@
-//! Compound objects: union, intersection and difference of solids, nested up to 64 deep.
-//!
-//! A part is written like an object, with `shape` and optionally `material` and `transform`, so
-//! that users can copy the text of an object into a compound, and the text of a part into an
-//! object.
+//! Compound objects: union, intersection and difference of solids, nested up to 64 deep. A part is
+//! written like an object, so that users can copy the text of one into the other.
 
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
@@ -110,10 +107,8 @@ compounds! {
 ]";
 }
 
-/// Returns the example parts of a new compound that fills a box. `base` is the centre of the lower
-/// side of this box, and `size` is its size. The first part is a block that stands on `base` and
-/// has nine tenths of `size`. The second is a ball that protrudes from the upper right near corner
-/// of the block.
+/// Returns the parts of a new compound that fills a box on `base`: a block of nine tenths of
+/// `size`, and a ball at its upper right near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -129,8 +124,7 @@ impl CsgOperand {
     }
 }
 
-/// Combines the parts of a compound into one solid. `join` creates the CSG tree of the compound
-/// from the CSG trees of its parts.
+/// Combines the parts of a compound; `join` creates its tree from those of the parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -173,8 +167,8 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the validation errors of `of`, the parts of a compound. `depth` is the nesting depth of
-/// the compound: 1 if it is no part of another one.
+/// Returns the validation errors of the parts of a compound. Its `depth` is 1 if it is no part of
+/// another.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -214,16 +208,12 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// Material that a part of a compound names, as `(key, material)`. `key` is the dotted key of the
-/// name in scene files, relative to the shape, such as `union.of.0.material`. `material` is the
-/// name.
+/// Material that a part names: the dotted key, such as `union.of.0.material`, and the name.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// Returns the material name of each solid in the shape, in the order of [`CsgSolid::parts`]. A
-    /// solid without a material of its own has the material of the innermost enclosing compound
-    /// that has one. If there is no such compound, its material is `whole`. A shape that is no
-    /// compound is one solid.
+    /// Returns the material of each solid in the shape, in the order of [`CsgSolid::parts`]: its
+    /// own, or that of the innermost compound that has one, or `whole`.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match self.parts() {
             None => vec![whole],
@@ -237,8 +227,7 @@ impl Shape {
         }
     }
 
-    /// Returns the mutable material names of all parts; the name of a part without a material is
-    /// empty.
+    /// Returns the material names of all parts, which may be empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in self.parts_mut() {
@@ -248,8 +237,7 @@ impl Shape {
         names
     }
 
-    /// Returns the references to materials in all nested parts of a compound, except for parts
-    /// without a material of their own. Empty if the shape is no compound.
+    /// Returns the materials that nested parts name.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in self.parts().into_iter().flatten().enumerate() {
@@ -261,5 +249,21 @@ impl Shape {
             named.extend(inner.map(|(tail, name)| (format!("{key}.shape.{tail}"), name)));
         }
         named
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::EXAMPLES;
+
+    #[test]
+    fn shapes_that_fit_into_compounds_are_solids() {
+        for (key, _) in EXAMPLES {
+            let shape = Shape::fitted_to(key, DVec3::ZERO, DVec3::ONE).unwrap();
+            let form = shape.form();
+            let is_solid = matches!(form, Form::Csg(_)) || form.into_solid().is_some();
+            assert_eq!(unfit_reason(&shape).is_none(), is_solid, "{key}");
+        }
     }
 }

@@ -40,7 +40,6 @@ impl ShapeDesc for Cube {
 }
 
 /// Returns the corners of a square, as (x, z) offsets from its lower left near corner (near is +z).
-/// `side` is the length of a side.
 pub(super) fn square(side: f64) -> [DVec2; 4] {
     [(0.0, 0.0), (side, 0.0), (side, -side), (0.0, -side)].map(DVec2::from)
 }

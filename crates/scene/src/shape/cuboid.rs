@@ -1,8 +1,4 @@
-//! Box with sides parallel to the axes.
-//!
-//! A box is described by its centre and size, like the shapes `platform` and `rectangle`. A change
-//! of the key `center` alone moves the box. Two opposite corners would need two changes, and could
-//! be given in the wrong order. A `transform` rotates the box.
+//! Box with sides parallel to the axes, described by centre and size, so that one key moves it.
 
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::prismoid;

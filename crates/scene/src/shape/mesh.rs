@@ -42,8 +42,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // The edges of the icosahedron have the squared length 4; all other pairs of corners have a
-    // squared distance above 10. Every three corners that are pairwise neighbours form a triangle.
+    // The edges have the squared length 4; other pairs of corners are farther apart than 10.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -102,8 +101,7 @@ impl ShapeDesc for MeshDesc {
         self.content.fault().into_iter().collect()
     }
 
-    /// Creates a mesh without a file: the placeholder at the origin. The box to fill is ignored,
-    /// because only a transform moves a mesh.
+    /// Creates the placeholder, because only a transform moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
     }
@@ -123,8 +121,7 @@ impl Shape {
         Some(mesh.file.as_str()).filter(|file| !file.is_empty())
     }
 
-    /// Returns the mesh that was read from the file that the shape names. Returns `None` if the
-    /// shape names no file or the file could not be read.
+    /// Returns the mesh that was read from the file.
     pub fn mesh(&self) -> Option<&Arc<Mesh>> {
         let Self::MeshDesc(mesh) = self else { return None };
         mesh.content.content()

@@ -1,7 +1,5 @@
-//! Shapes: descriptions of geometry in scene files, one kind per file, with keys, ranges and help.
-//! Rays do not intersect descriptions. Each description is converted to a canonical form: one of a
-//! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
-//! intersection kernels.
+//! Shapes: descriptions of geometry in scene files, one kind per file. Each becomes a canonical
+//! form of the module `primitive`, which rays intersect.
 
 #![deny(clippy::wildcard_enum_match_arm)]
 

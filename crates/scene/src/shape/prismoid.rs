@@ -4,8 +4,7 @@ use crate::value::{round_nice, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
 
-/// Implements the methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the keys
-/// `corner` and `rotation` of an upright solid.
+/// Methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on `corner` and `rotation`.
 macro_rules! by_corner_and_rotation {
     () => {
         fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
@@ -30,13 +29,12 @@ pub(super) use by_corner_and_rotation;
 
 /// Returns the convex solid over a horizontal polygon: a prism, a pyramid or a frustum.
 ///
-/// `base` is the list of the polygon's corners in order along its boundary, as (x, z) offsets from
-/// `corner`. `top_over_base` is the ratio of the side lengths of top and base, from 0 (an apex) to
-/// 1 (upright sides). `rotation` is the angle in degrees about the vertical through the base's
-/// centroid, counter-clockwise seen from above.
+/// `base` has the polygon's corners in order, as (x, z) offsets from `corner`. `top_over_base` is
+/// the ratio of the side lengths, from 0 (an apex) to 1. `rotation` is about the base's centroid,
+/// in degrees, counter-clockwise seen from above.
 ///
-/// The normals of the sides are computed from the base and the height instead of from differences
-/// of corners, so that they keep full precision with a tiny top or far from the origin.
+/// Normals are computed from the base and the height, not from differences of corners, so that they
+/// keep full precision with a tiny top or far from the origin.
 pub(super) fn prismoid(
     corner: DVec3,
     base: &[DVec2],
@@ -47,9 +45,7 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let rotated = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // The corners `b` and the centroid `c` are relative to `corner`, which is added last. Without a
-    // rotation (b - c) + c is then exact, and a cube keeps its corners. If `corner` were added to
-    // both first, the sum would be rounded.
+    // Relative to `corner`, (b - c) + c is exact without a rotation, and a cube keeps its corners.
     let corner_at = |scale: f64, b: DVec2, y: f64| {
         let offset = centroid + rotated(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)
@@ -71,8 +67,7 @@ pub(super) fn prismoid(
         let across = (end - start).perp().normalize();
         let apothem = across.dot(start - centroid);
         let outward = rotated(across * apothem.signum());
-        // At height y the distance of the side from the axis is
-        // `apothem (1 - (1 - top_over_base) y / height)`.
+        // At height y the side has the distance `apothem (1 - (1 - top_over_base) y / height)`.
         let up = apothem.abs() * (1.0 - top_over_base) / height;
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
@@ -80,9 +75,8 @@ pub(super) fn prismoid(
     Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners })
 }
 
-/// Returns the lower left near corner (towards -x and +z) of a horizontal rectangle with the centre
-/// `base`. `width` is its length along x, `depth` along z. The x and z of the corner are rounded to
-/// short decimals.
+/// Returns the lower left near corner (towards -x and +z) of a horizontal rectangle about `base`,
+/// with short decimals.
 pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
     let scale = width.min(depth);
     [round_nice(base.x - width / 2.0, scale), base.y, round_nice(base.z + depth / 2.0, scale)]

@@ -20,8 +20,8 @@ description! {
 }
 
 impl Rectangle {
-    /// Returns the rectangle's axes as unit vectors: to the right (seen from the front), up and to
-    /// the front. Returns `None` if `up` is parallel to the normal.
+    /// Returns the unit vectors to the right (seen from the front), up and to the front; `None` if
+    /// `up` is parallel to the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);

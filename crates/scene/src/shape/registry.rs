@@ -16,8 +16,7 @@ pub trait ShapeDesc: Description {
     /// Example of an `[[object]]` in TOML, for the manual and for tests.
     const EXAMPLE: &str;
 
-    /// Converts the description to its canonical form: the geometry as one of the kinds of
-    /// primitives, in double precision. The description must be valid.
+    /// Converts the valid description to its canonical form.
     fn form(&self) -> Form;
 
     /// Returns the validation errors of the description.
@@ -25,19 +24,18 @@ pub trait ShapeDesc: Description {
         self.validator().errors()
     }
 
-    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's
-    /// lower side. `size` is its lengths along x, y and z, all greater than 0.
+    /// Creates an upright instance that roughly fills a box. `base` is the centre of its lower
+    /// side.
     fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
-    /// Returns the points that determine the shape's position: adding a vector to all of them moves
-    /// the shape by that vector. Empty if only a transform can move the shape.
+    /// Returns the points that move the shape if a vector is added to all of them; empty if only a
+    /// transform can.
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         Vec::new()
     }
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
-    /// from above. Returns `false`, without a change, if the keys of the kind cannot express the
-    /// rotation.
+    /// from above. Returns `false`, without a change, if its keys cannot express that.
     fn rotate_y(&mut self, _degrees: f64) -> bool {
         false
     }
@@ -62,15 +60,14 @@ pub trait ShapeDesc: Description {
         &mut []
     }
 
-    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
-    /// matrix. They are right-handed, orthonormal vectors in the shape's space.
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace): right-handed,
+    /// orthonormal columns.
     fn texture_axes(&self) -> DMat3 {
         DMat3::IDENTITY
     }
 }
 
-/// Returns the angle `rotation + degrees`, rounded to a millionth of a degree and reduced to more
-/// than -180 and at most 180 degrees.
+/// Returns `rotation + degrees`, above -180 and at most 180, rounded to a millionth.
 pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
@@ -78,8 +75,7 @@ pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
 
 macro_rules! kinds {
     ($($key:literal => $kind:ident),+ $(,)?) => {
-        /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
-        /// with one key, the name of the kind.
+        /// Shape of an object. In scene files it is a table with one key, the kind.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Shape {
             $(
@@ -92,8 +88,7 @@ macro_rules! kinds {
             Shape { $($key => $kind),+ }
         }
 
-        // A static instead of a constant, because the table refers to itself through the keys of
-        // compounds: their parts are shapes of any kind in this table.
+        // A static, because the table refers to itself through the parts of compounds.
         static KIND_TABLE: [Field; [$($key),+].len()] = [
             $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
         ];
@@ -112,16 +107,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// Converts the shape to its canonical form in double precision, without the object's
-            /// transform. The shape must be valid.
+            /// Converts the valid shape to its canonical form, without the object's transform.
             pub fn form(&self) -> Form {
                 match self {
                     $(Self::$kind(kind) => kind.form(),)+
                 }
             }
 
-            /// Returns the validation errors of the shape. Each key begins with the key of the
-            /// shape's kind.
+            /// Returns the validation errors; each key begins with the kind.
             pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
@@ -136,15 +129,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the rotation about the vertical [degrees], as far as the keys of the kind
-            /// express it.
+            /// Returns [`ShapeDesc::rotation`].
             pub fn rotation(&self) -> f64 {
                 match self {
                     $(Self::$kind(kind) => kind.rotation(),)+
                 }
             }
 
-            /// Returns the step that makes the shape stand upright, if its axis is not y.
+            /// Returns [`ShapeDesc::upright`].
             pub fn upright(&self) -> Option<TransformOp> {
                 match self {
                     $(Self::$kind(kind) => kind.upright(),)+
@@ -165,8 +157,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Creates a shape of the kind `key` that roughly fills a box, see
-            /// [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
+            /// Creates a shape by [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
@@ -174,17 +165,14 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the points that determine the shape's position: adding a vector to all of
-            /// them moves the shape by that vector. Empty if only a transform can move the shape.
+            /// Returns [`ShapeDesc::anchor_points_mut`].
             pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
                     $(Self::$kind(kind) => kind.anchor_points_mut(),)+
                 }
             }
 
-            /// Rotates the shape by `degrees` about the vertical through its centre,
-            /// counter-clockwise seen from above. Returns `false`, without a change, if the keys of
-            /// its kind cannot express the rotation.
+            /// Rotates the shape by [`ShapeDesc::rotate_y`].
             pub fn rotate_y(&mut self, degrees: f64) -> bool {
                 match self {
                     $(Self::$kind(kind) => kind.rotate_y(degrees),)+
@@ -223,8 +211,7 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the position of the shape: the first of its anchor points, or the origin if it has
-    /// none. Moving all anchor points by a vector moves the shape by that vector.
+    /// Returns the first anchor point, or the origin.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

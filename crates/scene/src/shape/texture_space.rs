@@ -5,16 +5,13 @@ use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::DefaultMapping;
 
-/// Texture space of a shape that is no compound. Its x axis points to the right, its y axis up or
-/// along the axis of the shape, its z axis to the front or along the normal. The unit is the scene
-/// unit before the object's transform.
+/// Texture space of a shape that is no compound: x to the right, y up or along the axis, z to the
+/// front or along the normal, in scene units before the object's transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
-    /// Map from the texture space to the space of the shape. For a part of a compound, it maps to
-    /// the space of the whole compound.
+    /// Map to the space of the shape, or of the whole compound.
     pub shape_from_texture: DAffine3,
-    /// Lowest and highest corner of the shape's bounding box, in texture space. For a plane, both
-    /// corners are its `point`.
+    /// Corners of the shape's bounding box in texture space; for a plane, its `point`.
     pub corners: [DVec3; 2],
     /// Mapping that `mapping = "auto"` selects for the shape.
     pub default_mapping: DefaultMapping,
@@ -32,8 +29,7 @@ impl TextureSpace {
         Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Returns `true` if the shape itself defines texture coordinates. A mesh defines them if its
-    /// file has them. A flat shape defines them if it is bounded; an infinite plane does not.
+    /// Returns `true` for bounded flat shapes, and for meshes whose file has texture coordinates.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {
@@ -45,8 +41,7 @@ impl TextureSpace {
 }
 
 impl Shape {
-    /// Returns the texture space of each part of the shape, in the order of
-    /// [`CanonicalShape::parts`](zerkalo_kernel::primitive::CanonicalShape::parts). The shape must be valid.
+    /// Returns the texture space of each part of the valid shape, in the order of its form.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = self.parts() else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
@@ -61,8 +56,7 @@ impl Shape {
     }
 }
 
-/// Returns orthonormal axes with the unit vector `y` as y axis. The x axis points as far to the
-/// right as possible.
+/// Returns orthonormal axes with the unit vector `y`, and x as far to the right as possible.
 pub(super) fn around_axis(y: DVec3) -> DMat3 {
     let across = y.cross(DVec3::Z);
     let x = if across.length() > 1e-3 { across.normalize() } else { DVec3::X };
@@ -70,17 +64,15 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// Returns orthonormal axes with the unit normal `z` of a plane as z axis. The y axis points as far
-/// up as possible. On a horizontal plane the y axis points away from the viewer if the plane faces
-/// up, and towards the viewer if the plane faces down.
+/// Returns orthonormal axes with the unit normal `z`, and y as far up as possible: on level planes
+/// away from the viewer if they face up, otherwise towards the viewer.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();
     DMat3::from_cols(x, z.cross(x), z)
 }
 
-/// Returns the texture axes of a shape that is rotated by `degrees` about the vertical,
-/// counter-clockwise seen from above, as the columns of a matrix.
+/// Returns the texture axes of a shape that is rotated about the vertical.
 pub(super) fn axes_rotated_y(degrees: f64) -> DMat3 {
     let (sin, cos) = crate::value::sin_cos_degrees(degrees);
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))

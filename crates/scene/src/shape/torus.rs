@@ -1,5 +1,4 @@
 //! Torus: the points at distance `tube` from the circle of radius `ring` about `axis`.
-//! `shape.torus = { center = [0.0, 0.25, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, tube = 0.25 }`
 
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
@@ -31,8 +30,7 @@ impl ShapeDesc for Torus {
         TorusForm { scene_from_torus, ring: self.ring, tube: self.tube }.into()
     }
 
-    /// Returns the validation errors of the torus. A tube wider than the ring is an error: the
-    /// surface would intersect itself (a spindle torus).
+    /// Returns the validation errors. A spindle torus would intersect itself.
     fn faults(&self) -> Vec<ValidationError> {
         let spindle = (self.ring > 0.0 && self.tube > self.ring).then(|| {
             let found = format!("tube ({}) is larger than ring ({})", self.tube, self.ring);
@@ -44,8 +42,7 @@ impl ShapeDesc for Torus {
             .errors()
     }
 
-    /// Creates a torus that lies flat in a box (see [`ShapeDesc::fitted_to`]). The radius of its
-    /// tube is at most a third of that of its ring.
+    /// Creates a flat torus whose tube is at most a third of its ring.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let across = size.x.min(size.z);
         let tube = round_nice((across / 8.0).min(size.y / 2.0), across);

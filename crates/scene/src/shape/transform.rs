@@ -108,18 +108,16 @@ impl KeyNode for Vec<TransformOp> {
     }
 }
 
-/// Returns the rotation by `degrees` about the unit vector `axis` (Rodrigues' formula). Quarter
-/// turns about the coordinate axes are exact.
+/// Returns the rotation about the unit vector `axis` (Rodrigues' formula), exact for quarter turns
+/// about coordinate axes.
 fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = sin_cos_degrees(degrees);
     let rotated = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
     DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Returns `true` if an affine map can be inverted with usable precision. Three conditions must
-/// hold. The map is finite. The largest absolute element `m` of its matrix is within 1e-12..=1e12.
-/// The product of `m` and the largest absolute element of the inverse is at most 1e12, which leaves
-/// about 4 of the 16 decimal digits of `f64`.
+/// Returns `true` if the map is finite, its largest element `m` is within 1e-12..=1e12, and `m`
+/// times the largest element of the inverse is at most 1e12, which leaves 4 of 16 digits.
 fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -135,10 +133,9 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if the composition of `steps` is not usable for `shape`, otherwise `None`.
-/// There are four errors: the composition flattens the shape, stretches it out of range, moves it
-/// beyond the largest coordinate, or makes it too small for its distance from the origin. A
-/// compound without points is never too small. Each single step must be valid.
+/// Returns an error if the composition of the valid `steps` flattens `shape`, stretches it out of
+/// range, moves it beyond the largest coordinate, or makes it too small for its distance from the
+/// origin. A compound without points is never too small.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;

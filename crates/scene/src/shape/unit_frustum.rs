@@ -23,8 +23,7 @@ impl ShapeDesc for UnitFrustum {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }
 
-    /// Creates a cylinder at the origin. The box to fill is ignored, because only a transform can
-    /// move and scale this shape.
+    /// Creates a cylinder at the origin, because only a transform moves this shape.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { s: 1.0 }
     }

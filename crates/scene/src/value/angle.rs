@@ -1,7 +1,6 @@
 //! Angles as users write them: in degrees.
 
-/// Returns sine and cosine of an angle in degrees. They are exact at every multiple of 90, so that
-/// a quarter turn has no rounding error.
+/// Returns sine and cosine of an angle in degrees, exact at multiples of 90.
 pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let angle = degrees.rem_euclid(360.0);
     match angle {

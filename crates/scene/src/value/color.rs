@@ -1,7 +1,6 @@
 //! Linear RGB colours with the primaries of sRGB.
 
-/// Linear RGB colour (red, green, blue) without an upper bound. Scene files have `[r, g, b]`
-/// (linear) or `"#rrggbb"` (sRGB).
+/// Linear RGB colour without an upper bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Color(pub [f64; 3]);
 
@@ -46,8 +45,7 @@ impl Color {
     }
 }
 
-/// Converts linear light in 0..=1 to an sRGB level in 0..=1 (IEC 61966-2-1, piecewise). The inverse
-/// is [`linear_from_srgb`].
+/// Converts linear light in 0..=1 to an sRGB level in 0..=1 (IEC 61966-2-1).
 pub fn srgb_from_linear(linear: f64) -> f64 {
     if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

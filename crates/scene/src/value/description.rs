@@ -1,8 +1,5 @@
-//! Macros that declare the tables of scene files.
-//!
-//! [`description!`] generates a struct from one declaration, with its conversion from and to TOML,
-//! its defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an
-//! enum for a key that accepts a fixed set of words.
+//! Macros that declare the tables of scene files: [`description!`] a struct for a table of keys,
+//! [`choices!`] an enum for a key that accepts a set of words.
 
 use crate::value::{
     Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
@@ -15,19 +12,16 @@ pub trait Description: KeyNode {
     /// Keys of this kind of table, in the order of their declaration.
     const FIELDS: &'static [Field];
 
-    /// Returns a validator that has checked each value of the table against the range of its key.
-    /// Callers can add checks that involve several keys.
+    /// Returns a validator that has checked each value against the range of its key.
     fn validator(&self) -> Validator;
 }
 
 /// Rust type to which the values of keys in scene files are converted.
 pub trait FieldValue: KeyNode {
-    /// Type of the values in scene files. The range of numbers is [`NumberRange::FINITE`] unless
-    /// the declaration of a key gives another.
+    /// Type of the values in scene files, without the range of a declaration.
     const TYPE: ValueType;
 
-    /// Returns the validation errors of `self`, the value of the key that `field` describes. The
-    /// dotted key of each error begins with `field.name`.
+    /// Returns the validation errors of the value. Their keys begin with `field.name`.
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         match self.value() {
             Some(KeyValue::Numbers(numbers)) => field.check(&numbers).into_iter().collect(),
@@ -44,13 +38,9 @@ pub trait FieldValue: KeyNode {
     }
 }
 
-/// Conversion of a default value in a `description!` declaration, such as `[f64; 3]` for a colour,
-/// to the Rust type of its key.
+/// Conversion of a default in a declaration, such as `[f64; 3]` for a colour.
 pub trait FromWritten<W> {
-    /// Converts a default value of a declaration to this type.
-    ///
-    /// # Panics
-    /// Panics if `written` is not valid for the type, which is an error in the declaration.
+    /// Converts a default. Panics if the declaration is wrong.
     fn from_written(written: W) -> Self;
 }
 
@@ -72,8 +62,7 @@ impl FromWritten<&'static str> for String {
     }
 }
 
-/// Returns the text of a doc comment without its leading space. `doc` is the text as the attribute
-/// `#[doc]` holds it.
+/// Returns the text of a `#[doc]` attribute without its leading space.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
@@ -385,8 +374,7 @@ macro_rules! description {
         $table.optional(stringify!($key))?.unwrap_or_else(|| $default)
     };
 
-    // The first rule is for keys that are always written. The second is for keys declared with
-    // `or`, which may be left out: their values are written only if they are present.
+    // Keys with `or` are written only if they are present.
     (@write ($value:expr)) => {
         Some($value as &dyn $crate::value::TomlValue)
     };

@@ -2,17 +2,14 @@
 
 use glam::DVec3;
 
-/// Smallest magnitude of a vector's largest component for which the length is computed without
-/// scaling. Vectors below this limit are scaled up first, because the squares could underflow.
-/// Vectors above its reciprocal are scaled down first, because the squares could overflow.
+/// Largest component below which a vector is scaled up, because squares could underflow. Above the
+/// reciprocal it is scaled down.
 const MIN_EXACT: f64 = 1e-100;
 
-/// Scale factor for vectors whose squared length would lose precision. Small vectors are multiplied
-/// by it, large ones are divided by it. It is a power of two, 2^600, so that scaling is exact.
+/// Scale factor, a power of two (2^600), so that scaling is exact.
 const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
-/// Returns `direction` scaled to length 1. Returns `None` if the vector is zero or a component is
-/// not finite.
+/// Returns `direction` scaled to length 1; `None` if it is zero or not finite.
 pub fn unit(direction: impl Into<DVec3>) -> Option<DVec3> {
     let v = direction.into();
     let largest = v.abs().max_element();

@@ -1,5 +1,4 @@
-//! Tables of keys: one [`Field`] per key of a table in scene files. Parser, messages, range checks,
-//! the generated manual and the editing forms all use these tables.
+//! Tables of keys, for the parser, messages, range checks, the manual and the editing forms.
 
 use crate::value::{NumberRange, ValidationError, number};
 use std::fmt;
@@ -13,8 +12,7 @@ pub struct Field {
     pub takes: ValueType,
     /// Unit of the numbers in the value; empty if there is none.
     pub unit: &'static str,
-    /// Default value of the key. If there is none, this field states that the key is required, or
-    /// what omitting it means.
+    /// Default, or what omitting the key means.
     pub preset: DefaultValue,
     /// Help text of the key, one sentence.
     pub doc: &'static str,
@@ -27,8 +25,7 @@ pub enum DefaultValue {
     Required,
     /// Default value of the key, given as TOML text.
     Is(&'static str),
-    /// No default value: the key may be omitted. The variant holds a phrase that describes the
-    /// result of omitting it.
+    /// The key may be omitted; a phrase describes the result.
     Without(&'static str),
 }
 
@@ -73,8 +70,7 @@ pub enum ValueType {
     /// List of `[[name]]` tables, each with the listed keys. A function, because the keys of a
     /// compound's parts contain themselves, and constants cannot refer to each other in a cycle.
     Tables(fn() -> &'static [Field]),
-    /// Tables `[name.NAME]` with the listed keys. The scene file chooses each NAME, as in
-    /// `[materials.gold]`.
+    /// Tables `[name.NAME]` with the listed keys.
     Named(&'static [Field]),
 }
 
@@ -89,8 +85,7 @@ impl Field {
         Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
-    /// Creates a key that may be omitted and has no default value. `instead` describes the result
-    /// of omitting it.
+    /// Creates a key without a default. `instead` describes the result of omitting it.
     pub const fn optional(
         name: &'static str,
         takes: ValueType,
@@ -106,14 +101,12 @@ impl Field {
         Self { preset: DefaultValue::Is(value), ..self }
     }
 
-    /// Returns the key as one that may be omitted and has no default value. `instead` describes the
-    /// result of omitting it.
+    /// Returns the key without a default. `instead` describes the result of omitting it.
     pub const fn or(self, instead: &'static str) -> Self {
         Self { preset: DefaultValue::Without(instead), ..self }
     }
 
-    /// Checks the numbers `values` against the range of the key's value type. Returns an error if
-    /// one of them is out of range, otherwise `None`.
+    /// Returns an error if one of `values` is out of range.
     pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
         let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
         let valid = match self.takes {
@@ -151,8 +144,7 @@ impl ValueType {
         }
     }
 
-    /// Returns `other`. `self` is the value type that follows from the Rust type of a key; `other`
-    /// is the value type that the key's declaration gives instead.
+    /// Returns `other`, which a declaration gives instead of the type of the Rust type.
     pub(crate) const fn replaced(self, other: Self) -> Self {
         other
     }

@@ -1,7 +1,6 @@
 //! 64-bit FNV-1a hash, which is stable across platforms and versions.
 
-/// Incremental 64-bit FNV-1a hash (Fowler, Noll, Vo), with the offset basis and prime of
-/// draft-eastlake-fnv.
+/// Incremental 64-bit FNV-1a hash (draft-eastlake-fnv).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fnv1a64(u64);
 

@@ -42,14 +42,12 @@ pub trait KeyNode {
         None
     }
 
-    /// Sets the value. Returns `false`, without a change, if the node cannot have it. Ranges are
-    /// not checked.
+    /// Sets the value, without a check of ranges. Returns `false` if the node cannot have it.
     fn set_value(&mut self, _: KeyValue) -> bool {
         false
     }
 
-    /// Returns `true` if the value stands for an omitted key. Files are then written without the
-    /// key.
+    /// Returns `true` if the value stands for an omitted key.
     fn is_absent(&self) -> bool {
         false
     }

@@ -1,6 +1,5 @@
-//! Values of scene files: colours, number ranges, validation errors, and the tables of keys that
-//! describe them. Every description (shape, material, light, camera, scene) uses this module, which
-//! depends on none of them.
+//! Values of scene files, and the tables of keys that describe them. Every description uses this
+//! module, which depends on none of them.
 
 mod angle;
 mod color;

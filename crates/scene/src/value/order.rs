@@ -1,7 +1,5 @@
-//! Stable sorting with little machine code.
-//!
-//! The sorts of the standard library are compiled for each type of items and keys, into 8 KB each.
-//! The functions of this module sort numbers only.
+//! Stable sorting of numbers with little machine code: those of the standard library are compiled
+//! for each type, into 8 KB each.
 
 /// Sorts `items` by ascending keys. Items with equal keys keep their order.
 pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
@@ -10,16 +8,14 @@ pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
     items.extend(order.into_iter().filter_map(|i| unsorted[i].take()));
 }
 
-/// Returns the indices of `keys`, sorted by ascending keys. Indices of equal keys are in ascending
-/// order.
+/// Returns the indices of `keys` in ascending order; those of equal keys are ascending.
 pub fn ascending(keys: Vec<i64>) -> Vec<usize> {
     let mut order: Vec<(i64, usize)> = keys.into_iter().zip(0..).collect();
     order.sort_unstable();
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Converts `x` to an integer. The integers of two numbers have the order that [`f64::total_cmp`]
-/// gives the numbers.
+/// Converts `x` to an integer with the order of [`f64::total_cmp`].
 pub fn total_order(x: f64) -> i64 {
     let bits = x.to_bits() as i64;
     // The bits of negative numbers ascend with the absolute value.

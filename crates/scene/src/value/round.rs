@@ -1,14 +1,12 @@
 //! Rounding of computed numbers to short decimals.
 
-/// Rounds `x` to a multiple of 10^`exponent`. The result is the floating-point number nearest to
-/// that decimal number. It is never `-0`.
+/// Rounds `x` to the number nearest to a multiple of 10^`exponent`, never `-0`.
 pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     if !x.is_finite() {
         return x;
     }
     let rounded = if exponent <= 0 {
-        // Formatting rounds the exact decimal value of `x`. Arithmetic with a negative power of ten
-        // would be inexact: 35 * 0.01 is not 0.35.
+        // Arithmetic with negative powers of ten is inexact: 35 * 0.01 is not 0.35.
         format!("{x:.*}", exponent.unsigned_abs().min(340) as usize).parse().unwrap_or(x)
     } else {
         let unit = 10f64.powi(exponent.min(300));
@@ -22,8 +20,7 @@ pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
-/// Returns the exponent of the largest power of ten that is at most |`x`|; 0 if `x` is 0 or not
-/// finite.
+/// Returns the exponent of the largest power of ten up to |`x`|; 0 if `x` is 0 or not finite.
 pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
@@ -32,8 +29,8 @@ pub fn floor_log10(x: f64) -> i32 {
     format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// Rounds the coordinate `x` to a multiple of 10^(k - 4). 10^k is the largest power of ten that is
-/// at most `scale`, the size of the object or scene.
+/// Rounds `x` to a multiple of 10^-4 of the power of ten of `scale`, the size of the object or
+/// scene.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }
@@ -43,11 +40,8 @@ pub fn round_fine(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 6)
 }
 
-/// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
-///
-/// The horizontal components of the result are rounded to about a millionth of its horizontal
-/// length. The heading of the result, its angle about the vertical, is rounded to thousandths of a
-/// degree, so that rounding errors do not add up over repeated rotations.
+/// Rotates `v` by `degrees` about the vertical, counter-clockwise seen from above. The heading is
+/// rounded to thousandths of a degree, so that errors do not add up over repeated rotations.
 pub fn rotated_y(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
     let horizontal = x.hypot(z);

@@ -2,8 +2,7 @@
 
 use std::fmt::Write as _;
 
-/// Escapes the characters of `text` that could control a terminal or hide other text. Control
-/// characters, line ends, directional and invisible formatting characters become `\u{..}`.
+/// Escapes the characters that could control a terminal or hide other text as `\u{..}`.
 pub fn sanitized(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -21,9 +20,8 @@ pub fn sanitized(text: &str) -> String {
     out
 }
 
-/// Returns `true` for Unicode format characters (category Cf) and for line and paragraph
-/// separators. They reorder or hide text, so that a displayed name would differ from the name in
-/// the file.
+/// Returns `true` for format characters (category Cf) and line separators, which reorder or hide
+/// text.
 fn controls_terminal(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'

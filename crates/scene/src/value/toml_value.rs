@@ -1,8 +1,5 @@
-//! Conversion of descriptions from and to the values of scene files.
-//!
-//! This module replaces `serde`, whose conversions would be compiled again for each description and
-//! each kind of input. Here, code that does not depend on the type is compiled once, in shared
-//! functions.
+//! Conversion of descriptions from and to the values of scene files. Unlike with `serde`, code that
+//! does not depend on the type is compiled once.
 
 use crate::value::{Color, Field, FieldValue, KeyValue, ValueType};
 use std::collections::BTreeMap;
@@ -12,11 +9,7 @@ use toml::{Spanned, Table, Value};
 
 /// Type with a conversion from and to the values of scene files.
 pub trait TomlValue {
-    /// Converts a value of a scene file to this type.
-    ///
-    /// # Errors
-    /// Fails if `value` has the wrong type, if a key is unknown or missing, or if a number is too
-    /// large for its type. Ranges are not checked.
+    /// Converts a value of a scene file, without a check of ranges.
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError>
     where
         Self: Sized;
@@ -24,10 +17,7 @@ pub trait TomlValue {
     /// Converts `self` to a value of a scene file.
     fn to_toml(&self) -> Value;
 
-    /// Parses `text` as a value of this type. `text` holds the keys and values of one table.
-    ///
-    /// # Errors
-    /// Fails if `text` is not TOML, or for the reasons of [`TomlValue::from_toml`].
+    /// Parses the keys and values of one table.
     fn from_text(text: &str) -> Result<Self, TomlError>
     where
         Self: Sized,
@@ -89,8 +79,7 @@ fn unknown(span: Range<usize>, what: &str, found: &str, known: &[&str]) -> TomlE
     TomlError::new(span, format!("unknown {what} `{found}`, {expected}"))
 }
 
-/// Reader of a table of a scene file. All keys of the table are known, because the creation of the
-/// reader fails for an unknown key.
+/// Reader of a table whose keys are all known.
 pub(crate) struct TableReader<'a> {
     table: &'a DeTable<'a>,
     span: Range<usize>,
@@ -374,8 +363,7 @@ impl<T: TomlValue> TomlValue for BTreeMap<String, T> {
     }
 }
 
-/// Value of an optional key. Callers leave out a key whose value is `None`, so the empty table that
-/// stands for `None` is never written.
+/// Value of an optional key; that of `None` is never written.
 impl<T: TomlValue> TomlValue for Option<T> {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
         T::from_toml(value).map(Some)

@@ -2,8 +2,7 @@
 
 use crate::value::{Field, FieldValue, number};
 
-/// Validation error of a table in a scene file. The module `scene` adds file, line, column and
-/// object.
+/// Validation error of a table, without file, line and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValidationError {
     /// Dotted key inside the table (`center`, `shape.sphere.radius`); empty for the whole table.
@@ -20,16 +19,15 @@ impl ValidationError {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// Returns the error with `outer` and a dot before its key. `outer` is the key whose value is
-    /// the table with the error.
+    /// Returns the error with `outer.` before its key.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
         self
     }
 
-    /// Returns the error with `outer` and a dot before its key and before its phrase, such as
-    /// `focus.distance is -1`.
+    /// Returns the error with `outer.` before its key and its phrase, such as `focus.distance is
+    /// -1`.
     pub fn inside(mut self, outer: &str) -> Self {
         self.found = format!("{outer}.{}", self.found);
         self.prefixed(outer)

@@ -1,28 +1,23 @@
-//! Ordered dithering to the 256-colour table, for pictures that no longer change.
+//! Ordered dithering to the 256-colour table: Thomas Knoll's pattern dithering.
 //!
-//! The method is Thomas Knoll's pattern dithering. For each pixel a few colours of the table are
-//! chosen. Their mean in linear light approximates the colour of the pixel. The chosen colours are
-//! sorted by lightness, and the position of the pixel in an ordered pattern selects one of them.
+//! For each pixel a few colours of the table are chosen, whose mean in linear light approximates
+//! its colour. They are sorted by lightness, and the position of the pixel in an ordered pattern
+//! selects one of them.
 
 use crate::cells::Raster;
 use crate::cells::oklab::{level, linear};
 use crate::cells::palette_quantisation::{nearest_xterm, xterm_lightness, xterm_rgb};
 
-/// Number of palette colours that are mixed for a pixel, one per position of the dither pattern.
+/// Number of colours that are mixed for a pixel.
 const MIXED: usize = 4;
-/// Bayer's ordered pattern of 2 x 2 pixels, repeated over the image. For each pixel, a list of
-/// palette colours is chosen, sorted from dark to light. The pixel shows one colour of this list:
-/// its index is the number at the pixel's position in the pattern.
+/// Bayer's pattern: index of the colour, from dark to light, that the pixel at each position shows.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
-/// Share, from 0 to 1, of the accumulated error that is added to the target colour before a palette
-/// colour is chosen. The palette colours of a pixel are chosen one after the other. The error is
-/// the sum of the differences between the target and each colour already chosen. A share of 1
-/// reproduces the mean best, but mixes distant colours, which looks coarse in pixels as large as
-/// half a cell.
+/// Share, from 0 to 1, of the error so far that is added to the target before the next colour is
+/// chosen. A share of 1 reproduces the mean best, but mixes distant colours, which looks coarse in
+/// pixels as large as half a cell.
 const STRENGTH: f32 = 0.5;
 
-/// Returns the index of one of xterm's 256 colours for each pixel of the image `raster`, by ordered
-/// dithering.
+/// Returns the index of one of xterm's 256 colours for each pixel.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];
@@ -38,8 +33,7 @@ pub fn dithered(raster: &Raster) -> Vec<u8> {
     indices
 }
 
-/// Returns the indices of xterm's colours to mix for `rgb`, from dark to light. Their mean
-/// approximates `rgb`.
+/// Returns the indices of xterm's colours to mix for `rgb`, from dark to light.
 fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
     let target = linear(rgb);
     let mut missing = [0.0f32; 3];

@@ -1,4 +1,4 @@
-//! Picture cells in 16 colours, or without colours, with shading glyphs of different density.
+//! Picture cells in 16 colours, or without colours, with shading glyphs.
 
 use crate::cells::oklab::{Oklab, level, linear};
 use crate::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
@@ -6,8 +6,8 @@ use crate::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
 use ratatui::style::Color;
 use std::sync::LazyLock;
 
-/// Glyphs, each with the share of the cell that it covers. The shares of the shades ░▒▓ are nominal
-/// (25, 50, 75 %). The other shares were measured in DejaVu Sans Mono.
+/// Glyphs with the share of the cell that they cover: nominal for ░▒▓, the others measured in
+/// DejaVu Sans Mono.
 const COVERAGE: [(char, f32); 9] = [
     (' ', 0.0),
     ('.', 0.025),
@@ -19,31 +19,28 @@ const COVERAGE: [(char, f32); 9] = [
     ('▓', 0.75),
     ('█', 1.0),
 ];
-/// Shading glyphs for mixtures of two colours in a cell.
+/// Glyphs for mixtures of two colours.
 const SHADES: [char; 3] = ['░', '▒', '▓'];
-/// Background colours of cells that mix two colours: black, two greys and white. They leave the hue
-/// of the foreground unchanged.
+/// Background colours of mixtures, which leave the hue of the foreground unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// Smallest gain for which a half block is preferred to a shading glyph. The gain is the sum of the
-/// OKLab errors of both halves with the shading glyph, minus the same sum with the half block.
-/// Without this limit, a changing picture would flicker between half blocks and shades.
+/// Smallest decrease of the sum of both halves' OKLab errors for which a half block is preferred to
+/// a shading glyph. Without it, a changing picture would flicker between both.
 const HALVES_GAIN: f32 = 0.05;
 
-/// Returns the share of the cell that `glyph` covers, 0..=1. Returns 0.5 for glyphs that are not in
+/// Returns the share of the cell that `glyph` covers, 0..=1; 0.5 for others than those of
 /// [`COVERAGE`], such as half blocks.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }
 
-/// Returns the mean colour of a cell. `fg` covers the share `coverage`, and `bg` covers the
-/// remainder.
+/// Returns the mean colour of a cell of which `fg` covers the share `coverage`.
 pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     let (fg, bg) = (linear(fg), linear(bg));
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// Candidate cells of a picture in 16 colours: each colour alone, and each shading glyph in one
-/// colour on a neutral background (black, grey or white).
+/// Candidate cells in 16 colours: each colour alone, and each shading glyph in one colour on a
+/// neutral background.
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
@@ -52,7 +49,7 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     (0..16).map(flat).chain(mixed).collect()
 });
 
-/// Palette of the mean colours of the terminal cells in [`CELLS`], in OKLab.
+/// Mean colours of [`CELLS`].
 static SHADED: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
         (Color::Indexed(fg), Color::Indexed(bg)) => {
@@ -64,7 +61,7 @@ static SHADED: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     QuantisedPalette::new(CELLS.iter().map(look).collect())
 });
 
-/// Palette of the 16 ANSI colours alone, without shading glyphs.
+/// The 16 ANSI colours.
 static BARE: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     QuantisedPalette::new((0..16).map(|index| Oklab::of(xterm_rgb(index))).collect())
 });
@@ -73,18 +70,17 @@ fn flat(index: u8) -> PictureCell {
     PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::Indexed(index) }
 }
 
-/// Returns the index of the ANSI colour, 0 to 15, nearest to `rgb`.
+/// Returns the index of the nearest ANSI colour.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves.
-/// Its glyph is a shading glyph, a half block or a space.
+/// Returns the cell in 16 colours that approximates its halves.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
     let shade = SHADED.nearest([0, 1, 2].map(|c| level(0.5 * (a[c] + b[c]))));
-    // If the halves have similar colours, a half block gains too little over a shading glyph.
+    // A half block would gain too little.
     if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];
     }
@@ -97,8 +93,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     CELLS[shade]
 }
 
-/// Returns the cell without colours whose glyph approximates the lightness of its halves, `upper`
-/// and `lower`.
+/// Returns the cell without colours that approximates the lightness of its halves.
 pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
         COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()

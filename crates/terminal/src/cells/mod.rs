@@ -1,16 +1,12 @@
-//! Conversion of images to terminal cells, that is, to glyphs with colours. A pixel is half a cell.
-//!
-//! A cell is about twice as high as it is wide. Each cell therefore shows two square pixels, one
-//! above the other. The module is independent of scenes and of the screen's layout.
+//! Conversion of images to terminal cells. A cell is about twice as high as it is wide, and shows
+//! two square pixels, one above the other.
 
 mod dither;
-mod false_color;
 mod glyph_shading;
 mod mosaic;
 mod oklab;
 mod palette_quantisation;
 
-pub use false_color::{NO_HIT, Scale, difference, magnitude, normal_color, object_color};
 pub use mosaic::blocks;
 pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
@@ -20,22 +16,22 @@ use ratatui::style::Color;
 /// Set of colours that a terminal shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Colors {
-    /// Colours in 24-bit sRGB.
+    /// 24-bit sRGB.
     #[default]
     True,
     /// The 256 colours of xterm's table.
     Indexed,
     /// The 16 ANSI colours, which users configure.
     Sixteen,
-    /// No colours: glyphs alone make the picture.
+    /// Glyphs alone make the picture.
     Mono,
 }
 
 impl Colors {
-    /// All sets of colours, in the order in which a key of the dashboard cycles through them.
+    /// All sets of colours, in the order in which a user cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// Returns the name of this set of colours, as it is displayed to users.
+    /// Returns the name for users.
     pub fn name(self) -> &'static str {
         match self {
             Self::True => "24-bit colour",
@@ -46,40 +42,38 @@ impl Colors {
     }
 }
 
-/// Raster: an image of square pixels for terminal cells. A cell shows two pixels, one above the
-/// other.
+/// Image of square pixels, two of which a cell shows.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Raster {
-    /// Number of pixels in a row: one per cell.
+    /// Pixels in a row, one per cell.
     pub width: usize,
-    /// Number of rows of pixels: two per row of cells.
+    /// Rows of pixels, two per row of cells.
     pub height: usize,
-    /// Pixels in 8-bit sRGB, row by row: `width * height`.
+    /// Pixels in 8-bit sRGB, row by row.
     pub pixels: Vec<[u8; 3]>,
 }
 
 impl Raster {
-    /// Creates an image of `width` x `height` pixels. `pixel(i)` returns the colour of pixel i;
-    /// pixels are numbered row by row.
+    /// Creates an image from the colour of each pixel, numbered row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
 }
 
-/// Terminal cell of the picture: its glyph and its colours.
+/// Terminal cell of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
-    /// Character that the cell shows, one column wide.
+    /// Character, one column wide.
     pub glyph: char,
-    /// Foreground colour, in which the glyph is drawn: the terminal's default, 24-bit or indexed.
+    /// Colour of the glyph: the terminal's default, 24-bit or indexed.
     pub fg: Color,
-    /// Background colour, behind the glyph: the terminal's default, 24-bit or indexed.
+    /// Colour behind the glyph: the terminal's default, 24-bit or indexed.
     pub bg: Color,
 }
 
 impl PictureCell {
-    /// Returns the mean colours of the upper and the lower half of the cell, as shown by a terminal
-    /// with a dark background and xterm's colours.
+    /// Returns the mean colours of the upper and the lower half, on a dark terminal with xterm's
+    /// colours.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |color, plain| match color {
             Color::Rgb(r, g, b) => [r, g, b],
@@ -94,8 +88,8 @@ impl PictureCell {
         }
     }
 
-    /// Returns the 24-bit colours of the upper and the lower half of the cell. Returns `None` if a
-    /// half has several colours, or one that is not 24-bit.
+    /// Returns the colours of the upper and the lower half. Returns `None` if a half has several
+    /// colours, or one that is not 24-bit.
     pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
         let halves = match self.glyph {
             '▀' => [self.fg, self.bg],
@@ -125,18 +119,15 @@ const PLAIN_BG: [u8; 3] = [0; 3];
 /// Image converted to terminal cells.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct PictureCells {
-    /// Number of cells in a row of the image.
     pub columns: u16,
-    /// Number of rows of cells.
     pub rows: u16,
-    /// Cells of the image, row by row: `columns * rows`.
+    /// Cells, row by row.
     pub cells: Vec<PictureCell>,
 }
 
 impl PictureCells {
-    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture changes
-    /// rarely or only by user input. In 256 colours only a settled picture is dithered, because
-    /// dithering would make a changing picture flicker.
+    /// Converts `raster` for a terminal with `colors`. In 256 colours only a settled picture is
+    /// dithered, because a changing one would flicker.
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.
     pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
@@ -166,7 +157,7 @@ impl PictureCells {
         Self { columns: raster.width as u16, rows: rows as u16, cells }
     }
 
-    /// Returns the cell at `column` and `row` of the image. Returns `None` outside of the image.
+    /// Returns the cell at `column` and `row`; `None` outside the image.
     pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
         let inside = column < self.columns && row < self.rows;
         inside.then(|| {
@@ -175,8 +166,7 @@ impl PictureCells {
     }
 }
 
-/// Creates a cell from the colours of its upper and lower half. `lower` is `None` below the last
-/// row of pixels. The glyph of equal halves is a space.
+/// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.
 fn two_halves(upper: Color, lower: Option<Color>) -> PictureCell {
     match lower {
         Some(lower) if lower == upper => PictureCell { glyph: ' ', fg: Color::Reset, bg: upper },

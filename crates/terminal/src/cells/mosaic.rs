@@ -2,10 +2,8 @@
 
 use crate::cells::oklab::{level, linear};
 
-/// Replaces the colour of each half cell by the mean of its block, in linear light. A half cell is
-/// the upper or lower half of a terminal cell, and a block is a square of `side` x `side` half
-/// cells. `pixels` holds the colours of the half cells in rows of `width`. A half cell that is
-/// `None` stays `None` and does not count in the mean.
+/// Replaces the colour of each half cell by the mean, in linear light, of its block of `side` x
+/// `side` half cells. `pixels` is in rows of `width`. Half cells that are `None` do not count.
 pub fn blocks(pixels: &[Option<[u8; 3]>], width: usize, side: usize) -> Vec<Option<[u8; 3]>> {
     if width == 0 {
         return Vec::new();

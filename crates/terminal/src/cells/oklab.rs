@@ -5,18 +5,17 @@
 
 use std::sync::LazyLock;
 
-/// Colour in the OKLab colour space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Oklab {
     /// Lightness, from 0 (black) to 1 (white).
     pub l: f32,
-    /// Green (negative) to red (positive). The range within sRGB is -0.24..=0.28.
+    /// Green (negative) to red (positive), within sRGB -0.24..=0.28.
     pub a: f32,
-    /// Blue (negative) to yellow (positive). The range within sRGB is -0.32..=0.2.
+    /// Blue (negative) to yellow (positive), within sRGB -0.32..=0.2.
     pub b: f32,
 }
 
-/// Linear light, 0..=1, of each 8-bit sRGB level (IEC 61966-2-1).
+/// Linear light of each 8-bit sRGB level (IEC 61966-2-1).
 static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|level| match level as f64 / 255.0 {
         level if level <= 0.04045 => (level / 12.92) as f32,
@@ -30,8 +29,8 @@ pub fn linear(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|level| table[usize::from(level)])
 }
 
-/// Converts linear light to the nearest 8-bit sRGB level, by the distance in linear light. `linear`
-/// is clamped to 0..=1.
+/// Converts linear light, clamped to 0..=1, to the 8-bit sRGB level that is nearest in linear
+/// light.
 pub fn level(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
@@ -45,7 +44,7 @@ impl Oklab {
         Self::of_linear(linear(rgb))
     }
 
-    /// Converts linear sRGB to OKLab. Components are usually in 0..=1.
+    /// Converts linear sRGB to OKLab.
     pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
         let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
         let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
@@ -57,8 +56,8 @@ impl Oklab {
         }
     }
 
-    /// Returns the Euclidean distance of two colours. It is 1 between black and white. Differences
-    /// of about 0.02 are just visible side by side.
+    /// Returns the Euclidean distance: 1 between black and white; about 0.02 is just visible side
+    /// by side.
     pub fn distance(self, other: Self) -> f32 {
         self.distance_squared(other).sqrt()
     }

@@ -1,42 +1,36 @@
-//! Palette quantisation: a cached search for the palette colour nearest to a given colour in OKLab,
-//! and xterm's table of 256 colours. The table has 16 colours that users configure, a cube of 216
-//! colours, and 24 greys.
+//! Palette quantisation: a cached search for the nearest palette colour in OKLab, and xterm's table
+//! of 16 colours that users configure, a cube of 216 colours, and 24 greys.
 
 use crate::cells::oklab::Oklab;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU16, Ordering};
 
-/// Number of bits per channel to which colours are rounded before the search for the nearest
-/// palette colour. Rounding to 6 bits changes a channel by at most 3 of 255 levels.
+/// Bits per channel to which colours are rounded before the search. This changes a channel by at
+/// most 3 of 255 levels.
 const BITS: usize = 6;
 
-/// Palette of colours with a search for the nearest one in OKLab. A cache stores the result for
-/// each sRGB colour, rounded to 6 bits per channel.
+/// Palette with a cached search for the nearest colour.
 pub struct QuantisedPalette {
-    /// Colours of the palette.
     pub colors: Vec<Oklab>,
-    /// Index plus 1 of the nearest palette colour, for each of the 2^18 rounded sRGB colours. A 0
-    /// means that the nearest palette colour has not been searched yet.
+    /// Index plus 1 of the nearest colour of each of the 2^18 rounded sRGB colours; 0 before the
+    /// search.
     known: Vec<AtomicU16>,
 }
 
 impl QuantisedPalette {
-    /// Creates a palette of `colors`, of which there must be 1 to 65,535.
+    /// Creates a palette of 1 to 65,535 colours.
     pub fn new(colors: Vec<Oklab>) -> Self {
         Self { colors, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }
 
-    /// Returns the index of the palette colour nearest to the 8-bit sRGB colour `rgb`, which is
-    /// rounded to 6 bits per channel.
+    /// Returns the index of the palette colour nearest to the rounded `rgb`.
     pub fn nearest(&self, rgb: [u8; 3]) -> usize {
         let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
         let known = &self.known[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
-        // Two threads may search the same rounded colour at the same time. Both store the same
-        // index.
+        // Two threads that search the same colour store the same index.
         match known.load(Ordering::Relaxed) {
             0 => {
-                // Each channel has 64 rounded levels. They are spread over 0..=255, so that black
-                // and white are exact.
+                // The 64 levels are spread over 0..=255, so that black and white are exact.
                 let index = self.search(Oklab::of(coarse.map(|c| ((c * 255 + 31) / 63) as u8)));
                 known.store(index as u16 + 1, Ordering::Relaxed);
                 index
@@ -45,23 +39,21 @@ impl QuantisedPalette {
         }
     }
 
-    /// Returns the index of the palette colour nearest to `target`, without rounding and without
-    /// the cache.
+    /// Returns the index of the nearest palette colour without rounding.
     pub fn search(&self, target: Oklab) -> usize {
         let distances = self.colors.iter().map(|look| target.distance_squared(*look));
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
     }
 }
 
-/// 8-bit sRGB levels along each edge of xterm's cube of 6 x 6 x 6 colours.
+/// Levels along each edge of xterm's cube of 6 x 6 x 6 colours.
 const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
-/// First index of xterm's colour cube. The 16 colours before it are never chosen, because users
-/// configure them.
+/// First index of the cube. Pictures do not use the 16 colours before it.
 const FIRST: u8 = 16;
-/// First index of xterm's 24 greys.
+/// First index of the greys.
 const GREYS: u8 = 232;
 
-/// Default values of the 16 ANSI colours in xterm, 8-bit sRGB.
+/// Default values of the 16 ANSI colours in xterm.
 const ANSI: [[u8; 3]; 16] = [
     [0, 0, 0],
     [205, 0, 0],
@@ -81,7 +73,6 @@ const ANSI: [[u8; 3]; 16] = [
     [255, 255, 255],
 ];
 
-/// Returns the 8-bit sRGB of colour `index` of xterm's 256 colours.
 pub fn xterm_rgb(index: u8) -> [u8; 3] {
     match index {
         ..FIRST => ANSI[usize::from(index)],
@@ -93,20 +84,18 @@ pub fn xterm_rgb(index: u8) -> [u8; 3] {
     }
 }
 
-/// Palette of the xterm colours that pictures use: the colour cube and the greys. Entry 0 of this
-/// palette is the colour with index [`FIRST`] in xterm's table.
+/// Colours of the table from [`FIRST`] on.
 static XTERM: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     QuantisedPalette::new((FIRST..=255).map(|index| Oklab::of(xterm_rgb(index))).collect())
 });
 
-/// Returns the index, 16..=255, of xterm's colour nearest in OKLab to the 8-bit sRGB colour `rgb`.
-/// `rgb` is first rounded to 6 bits per channel, which changes a channel by at most 3 of 255
-/// levels. The returned colour is therefore almost as near as the nearest one.
+/// Returns the index, 16..=255, of xterm's colour nearest to the 8-bit sRGB colour `rgb`, which is
+/// rounded first.
 pub fn nearest_xterm(rgb: [u8; 3]) -> u8 {
     FIRST + XTERM.nearest(rgb) as u8
 }
 
-/// Returns the OKLab lightness, 0..=1, of colour `index` (16 to 255) of xterm's 256 colours.
+/// Returns the OKLab lightness, 0..=1, of colour `index` (16 to 255).
 pub fn xterm_lightness(index: u8) -> f32 {
     XTERM.colors[usize::from(index.saturating_sub(FIRST))].l
 }

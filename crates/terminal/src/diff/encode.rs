@@ -1,13 +1,13 @@
-//! Encoding of terminal cells in few bytes. Colours are sent only when they change. An upper half
-//! block and a lower half block with exchanged colours look the same; the one with fewer colour
-//! changes is sent. The cursor moves by the shortest sequence.
+//! Encoding of cells in few bytes. Colours are sent only when they change. Of an upper half block
+//! and a lower one with exchanged colours, the one with fewer changes is sent. The cursor moves by
+//! the shortest sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Text attributes, each with the SGR parameter that sets it and the SGR parameter that resets it.
+/// Attributes with the SGR parameters that set and reset them.
 const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -20,10 +20,10 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::CROSSED_OUT, 9, 29),
 ];
 
-/// Text attributes that are visible on a space character.
+/// Attributes that are visible on a space.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
-/// Pen: colours and text attributes that the terminal uses for the next character.
+/// Colours and attributes of the next character.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pen {
     fg: Color,
@@ -31,48 +31,44 @@ struct Pen {
     modifier: Modifier,
 }
 
-/// Encoder of terminal cells as bytes. It tracks the colours, attributes and cursor position of the
-/// terminal.
+/// Encoder of cells, which tracks colours, attributes and cursor position of the terminal.
 #[derive(Clone, Debug, Default)]
 pub struct Encoder {
     pen: Pen,
-    /// Column and row of the terminal's cursor. `None` if unknown.
+    /// Column and row of the cursor; `None` if unknown.
     cursor: Option<(u16, u16)>,
     columns: u16,
 }
 
 impl Encoder {
-    /// Creates an encoder for a terminal with default colours, without attributes, and with unknown
-    /// cursor position.
+    /// Creates an encoder for a terminal with default colours and unknown cursor position.
     pub fn new(columns: u16) -> Self {
         Self { columns, ..Self::default() }
     }
 
-    /// Writes the sequence that clears the terminal and resets colours and attributes.
+    /// Writes the sequence that clears the terminal.
     pub fn clear(&mut self, out: &mut Vec<u8>) {
         *self = Self::new(self.columns);
         out.extend(b"\x1b[m\x1b[2J");
     }
 
-    /// Writes the sequence that shows `cell` at column `x` and row `y`.
+    /// Writes `cell` at column `x` and row `y`.
     pub fn cell(&mut self, out: &mut Vec<u8>, x: u16, y: u16, cell: &Cell) {
         self.go(out, x, y);
         let (symbol, pen) = self.cheapest(cell);
         self.set(out, pen);
         out.extend(symbol.as_bytes());
         let width = symbol.width() as u16;
-        // After the last column and after wide characters the cursor position depends on the
-        // terminal. It is treated as unknown then.
+        // After the last column and wide characters, the cursor position depends on the terminal.
         self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
-    /// Marks the position of the cursor as unknown. Callers use this after other output that moves
-    /// the cursor.
+    /// Marks the position of the cursor as unknown, after other output.
     pub fn moved(&mut self) {
         self.cursor = None;
     }
 
-    /// Writes the sequence that moves the cursor to column `x` and row `y`.
+    /// Moves the cursor to column `x` and row `y`.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
         let before = self.cursor.replace((x, y));
         let counted = |n: u16, letter: char| match n {
@@ -97,8 +93,7 @@ impl Encoder {
         out.extend(shortest.as_bytes());
     }
 
-    /// Returns `(symbol, pen)` that show `cell` with the fewest bytes. The pen consists of the
-    /// colours and the text attributes.
+    /// Returns the symbol and pen that show `cell` with the fewest bytes.
     fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
         let Cell { fg, bg, modifier, .. } = *cell;
         let symbol = cell.symbol();
@@ -114,13 +109,11 @@ impl Encoder {
         };
         let [upper, lower] = halves;
         let is_flat = upper == lower;
-        // The default colours of foreground and background are both `Color::Reset`, but they look
-        // different. A half with a default colour can therefore not change between foreground and
-        // background.
+        // The default colours of foreground and background are both `Color::Reset`, but look
+        // different.
         let is_explicit = upper != Color::Reset && lower != Color::Reset;
         let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
-            // A full block is replaced by a space, because the full block of some fonts leaves an
-            // edge of the background uncovered.
+            // The full block of some fonts leaves an edge of the background uncovered.
             (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
@@ -128,7 +121,7 @@ impl Encoder {
         };
         let changes = |(symbol, pen): &(&str, Pen)| {
             let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
-            // The weight is 16, because a change of colour needs up to 17 bytes and a glyph 1 to 3.
+            // A change of colour needs up to 17 bytes, a glyph 1 to 3.
             16 * colors + symbol.len()
         };
         candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)
@@ -145,7 +138,7 @@ impl Encoder {
             for (attribute, _, reset) in ATTRIBUTES {
                 if removed.contains(attribute) {
                     codes.push(reset.to_string());
-                    // One parameter can reset several attributes: 22 resets both bold and dim.
+                    // 22 resets both bold and dim.
                     let affected = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
                     affected.for_each(|(attribute, _, _)| reset_too |= *attribute);
                 }
@@ -168,8 +161,8 @@ impl Encoder {
     }
 }
 
-/// Returns the SGR parameters that set the colour `color`. `base` is 30 for foreground and 40 for
-/// background. RGB and indexed colours follow ISO 8613-6.
+/// Returns the SGR parameters of `color`; `base` is 30 for foreground and 40 for background. RGB
+/// and indexed colours follow ISO 8613-6.
 fn color_code(color: Color, base: u8) -> String {
     let dark = |n: u8| (base + n).to_string();
     let bright = |n: u8| (base + 60 + n).to_string();

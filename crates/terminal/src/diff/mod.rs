@@ -1,11 +1,10 @@
 //! Frame difference: selects the cells that the next frame sends to the terminal.
 //!
 //! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
-//! largest difference first, within the byte budget of the frame. If a new picture does not fit
-//! into this budget, a mosaic of coarse blocks is sent first. While samples accumulate, not every
-//! frame compares all cells. The next full comparison is due when the number of samples per pixel
-//! has grown by a factor of 2^(1/4), or of 2^(1/2) from 64 samples on. Invisible differences are
-//! sent when the connection is otherwise idle.
+//! largest first, within the byte budget of the frame. A new picture that does not fit is first
+//! sent as a mosaic of coarse blocks. While samples accumulate, a full comparison of all cells is
+//! due when their number per pixel has grown by a factor of 2^(1/4), or of 2^(1/2) from 64 on.
+//! Invisible differences are sent when the connection is idle.
 
 mod encode;
 mod perceptual;
@@ -19,11 +18,9 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
 
-/// Number of bytes that are reserved in each frame for everything except cells: cursor,
-/// synchronised update, acknowledgement request.
+/// Bytes of each frame that are reserved for everything except cells.
 const FRAME_OVERHEAD: usize = 64;
-/// Time without a change of the picture after which differences below the threshold of visibility
-/// are sent.
+/// Time without a change of the picture after which invisible differences are sent.
 const IDLE: Duration = Duration::from_secs(2);
 
 /// Contents that the terminal should show.
@@ -31,86 +28,73 @@ const IDLE: Duration = Duration::from_secs(2);
 pub struct TargetFrame<'a> {
     /// All cells of the screen.
     pub cells: &'a Buffer,
-    /// Position of the text cursor. `None` hides the cursor.
+    /// Position of the text cursor; `None` hides it.
     pub cursor: Option<Position>,
-    /// Area of the picture on the screen; may be empty.
+    /// Area of the picture; may be empty.
     pub picture: Rect,
-    /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
-    /// `false` if text covers it.
+    /// Row-major mask of the picture's area: `false` if text covers a cell.
     pub uncovered: &'a [bool],
-    /// Number of the shown picture. It increases when an edit, a camera movement or another action
-    /// changes what the picture shows. Additional samples do not increase it.
+    /// Number that increases when the picture shows something else, but not with more samples.
     pub subject: u64,
-    /// Number that increases when the picture may have changed for any reason, such as additional
-    /// samples.
+    /// Number that increases when the picture may have changed for any reason.
     pub version: u64,
-    /// Number of samples per pixel of the picture in this frame.
+    /// Samples per pixel.
     pub samples: f64,
     /// `true` if the picture changes rarely or only by user input.
     pub settled: bool,
 }
 
-/// Summary of an encoded frame. The encoded bytes are in a buffer of the caller.
+/// Summary of an encoded frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
     /// `true` if the frame contains cells of the picture.
     pub picture: bool,
-    /// Number of bytes of the frame that encode cells whose differences are below the threshold of
-    /// visibility.
+    /// Number of bytes that encode invisible differences.
     pub flushed: usize,
 }
 
-/// Differences between terminal and target frame that remain to be sent.
+/// Differences that remain to be sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending {
-    /// `true` if some text of the target frame remains to be sent.
     pub text: bool,
-    /// `true` if visible differences of the picture remain to be sent.
     pub visible: bool,
-    /// Earliest time at which picture differences below the threshold of visibility may be sent.
-    /// `None` if there are no such differences.
+    /// Earliest time at which invisible differences may be sent; `None` if there are none.
     pub hidden: Option<Duration>,
 }
 
-/// Difference between the contents of the terminal and a target frame. The default value is for a
-/// terminal with unknown contents.
+/// Difference between the contents of the terminal, unknown by default, and a target frame.
 #[derive(Debug, Default)]
 pub struct FrameDiff {
-    /// Contents of the terminal. An empty buffer means that they are unknown and the terminal must
-    /// be cleared.
+    /// Contents of the terminal; an empty buffer if they are unknown.
     shown: Buffer,
     cursor: Option<Position>,
     encoder: Encoder,
     picture_diff: PerceptualDiff,
     subject: Option<u64>,
-    /// `true` until cells of a new picture have been sent, exactly or as a mosaic (large blocks of
-    /// one colour). A picture is new after an edit or a camera movement.
+    /// `true` until cells of a new picture have been sent, exactly or as a mosaic.
     fresh: bool,
-    /// Number of samples per pixel at which the next full comparison of the picture is due. A full
-    /// comparison considers all cells. The comparisons between two full ones consider only cells
-    /// that still differ visibly from the target frame.
+    /// Samples per pixel at which the next full comparison is due. The comparisons before consider
+    /// only cells that still differ visibly.
     next_samples: f64,
     version: u64,
-    /// Time at which the version of the target frame's picture last changed.
+    /// Time of the last change of `version`.
     version_at: Duration,
     pending: Pending,
 }
 
 impl FrameDiff {
-    /// Returns the differences that remain to be sent after the last frame.
+    /// Returns the differences that remain after the last frame.
     pub fn pending(&self) -> Pending {
         self.pending
     }
 
-    /// Records that other output has moved the terminal's cursor, so that its position is unknown.
+    /// Records that other output has moved the cursor.
     pub fn moved(&mut self) {
         self.encoder.moved();
     }
 
-    /// Appends the bytes of the next frame to `out`, within the limits of `allowance`, and returns
-    /// a summary of the frame. Appends nothing if the terminal shows `target` already. OKLab
-    /// differences up to `threshold` are treated as invisible: they are sent only when the
-    /// connection is otherwise idle.
+    /// Appends the bytes of the next frame to `out`, within `allowance`; nothing if the terminal
+    /// shows `target` already. OKLab differences up to `threshold` are invisible.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -140,8 +124,7 @@ impl FrameDiff {
             frame = self.send_picture(target, now, FrameBudget { bytes: room, ..allowance }, out);
         }
         if out.len() == before && target.cursor == self.cursor {
-            // No cell is sent. If the sequence that hides the cursor (6 bytes) was appended, it is
-            // removed again.
+            // The sequence that hides the cursor has 6 bytes.
             out.truncate(if self.cursor.is_some() { before - 6 } else { before });
             return frame;
         }
@@ -153,8 +136,7 @@ impl FrameDiff {
         frame
     }
 
-    /// Appends to `out` the bytes of every cell that differs from the terminal's contents, without
-    /// limit.
+    /// Appends every cell that differs.
     fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
         for (x, y, cell) in self.shown.diff_iter(target.cells) {
             self.encoder.cell(out, x, y, cell);
@@ -163,8 +145,8 @@ impl FrameDiff {
         self.pending = Pending::default();
     }
 
-    /// Appends to `out` the rows of text that differ from the terminal's contents: as many as fit
-    /// into `room` bytes, but at least one. Returns `true` if no such rows remain.
+    /// Appends the rows of text that differ, as many as fit into `room` bytes, but at least one.
+    /// Returns `true` if none remain.
     fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(target.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
@@ -181,7 +163,7 @@ impl FrameDiff {
             }
             self.encoder = encoder;
             for (x, y, cell) in row {
-                // A wide character covers the next cell as well.
+                // A wide character covers the next cell.
                 let width = unicode_width::UnicodeWidthStr::width(cell.symbol()).max(1) as u16;
                 for x in (*x..x.saturating_add(width)).take_while(|x| *x < target.cells.area.width)
                 {
@@ -195,8 +177,7 @@ impl FrameDiff {
         true
     }
 
-    /// Compares the picture of the target frame with the contents of the terminal. OKLab
-    /// differences up to `threshold` are treated as invisible.
+    /// Compares the picture of the target frame with the contents of the terminal.
     fn compare(&mut self, target: &TargetFrame, now: Duration, threshold: f32) {
         if self.version != target.version {
             (self.version, self.version_at) = (target.version, now);
@@ -215,8 +196,7 @@ impl FrameDiff {
         self.picture_diff.compare(target, &self.shown, is_due, threshold);
     }
 
-    /// Appends as many cells of the picture to `out` as fit into the byte budget `allowance`. Cells
-    /// with the largest difference from the terminal come first.
+    /// Appends as many cells of the picture as fit into `allowance`, the largest difference first.
     fn send_picture(
         &mut self,
         target: &TargetFrame,
@@ -269,9 +249,8 @@ impl FrameDiff {
         frame
     }
 
-    /// Encodes as many cells of `order` as fit into `room` bytes, the largest differences first.
-    /// `order` has a pair `(difference, index)` for each cell to send; the index is that of the
-    /// cell in the rectangle `area`. `cell(i)` returns the contents of the cell with index i.
+    /// Encodes as many cells of `order`, pairs of difference and index, as fit into `room` bytes,
+    /// the largest differences first. `cell` returns the contents by index.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -279,7 +258,7 @@ impl FrameDiff {
         room: usize,
         cell: impl Fn(usize) -> &'a Cell,
     ) -> Part {
-        // Cells of equal difference are sorted by index, so that frames are deterministic.
+        // Frames are deterministic.
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let encoded = |count: usize| {
             let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();
@@ -295,9 +274,8 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // The estimate assumes that every cell needs the same number of bytes. A smaller selection
-        // of cells needs more bytes for each cell, because its cells are farther apart. The
-        // estimate is therefore rarely too low.
+        // The estimate assumes equal bytes for every cell. Those of a smaller selection are farther
+        // apart, so it is rarely too low.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {
@@ -306,7 +284,7 @@ impl FrameDiff {
             }
             count = (count * room / part.bytes.len()).min(count - 1);
         }
-        // If more than a tenth of `room` is left, a second estimate tries to use it.
+        // A second estimate uses more of `room`.
         if best.cells.len() < order.len() && 10 * best.bytes.len() < 9 * room {
             let estimate = best.cells.len() * room / best.bytes.len().max(1);
             let part = encoded((estimate - estimate / 50).clamp(best.cells.len(), order.len()));
@@ -329,17 +307,16 @@ impl FrameDiff {
     }
 }
 
-/// Part of the picture that fits into a frame, as encoded cells.
+/// Encoded cells that fit into a frame.
 struct Part {
     bytes: Vec<u8>,
-    /// State of the cell encoder after the bytes of this part.
+    /// State of the encoder after these bytes.
     encoder: Encoder,
     cells: Vec<(usize, Cell)>,
 }
 
 impl TargetFrame<'_> {
-    /// Returns the index of the cell at column `x` and row `y` within the area of the picture.
-    /// Returns `None` for a cell outside of this area.
+    /// Returns the index of a cell within the area of the picture.
     fn index(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
         let inside = area.contains(Position { x, y });
@@ -351,7 +328,7 @@ impl TargetFrame<'_> {
     }
 }
 
-/// Returns the position of cell `index` of `area`, counted row by row.
+/// Returns the position of cell `index` of `area`, row by row.
 fn position(area: Rect, index: usize) -> Position {
     let width = usize::from(area.width).max(1);
     Position { x: area.x + (index % width) as u16, y: area.y + (index / width) as u16 }

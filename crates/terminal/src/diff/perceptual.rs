@@ -1,5 +1,4 @@
-//! Perceptual difference between the cells of the picture that the terminal shows and those of the
-//! target frame.
+//! Perceptual difference between the terminal and the target frame, in the cells of the picture.
 
 use crate::cells::{Oklab, PictureCell, blocks};
 use crate::diff::{TargetFrame, position};
@@ -7,49 +6,43 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Perceptual difference of a cell with unknown contents. It is larger than that between black and
-/// white, so that such cells are sent first.
+/// Difference of a cell with unknown contents, larger than that between black and white.
 const UNKNOWN: f32 = 2.0;
 
 /// Target and shown colours of one cell of the picture.
 #[derive(Clone, Copy, Debug, Default)]
 struct CellColors {
-    /// Cell of the target frame. `None` where text covers the picture.
+    /// Cell of the target frame; `None` where text covers the picture.
     target: Option<PictureCell>,
-    /// OKLab colours of the upper and the lower half of the target cell.
+    /// Colours of the halves of the target cell.
     look: [Oklab; 2],
-    /// Colours of the upper and the lower half of the cell that the terminal shows. `None` if
-    /// unknown.
+    /// Colours of the halves on the terminal; `None` if unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if the difference of this cell may count as visible. The value becomes `false` when
-    /// the cell is sent exactly or its difference becomes invisible. It becomes `true` again at the
-    /// next full comparison.
+    /// `true` if a difference may count as visible: from a full comparison on, until the cell is
+    /// sent exactly or the difference becomes invisible.
     counts: bool,
-    /// OKLab difference between target and shown cell; 0 if they are equal.
+    /// OKLab difference; 0 if the cells are equal.
     error: f32,
-    /// `true` if the difference between target and shown cell is visible.
+    /// `true` if the difference is visible.
     visible: bool,
 }
 
-/// Perceptual differences between the target frame and the terminal, for all cells in the area of
-/// the picture.
+/// Differences of all cells in the area of the picture.
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
     area: Rect,
-    /// Colours of the cells in the picture's area, row by row.
+    /// Colours of the cells, row by row.
     cells: Vec<CellColors>,
 }
 
 impl PerceptualDiff {
-    /// Marks the contents of the terminal in the picture's area as unknown, so that all cells are
-    /// sent again.
+    /// Marks the contents of the terminal as unknown.
     pub fn forget(&mut self) {
         self.area = Rect::ZERO;
         self.cells.clear();
     }
 
-    /// Sets the rectangle of the screen in which the picture is. A new rectangle has unknown
-    /// contents.
+    /// Sets the area of the picture. A new one has unknown contents.
     pub fn fit(&mut self, area: Rect) {
         if self.area != area {
             self.area = area;
@@ -59,10 +52,8 @@ impl PerceptualDiff {
         }
     }
 
-    /// Compares the shown cells with the target frame and marks the cells with a visible
-    /// difference, that is, one above `threshold`. If `is_due` is `true`, this is a full
-    /// comparison, which considers all cells. Otherwise it considers only cells whose `counts` is
-    /// `true`.
+    /// Marks the cells whose difference is above `threshold`. If `is_due` is `true`, all cells are
+    /// considered, otherwise those with `counts`.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -86,21 +77,19 @@ impl PerceptualDiff {
                 cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.look));
             cell_colors.counts &= cell_colors.error > threshold;
             cell_colors.visible = cell_colors.counts;
-            // Cells that differ in their contents but not in their colours get the smallest
-            // positive error, so that they are sent last.
+            // Cells with equal colours but different contents are sent last.
             cell_colors.error = cell_colors.error.max(f32::MIN_POSITIVE);
         }
     }
 
-    /// Records that text now covers cell `index` of the picture's area.
+    /// Records that text covers cell `index`.
     pub fn covered(&mut self, index: usize) {
         if let Some(cell_colors) = self.cells.get_mut(index) {
             (cell_colors.shown, cell_colors.counts) = (None, true);
         }
     }
 
-    /// Records that the terminal now shows `cell` at position `index` of the picture's area.
-    /// `exact` is `true` if `cell` equals the target.
+    /// Records that the terminal shows `cell`, which equals the target if `exact` is `true`.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
         let shown = picture_cell(cell).halves();
@@ -110,24 +99,19 @@ impl PerceptualDiff {
             if exact { 0.0 } else { difference(shown, cell_colors.look).max(f32::MIN_POSITIVE) };
     }
 
-    /// Returns `(OKLab difference, index)` of each cell whose difference between target and
-    /// terminal is visible.
+    /// Returns `(difference, index)` of each cell with a visible difference.
     pub fn visible(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| cell_colors.visible)
     }
 
-    /// Returns `(OKLab difference, index)` of each cell whose difference between target and
-    /// terminal is invisible, but not 0.
+    /// Returns `(difference, index)` of each cell with an invisible difference.
     pub fn hidden(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Creates a mosaic of the target: blocks of `side` x `side` half cells, each block of one
-    /// colour. A half cell is the upper or lower half of a cell. Returns `(cells, improved)`.
-    /// `cells` has all cells of the picture. A cell with a visible difference shows the mosaic;
-    /// every other cell equals the target. `improved` has `(gain, index)` for each mosaic cell that
-    /// is closer to the target than the cell on the terminal. The gain is the decrease in OKLab
-    /// distance from the target.
+    /// Creates a mosaic of the target, blocks of `side` x `side` half cells, in the cells with a
+    /// visible difference. Also returns `(gain, index)` of each cell that it brings closer to the
+    /// target, the decrease in OKLab distance.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
@@ -167,13 +151,11 @@ impl PerceptualDiff {
     }
 }
 
-/// Returns the perceptual difference of two cells: the larger of the OKLab distances between their
-/// upper halves and between their lower halves.
+/// Returns the larger of the distances between upper and between lower halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
-/// Converts a cell of a ratatui buffer to a [`PictureCell`].
 fn picture_cell(cell: &Cell) -> PictureCell {
     let glyph = cell.symbol().chars().next().unwrap_or(' ');
     PictureCell { glyph, fg: cell.fg, bg: cell.bg }

@@ -4,8 +4,8 @@ use crate::Capabilities;
 use crate::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
-/// Shortest plausible round trip over SSH. A reply that comes sooner is from a program on this side
-/// of the connection, such as a multiplexer, and not from the terminal.
+/// Shortest plausible round trip over SSH. A reply that comes sooner is from a multiplexer on this
+/// side.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
 /// State of the connection to the terminal before the first frame.
@@ -13,19 +13,17 @@ const TOO_SOON: Duration = Duration::from_millis(3);
 pub struct InitialLink {
     /// Method that limits the rate of frames.
     pub mode: PacingMode,
-    /// Round-trip time to the terminal: from a request to its reply. `None` if it was not measured.
+    /// Round-trip time to the terminal.
     pub round_trip: Option<Duration>,
-    /// `true` if the kernel reports the length of the connection's TCP send queue.
+    /// `true` if the kernel reports the length of the TCP send queue.
     pub queue: bool,
-    /// Rate at which frames are sent in [`PacingMode::FixedRate`], in bytes per second.
+    /// Bytes per second in [`PacingMode::FixedRate`].
     pub fixed_rate: f64,
 }
 
 impl InitialLink {
-    /// Derives the state from `terminal`, the capabilities of the terminal. `queue` is `true` if
-    /// the kernel reports the length of the connection's TCP send queue. If `rate` is given, frames
-    /// are sent at this fixed rate, in bytes per second; if it is `None`, the rate is measured
-    /// where possible.
+    /// Derives the state. `queue` is `true` if the kernel reports the length of the TCP send queue.
+    /// `rate` is a fixed rate in bytes per second.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

@@ -1,13 +1,11 @@
-//! Flow control: measures the rate of the connection to the terminal and limits the size of the
-//! next frame.
+//! Flow control: measures the rate of the connection and limits the size of the next frame.
 //!
 //! A slow SSH connection accepts a megabyte at once, but the terminal shows it only many seconds
 //! later. After each frame the program therefore requests the cursor position. The reply
 //! acknowledges the frame, and its time gives the round trip and the rate. A frame holds at most
-//! what the connection carries in 100 ms, and only a few frames are in flight. The program cannot
-//! rely on replies if they come from a multiplexer or do not come at all. It then measures the
-//! length of the kernel's TCP send queue instead. If the kernel does not report this length, bytes
-//! are sent at a fixed rate.
+//! what the connection carries in 100 ms, and only a few frames are in flight. Without replies from
+//! the terminal, the length of the kernel's TCP send queue is measured instead, and without that,
+//! bytes are sent at a fixed rate.
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
@@ -24,165 +22,143 @@ use std::collections::VecDeque;
 use std::time::Duration;
 pub use tcp_send_queue::TcpSendQueue;
 
-/// Shortest interval between frames that are sent to the terminal.
+/// Shortest interval between frames.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-/// Shortest interval between frames with text only, over an SSH connection and without user input.
+/// Shortest interval between frames with text only, over SSH and without user input.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// Time in which the connection should transmit a frame. Multiplied by the current rate, it gives
-/// the byte budget of the frame.
+/// Time in which the connection should transmit a frame.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
-/// Byte budgets of a frame that is sent to the terminal: `[smallest, initial, largest]`. The
-/// initial one applies before the first measurement of the rate.
+/// Byte budgets of a frame: `[smallest, initial, largest]`. The initial one applies before the
+/// first measurement.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
-/// Largest number of frames in flight. A frame is in flight until it is acknowledged.
+/// Largest number of frames in flight, that is, not acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
-/// Largest sum of bytes of the frames in flight that contain only text. Frames with cells of the
-/// picture do not count.
+/// Largest sum of bytes of the frames in flight that contain only text.
 const MAX_TEXT: usize = 1500;
-/// Size in bytes below which a frame is small. The time of a small frame is mostly latency. Its
-/// acknowledgement may therefore raise the measured rate, but not lower it.
+/// Size below which the time of a frame is mostly latency: its acknowledgement may raise the
+/// measured rate, but not lower it.
 const SMALL: usize = 1000;
-/// Time after the sending of a frame at which its acknowledgement, if still missing, is treated as
-/// lost.
+/// Time after which a missing acknowledgement is lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
-/// Number of consecutive lost acknowledgements after which the program requests no more of them.
+/// Number of consecutive losses after which no acknowledgements are requested.
 const MAX_LOSSES: u32 = 3;
-/// Interval at which the shortest round trip to the terminal is measured again, because the
-/// connection may have changed.
+/// Interval at which the shortest round trip is measured again.
 const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
-/// Weight of a new measurement in the connection's rate, which is an exponential moving average.
+/// Weight of a new measurement in the moving average of the rate.
 const NEW_WEIGHT: f64 = 0.3;
-/// Time after user input during which the user is treated as active.
+/// Time after input during which the user is active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
-/// Interval at which the length of the kernel's TCP send queue is measured.
+/// Interval at which the send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
-/// Interval at which the kernel's TCP send queue is measured after no byte has left it for
-/// [`LOST_AFTER`].
+/// Interval at which the send queue is measured after no byte has left it for [`LOST_AFTER`].
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
-/// Assumed round trip to the terminal before the first measurement.
+/// Assumed round trip before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
-/// Time after which the connection is treated as silent, if bytes wait for transmission, none is
-/// transmitted, and no user input arrives.
+/// Time after which the connection is silent, if bytes wait, none is transmitted, and no input
+/// arrives.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
-/// Longest interval between two acknowledgements that are combined into one measurement of the
-/// rate. If the connection has delayed the first one, both arrive almost together, and the second
-/// alone would give too high a rate.
+/// Longest interval between two acknowledgements that are combined into one measurement. If the
+/// first was delayed, the second alone would give too high a rate.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 /// Assumed rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// Share of the connection's rate that refinement may use, from 0 to 1. Refinement is the sending
-/// of picture differences below the threshold of visibility.
+/// Share of the rate that refinement may use: the sending of invisible differences.
 const REFINEMENT_SHARE: f64 = 0.25;
 
-/// Method that limits the rate of frames to the terminal.
+/// Method that limits the rate of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PacingMode {
-    /// Frames are not limited: the terminal is local.
+    /// The terminal is local.
     #[default]
     Unlimited,
-    /// Frames are limited by acknowledgements: the terminal replies to a request after each frame.
-    /// The value is the multiplexer through which the request passes; `None` without a multiplexer.
+    /// The terminal acknowledges each frame, through this multiplexer.
     AckClocked(Option<Multiplexer>),
-    /// Frames are limited by the length of the connection's TCP send queue, which the kernel
-    /// reports.
+    /// The kernel reports the length of the TCP send queue.
     SendQueue,
-    /// Frames are sent at a fixed rate, without acknowledgements.
+    /// Frames are sent at a fixed rate.
     FixedRate,
 }
 
-/// Limits of a frame to be sent: its size and its contents.
+/// Limits of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameBudget {
-    /// Largest number of bytes of the frame. `usize::MAX` means no limit.
+    /// Largest number of bytes; `usize::MAX` means no limit.
     pub bytes: usize,
     /// `true` if the frame may contain cells of the picture.
     pub picture: bool,
-    /// Largest number of bytes of the frame for refinement, that is, for picture differences below
-    /// the threshold of visibility.
+    /// Largest number of bytes for refinement.
     pub refinement: usize,
 }
 
-/// State of the connection to the terminal as displayed to the user.
+/// State of the connection, for display.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkStatus {
-    /// Rate of the connection in bytes per second, measured or fixed.
+    /// Bytes per second, measured or fixed.
     pub rate: f64,
-    /// Method that limits the rate of frames.
     pub mode: PacingMode,
 }
 
-/// Flow control of the connection to the terminal: how many bytes may be sent, and when.
+/// Flow control of the connection.
 #[derive(Debug, Default)]
 pub struct FlowControl {
     mode: PacingMode,
-    /// Method of limiting frames that was suspended because the terminal did not reply. It resumes
-    /// when a reply arrives. `None` if no method is suspended.
+    /// Method that was suspended because the terminal did not reply, until a reply arrives.
     suspended_mode: Option<PacingMode>,
     start: InitialLink,
-    /// Rate of the connection in bytes per second, measured or fixed.
+    /// Bytes per second, measured or fixed.
     rate: f64,
     round_trip: Option<Duration>,
     round_trip_at: Duration,
-    /// Half of the connection's rate at the last measurement of the round trip, in bytes per
-    /// second. With [`PacingMode::SendQueue`], a rate below this value causes a new measurement of
-    /// the round trip. A longer round trip may have lowered the rate: the limit of the send queue
-    /// is then too low, because it is derived from the old round trip.
+    /// Half of the rate at the last measurement of the round trip. With [`PacingMode::SendQueue`],
+    /// a lower rate causes a new one: a longer round trip may have lowered the rate, because the
+    /// limit of the queue is derived from it.
     doubtful_rate: f64,
-    /// Frames that the terminal has not acknowledged yet, oldest first.
+    /// Frames in flight, oldest first.
     in_flight: VecDeque<InFlight>,
-    /// `[time of sending, time of acknowledgement]` of the last acknowledged frame. `None` before
-    /// the first acknowledgement.
+    /// `[time of sending, time of acknowledgement]` of the last acknowledged frame.
     last_acked: Option<[Duration; 2]>,
     losses: u32,
-    /// Time at which the last period of user activity began. The user counts as active for
-    /// [`ACTIVE_TIME`] after each input.
+    /// Time at which the last period of user activity began.
     active_since: Duration,
     /// Time at which the last period of user activity ends.
     active_until: Duration,
     last_frame: Option<Duration>,
-    /// Estimated time at which the connection will have transmitted the bytes that were sent
-    /// without an acknowledgement request.
+    /// Estimated time at which the bytes without acknowledgement request will have been
+    /// transmitted.
     free_at: Duration,
-    /// Estimated time at which the connection will have transmitted all frames with an
-    /// acknowledgement request. From this time on it is idle.
+    /// Estimated time at which the frames with acknowledgement request will have been transmitted.
     clear_at: Duration,
-    /// Earliest time at which a frame may again contain refinement: cells whose differences are
-    /// below the threshold of visibility. The delay limits refinement to a quarter of the
-    /// connection's rate (`REFINEMENT_SHARE`).
+    /// Earliest time of the next refinement.
     pub refine_at: Duration,
     send_queue: SendQueueEstimate,
-    /// Last measurement of the connection's rate by acknowledgements; `None` before the first one.
+    /// Last measurement of the rate by acknowledgements.
     ack_sample: Option<AckSample>,
 }
 
-/// Frame in flight: a frame that the terminal has not acknowledged yet.
+/// Frame in flight.
 #[derive(Clone, Copy, Debug)]
 struct InFlight {
     sent: Duration,
     bytes: usize,
     /// `true` if the frame contains cells of the picture.
     picture: bool,
-    /// `true` if no other frame was in flight when this one was sent.
+    /// `true` if no other frame was in flight when it was sent.
     alone: bool,
 }
 
-/// Measurement of the connection's rate by acknowledgements. It holds a number of bytes, the time
-/// of their last acknowledgement, and two bounds (`earliest_start`, `latest_start`) of the time at
-/// which a reply to the first of these bytes could have arrived.
+/// Measurement of the rate by acknowledgements: a number of bytes, the time of the last
+/// acknowledgement, and bounds of the time at which a reply to the first byte could have arrived.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the previous frame was sent. `None` if there is no previous frame, or if the
-    /// connection was idle between that frame and the measured bytes: the acknowledgement of that
-    /// frame arrived before a reply to these bytes was possible.
+    /// Time at which the previous frame was sent; `None` if the connection was idle in between.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
 }
 
 impl FlowControl {
-    /// Creates the flow control of a connection in the state `start`.
     pub fn new(start: InitialLink) -> Self {
         let assumed_rate = BUDGET[1] / FRAME_SPAN.as_secs_f64();
         Self {
@@ -198,28 +174,26 @@ impl FlowControl {
         }
     }
 
-    /// Returns the state of the connection for display. Returns `None` for a local terminal.
+    /// Returns the state of the connection; `None` for a local terminal.
     pub fn reading(&self) -> Option<LinkStatus> {
         let status = LinkStatus { rate: self.rate, mode: self.mode };
         (self.mode != PacingMode::Unlimited).then_some(status)
     }
 
-    /// Returns the OKLab distance above which a difference counts as visible. Slower connections
-    /// have a larger threshold, so that fewer cells are sent.
+    /// Returns the OKLab distance above which a difference is visible, larger for slower
+    /// connections.
     pub fn threshold(&self) -> f32 {
         match self.mode {
             PacingMode::Unlimited => 0.0,
-            // The limits 1.25e6 and 37.5e3 bytes per second are 10 Mbit/s and 300 kbit/s.
+            // 10 Mbit/s and 300 kbit/s.
             _ if self.rate > 1.25e6 => 0.01,
             _ if self.rate < 37.5e3 => 0.04,
             _ => 0.02,
         }
     }
 
-    /// Records the time `now` of a user input, such as a key press. For the next 500 ms
-    /// (`ACTIVE_TIME`) the user counts as active. During this time the round trip is measured only
-    /// if the rate, measured by the TCP send queue, has fallen by half since the last measurement
-    /// of the round trip.
+    /// Records user input. For [`ACTIVE_TIME`] the round trip is then measured only if the rate is
+    /// doubtful.
     pub fn record_input(&mut self, now: Duration) {
         if now >= self.active_until {
             self.active_since = now;
@@ -227,9 +201,8 @@ impl FlowControl {
         self.active_until = now + ACTIVE_TIME;
     }
 
-    /// Returns the multiplexer through which the acknowledgement request after a frame must pass.
-    /// The inner `None` means that there is no multiplexer. The outer `None` means that no request
-    /// should be sent.
+    /// Returns the multiplexer, if there is one, through which the acknowledgement request after a
+    /// frame must pass. The outer `None` means no request.
     pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
             PacingMode::AckClocked(multiplexer) => Some(multiplexer),
@@ -237,14 +210,14 @@ impl FlowControl {
         }
     }
 
-    /// Returns `true` if the caller should now measure the kernel's send queue and pass the result
-    /// to [`FlowControl::held_back`].
+    /// Returns `true` if the caller should now measure the send queue for
+    /// [`FlowControl::held_back`].
     pub fn wants_queue_length(&self, now: Duration) -> bool {
         self.measures_at(now).is_some_and(|at| at <= now)
     }
 
-    /// Returns the time of the next measurement of the kernel's send queue. Returns `None` if none
-    /// is needed, because the queue is empty or its length does not limit the frames.
+    /// Returns the time of the next measurement of the send queue; `None` if it is empty or does
+    /// not limit the frames.
     pub fn measures_at(&self, now: Duration) -> Option<Duration> {
         if self.mode != PacingMode::SendQueue {
             return None;
@@ -253,10 +226,8 @@ impl FlowControl {
         self.send_queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
     }
 
-    /// Returns the time from which the connection is treated as silent, unless bytes are
-    /// transmitted or input arrives before that time. `blocked_since` is the start of a write to
-    /// the terminal that has not returned. Returns `None` if no bytes are known to be waiting for
-    /// transmission.
+    /// Returns the time from which the connection is silent, unless bytes are transmitted or input
+    /// arrives before. `blocked_since` is the start of a write that has not returned.
     pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
         let is_measured = self.mode == PacingMode::SendQueue;
         let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
@@ -264,12 +235,10 @@ impl FlowControl {
         Some(since.max(self.active_until) + SILENT_AFTER)
     }
 
-    /// Returns the limits of a frame that may be sent at the time `now`. Returns `None` if no frame
-    /// may be sent yet. `answers` is `true` if the frame shows the effect of user input. Such a
-    /// frame need not keep the usual interval to the last frame.
+    /// Returns the limits of a frame that may be sent now. `answers` is `true` if it shows the
+    /// effect of user input; it need not keep the usual interval then.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
-        // While the round trip is measured, a frame is small, so that its transmission adds little
-        // time.
+        // The round trip is measured by a small frame.
         let bytes = if self.needs_round_trip(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
@@ -284,8 +253,8 @@ impl FlowControl {
         due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
-    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame if no reply or
-    /// input arrives before. `text` is `true` if text may remain to be sent.
+    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame without a reply
+    /// or input. `text` is `true` if text may remain to be sent.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
@@ -296,7 +265,7 @@ impl FlowControl {
             PacingMode::AckClocked(_) if now < self.active_until.min(self.clear_at) => {
                 frame.max(self.clear_at)
             }
-            // By this time the oldest frame is acknowledged or counts as lost.
+            // The oldest frame is acknowledged or lost then.
             PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
             PacingMode::SendQueue => {
                 let due = self.measures_at(now).unwrap_or(now);
@@ -308,9 +277,7 @@ impl FlowControl {
         if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
-    /// Records that a frame of `bytes` bytes was sent. `picture` is `true` if the frame contains
-    /// cells of the picture. `flushed` is the number of those bytes that encode differences below
-    /// the threshold of visibility.
+    /// Records that a frame was sent. `flushed` is the number of bytes of refinement.
     pub fn sent(&mut self, now: Duration, bytes: usize, picture: bool, flushed: usize) {
         let seconds = |bytes: usize, rate: f64| Duration::from_secs_f64(bytes as f64 / rate);
         self.last_frame = Some(now);
@@ -331,9 +298,8 @@ impl FlowControl {
         }
     }
 
-    /// Records that `bytes` bytes were sent without an acknowledgement request. They end inside of
-    /// an escape sequence, where no request can be inserted. The time of their transmission is
-    /// estimated by the rate of the connection.
+    /// Records bytes that end inside an escape sequence, where no request can be inserted. The time
+    /// of their transmission is estimated.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
@@ -344,12 +310,11 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply of the terminal, which acknowledges the oldest frame in flight. Returns
-    /// `true` if another frame may now be permitted, and `false` if no reply was awaited.
+    /// Records a reply, which acknowledges the oldest frame in flight. Returns `false` if none was
+    /// awaited.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
-            // Replies come again after an interruption of the connection, for example of mobile
-            // data in a tunnel.
+            // The connection has been interrupted.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
             self.forget_frames();
@@ -369,11 +334,22 @@ impl FlowControl {
         }
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        // The rate is the number of bytes of a frame divided by the time in which replies to these
-        // bytes could arrive. This time ends with the acknowledgement of the frame. It begins when
-        // a reply to the first byte could arrive, 0.9 to 1 round trips after the frame was sent,
-        // but not before the previous acknowledgement. If the acknowledgement arrives sooner than
-        // the known round trip allows, the known round trip is too long and is not used.
+        self.measure_rate(frame, at, last_acked, known);
+        true
+    }
+
+    /// Updates the rate by the acknowledgement of `frame` at `at`. `last_acked` is the previous one,
+    /// and `known` the known round trip, if it is not too long.
+    fn measure_rate(
+        &mut self,
+        frame: InFlight,
+        at: Duration,
+        last_acked: Option<[Duration; 2]>,
+        known: Option<Duration>,
+    ) {
+        // The rate is the number of bytes divided by the time in which replies to them could
+        // arrive: from 0.9 to 1 round trips after the frame was sent, but not before the previous
+        // acknowledgement, to the acknowledgement. A round trip longer than that is not used.
         let idle_start =
             |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
         let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
@@ -394,31 +370,25 @@ impl FlowControl {
             },
         };
         self.ack_sample = Some(sample);
-        // If the connection delays the first of two acknowledgements, both arrive closer together
-        // than the frames were sent. The upper bound of the time is therefore at least the time
-        // between the sending of the two frames.
+        // Two acknowledgements may arrive closer together than the frames were sent.
         let sending = sample.sent_from.map(|from| frame.sent.saturating_sub(from));
         let longest = at.saturating_sub(sample.earliest_start).max(sending.unwrap_or_default());
         let shortest = at.saturating_sub(sample.latest_start);
         let rate = |span: Duration| {
             sample.bytes as f64 / span.max(Duration::from_millis(10)).as_secs_f64()
         };
-        // The measurement gives a lower and an upper bound of the rate. The known rate is kept if
-        // it is between them; otherwise the nearer bound replaces it.
+        // The known rate is kept if it is between both bounds; otherwise the nearer bound replaces
+        // it.
         let rate = self.rate.clamp(rate(longest), rate(shortest.min(longest)));
-        // The time of a small frame is mostly latency. It can prove a connection fast, but not
-        // slow.
         if sample.bytes >= SMALL || rate > self.rate {
             let is_full = 2 * sample.bytes >= self.budget() || shortest > 2 * FRAME_SPAN;
             if is_full || rate > self.rate {
                 self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
             }
         }
-        true
     }
 
-    /// Records the number of bytes in the kernel's send queue. `bytes` is `None` if the kernel no
-    /// longer reports it.
+    /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.
     pub fn held_back(&mut self, now: Duration, bytes: Option<usize>) {
         let Some(bytes) = bytes else {
             self.stop_requests(PacingMode::FixedRate, now);
@@ -442,8 +412,7 @@ impl FlowControl {
         }
     }
 
-    /// Treats all frames in flight as lost if the acknowledgement of the oldest one is overdue at
-    /// `now`.
+    /// Treats all frames in flight as lost if the oldest acknowledgement is overdue.
     pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
@@ -458,20 +427,18 @@ impl FlowControl {
         }
     }
 
-    /// Returns the longest time that the program, before it exits, waits for outstanding replies of
-    /// the terminal. Returns `None` if no replies are outstanding.
+    /// Returns the longest time to wait for outstanding replies at the end of the program.
     pub fn awaits(&self) -> Option<Duration> {
         let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
         is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
     }
 
-    /// Returns `true` if acknowledgements of frames are outstanding.
+    /// Returns `true` if acknowledgements are outstanding.
     pub fn is_waiting(&self) -> bool {
         !self.in_flight.is_empty()
     }
 
-    /// Returns the largest number of bytes of the next frame: what the connection transmits in
-    /// [`FRAME_SPAN`] at the measured rate, within the limits of [`BUDGET`].
+    /// Returns the largest number of bytes of the next frame.
     fn budget(&self) -> usize {
         match self.mode {
             PacingMode::Unlimited => usize::MAX,
@@ -482,7 +449,7 @@ impl FlowControl {
     fn has_room(&self, now: Duration, answers: bool) -> bool {
         let is_active = now < self.active_until;
         // The first frame that shows the effect of input does not wait for frames sent before the
-        // input. `last` is the time at which the last of these was sent.
+        // input, the last of them at `last`.
         let is_first = |last: Option<Duration>| {
             is_active && answers && last.is_some_and(|at| at < self.active_since)
         };
@@ -493,9 +460,8 @@ impl FlowControl {
                 if self.needs_round_trip(now) {
                     return self.in_flight.is_empty();
                 }
-                // While the user is active and the connection is busy, at most one frame is in
-                // flight, or two if the second shows the effect of input. The effect of an input
-                // then waits for at most one frame, the one in transmission.
+                // While the user is active and the connection busy, the effect of an input waits
+                // for at most the frame in transmission.
                 let limit = match is_active && self.clear_at > now {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
@@ -506,8 +472,7 @@ impl FlowControl {
             PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
                 let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
-                // While the user is active, the limit is lower by half of a frame, so that the
-                // effect of an input waits for fewer bytes.
+                // The effect of an input then waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 self.send_queue.bytes < self.max_queue() + extra - spare
             }
@@ -518,26 +483,22 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of bytes in the kernel's send queue above which no frame is sent. The
-    /// connection transmits this number in one round trip plus the time of one frame
-    /// ([`FRAME_SPAN`]).
+    /// Returns the number of bytes in the send queue above which no frame is sent: those of one
+    /// round trip and one frame.
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
     }
 
-    /// Returns the number of frames in flight that keeps the connection always busy: one frame in
-    /// transmission, and as many frames as the connection transmits in one round trip.
+    /// Returns the number of frames in flight that keeps the connection busy.
     fn target_in_flight(&self) -> usize {
         let round_trips =
             self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip. There are two cases. First,
-    /// the rate, measured by the TCP send queue, has fallen by half since the last measurement of
-    /// the round trip. Second, there is no measurement of the round trip from the last 30 s
-    /// ([`ROUND_TRIP_INTERVAL`]), and the user is not active.
+    /// Returns `true` if the next frame should measure the round trip: if the rate has fallen by
+    /// half since the last measurement, or that is old and the user is not active.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);
@@ -549,7 +510,6 @@ impl FlowControl {
         self.in_flight.front().map(|frame| frame.sent + LOST_AFTER)
     }
 
-    /// Removes all frames in flight. Their acknowledgements are no longer expected.
     fn forget_frames(&mut self) {
         self.in_flight.clear();
         self.last_acked = None;

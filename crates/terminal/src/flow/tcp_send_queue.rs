@@ -1,11 +1,10 @@
-//! Length of the SSH connection's TCP send queue: the number of bytes that the kernel holds because
-//! the other host has not acknowledged them (proc(5), `/proc/net/tcp`). This length describes only
-//! the path to the host at the other end of the TCP connection, such as a jump host.
+//! Length of the SSH connection's TCP send queue: bytes that the other host, such as a jump host,
+//! has not acknowledged (proc(5), `/proc/net/tcp`).
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// Send queue of one TCP connection (that of SSH), read from the kernel's table of connections.
+/// Send queue of one TCP connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TcpSendQueue {
     local: SocketAddr,
@@ -13,30 +12,25 @@ pub struct TcpSendQueue {
 }
 
 impl TcpSendQueue {
-    /// Finds the TCP connection of SSH. `ssh_connection` is the value of the environment variable
-    /// `SSH_CONNECTION`, which has the addresses of both ends. Returns `None` if the kernel does
-    /// not list the connection.
+    /// Finds the connection by the value of `SSH_CONNECTION`. Returns `None` if the kernel does not
+    /// list it.
     pub fn find(ssh_connection: &str) -> Option<Self> {
         let queue = Self::parse(ssh_connection)?;
         queue.bytes().is_some().then_some(queue)
     }
 
-    /// Returns the number of bytes in the send queue: those that the other host has not
-    /// acknowledged. Returns `None` if the kernel does not list the connection.
+    /// Returns the number of bytes in the send queue.
     pub fn bytes(&self) -> Option<usize> {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))
     }
 
-    /// Parses the value of `SSH_CONNECTION`, which is
-    /// `client-address client-port server-address server-port`. Returns `None` if `text` has
-    /// another form.
+    /// Parses `client-address client-port server-address server-port`.
     fn parse(text: &str) -> Option<Self> {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };
         let address = |ip: &str, port: &str| {
-            // An IPv6 address in `SSH_CONNECTION` may have a scope such as `%eth0`. Addresses in
-            // the kernel's table have none.
+            // A scope such as `%eth0` is not in the kernel's table.
             let ip: IpAddr = ip.split('%').next()?.parse().ok()?;
             Some(SocketAddr::new(ip.to_canonical(), port.parse().ok()?))
         };
@@ -54,9 +48,8 @@ impl TcpSendQueue {
     }
 }
 
-/// Parses an address of the kernel's table of TCP connections, such as `0100007F:0016`: the IP
-/// address as hexadecimal 32-bit words in native byte order, and the hexadecimal port. Returns
-/// `None` if `text` has another form.
+/// Parses an address of the kernel's table, such as `0100007F:0016`: hexadecimal 32-bit words in
+/// native byte order, and the port.
 fn address(text: &str) -> Option<SocketAddr> {
     let (words, port) = text.split_once(':')?;
     let mut bytes = Vec::with_capacity(16);

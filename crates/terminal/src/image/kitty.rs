@@ -1,5 +1,4 @@
-//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): an image is sent as a PNG
-//! file in chunks.
+//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): PNG files in chunks.
 
 use crate::image::transfer::Transfer;
 use base64::Engine;
@@ -7,20 +6,17 @@ use base64::engine::general_purpose::STANDARD;
 use crossterm::cursor::MoveTo;
 use ratatui::layout::Rect;
 
-/// Number of base64 characters in a chunk of kitty's graphics protocol, a multiple of 4. The
-/// protocol allows 4096. A chunk of 1024 fits into the smallest byte budget of a frame.
+/// Base64 characters in a chunk, a multiple of 4, at most 4096. A chunk of 1024 fits into the
+/// smallest budget of a frame.
 const CHUNK: usize = 1024;
 
-/// Number of the image in kitty's graphics protocol. It is below 256, because placeholders encode
-/// the number as an indexed foreground colour.
+/// Number of the image, below 256, because placeholders encode it as an indexed colour.
 pub const IMAGE: u8 = 163;
 
-/// Unicode placeholder of kitty's graphics protocol: a character in place of which the terminal
-/// shows a part of an image.
+/// Character in place of which the terminal shows a part of an image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
-/// Code points of the combining marks that encode the row of a placeholder: the beginning of the
-/// protocol's table.
+/// Combining marks that encode the row of a placeholder: the beginning of the protocol's table.
 const MARKS: [u32; 88] = [
     0x305, 0x30d, 0x30e, 0x310, 0x312, 0x33d, 0x33e, 0x33f, 0x346, 0x34a, 0x34b, 0x34c, 0x350,
     0x351, 0x352, 0x357, 0x35b, 0x363, 0x364, 0x365, 0x366, 0x367, 0x368, 0x369, 0x36a, 0x36b,
@@ -34,29 +30,24 @@ const MARKS: [u32; 88] = [
 /// Largest number of rows that placeholders can encode.
 pub const MAX_ROWS: u16 = MARKS.len() as u16;
 
-/// Returns the text of each cell in row `row` of the image. The text encodes the row but not the
-/// column, which the terminal finds by counting from the left.
+/// Returns the text of each cell in row `row`. The terminal counts columns from the left.
 pub fn placeholder(row: u16) -> String {
     let mark = MARKS.get(usize::from(row)).and_then(|mark| char::from_u32(*mark));
     [Some(PLACEHOLDER), mark].into_iter().flatten().collect()
 }
 
-/// Returns the bytes that show the image file `png` in the cells `place`. If `through_tmux` is
-/// `true`, tmux passes the bytes on to the terminal outside of tmux, which shows the image in the
-/// cells that contain placeholders. If `stretched` or `through_tmux` is `true`, the terminal scales
-/// the image to the size of the cells `place`.
+/// Returns the bytes that show the file `png` in the cells `place`: inside tmux, by placeholders.
+/// If `stretched` or `through_tmux` is `true`, the terminal scales the image to these cells.
 pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
-    // If only a part of the image was sent, an empty last chunk (`m=0`) ends the transfer. The
-    // terminal then discards the incomplete image as invalid.
+    // An empty last chunk (`m=0`) ends an incomplete transfer, which the terminal discards.
     let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
     let remove = [give_up, remove].map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
     let Rect { x, y, width, height } = place;
-    // The image appears at the position that the cursor has when the terminal receives the last
-    // chunk.
+    // The image appears at the cursor when the last chunk arrives.
     let cursor = match through_tmux {
         true => String::new(),
         false => MoveTo(x, y).to_string(),
@@ -80,7 +71,7 @@ pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) ->
     transfer
 }
 
-/// Wraps an escape sequence so that tmux passes it to the terminal outside of tmux.
+/// Wraps an escape sequence so that tmux passes it on.
 fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }

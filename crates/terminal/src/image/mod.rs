@@ -1,9 +1,8 @@
-//! Images for the viewer of exported pictures, encoded for the terminal by kitty's protocol, by sixel,
-//! or as half blocks.
+//! Images, encoded by kitty's protocol, by sixel, or as half blocks.
 //!
 //! An image is sent in slices within the byte budget of a frame, because a transfer can take
-//! seconds and a key must take effect in tenths of a second. Existing widgets for images send an
-//! image as a whole and are therefore not used.
+//! seconds and a key must take effect in tenths of a second. Existing widgets send an image as a
+//! whole.
 
 mod kitty;
 mod sixel;
@@ -14,43 +13,37 @@ use crate::{Capabilities, Multiplexer};
 use ratatui::layout::Rect;
 pub use transfer::Transfer;
 
-/// Largest width and height of a sixel image in pixels if the terminal reports no limit: the limit
-/// of xterm.
+/// Largest width and height of a sixel image if the terminal reports no limit: that of xterm.
 const SIXEL_PX: usize = 1000;
-/// Assumed width and height of a cell in pixels if the terminal does not report them.
+/// Assumed width and height of a cell.
 const CELL_PX: [u16; 2] = [8, 16];
-/// Estimated number of bytes per pixel of an encoded image. It determines how far an image is
-/// scaled down before it is encoded, so that the encoded image does not exceed its byte limit.
+/// Estimated bytes per pixel of an encoded image, by which it is scaled down to its byte limit.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
-/// Protocol by which images are shown in the terminal.
+/// Protocol by which images are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's graphics protocol, without a multiplexer.
+    /// Kitty's graphics protocol.
     Kitty,
-    /// Kitty's graphics protocol with Unicode placeholders, sent through tmux to the terminal
-    /// outside of it.
+    /// Kitty's graphics protocol with Unicode placeholders, through tmux.
     KittyThroughTmux,
-    /// Sixel images with this number of colours.
+    /// Sixel with this number of colours.
     Sixel(u16),
-    /// Half blocks in place of an image protocol.
+    /// No image protocol.
     Blocks,
 }
 
-/// Viewport of an image: size of the terminal and protocol for which the image is encoded.
+/// Terminal for which an image is encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageViewport {
-    /// Image protocol, or half blocks.
     pub protocol: Protocol,
-    /// Columns and rows of the screen. The last row shows the image's caption.
+    /// Columns and rows; the last row shows a caption.
     pub screen: [u16; 2],
-    /// Width and height of a terminal cell in pixels. `None` if the terminal does not report them.
+    /// Width and height of a cell in pixels, if known.
     pub cell_px: Option<[u16; 2]>,
-    /// Largest width and height of a sixel image in pixels. `None` if the terminal reports no
-    /// limit.
+    /// Largest width and height of a sixel image in pixels, if known.
     pub sixel_px: Option<[u16; 2]>,
-    /// Approximate largest number of bytes of the encoded image. The limit is chosen so that the
-    /// image is sent in a few seconds. A larger image is scaled down. `None` means no limit.
+    /// Approximate largest number of bytes. A larger image is scaled down.
     pub max_bytes: Option<f64>,
 }
 
@@ -59,40 +52,36 @@ pub struct ImageViewport {
 pub struct ImageLayout {
     /// Width and height of the image in the file, in pixels.
     pub size: [usize; 2],
-    /// Width and height of the displayed image, in pixels; at most `size`.
+    /// Width and height of the displayed image in pixels, at most `size`.
     pub shown: [usize; 2],
-    /// Width and height of the half blocks that show the image, in pixels of half blocks. If the
-    /// image is also shown by an image protocol, they fill only the cells that it covers fully.
+    /// Width and height of the half blocks, which fill only the cells that the image covers fully.
     pub halves: [usize; 2],
-    /// Cells that the image covers, fully or in part.
+    /// Cells that the image covers, at least in part.
     pub place: Rect,
 }
 
-/// Image that was scaled and encoded for the screen of an [`ImageViewport`].
+/// Image encoded for an [`ImageViewport`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
-    /// Columns and rows of the screen for which the image was scaled and encoded.
+    /// Columns and rows of the screen.
     pub screen: [u16; 2],
-    /// Protocol by which the image is shown.
     pub protocol: Protocol,
-    /// Size and place of the image on the screen.
     pub layout: ImageLayout,
     /// Half blocks that show the image.
     pub raster: Raster,
-    /// Bytes that show the image by the protocol. Empty for [`Protocol::Blocks`].
+    /// Bytes that show the image by the protocol.
     pub transfer: Transfer,
 }
 
 impl Protocol {
-    /// Returns the best image protocol that the terminal supports, or half blocks if there is none.
+    /// Returns the best protocol that the terminal supports.
     pub fn of(terminal: &Capabilities) -> Self {
         match terminal.environment.multiplexer {
             None if terminal.kitty_graphics => Self::Kitty,
             Some(Multiplexer::Tmux) if terminal.kitty_graphics && terminal.placeholders => {
                 Self::KittyThroughTmux
             }
-            // This case includes tmux, because a tmux that reports support of sixel shows sixel
-            // images itself.
+            // A tmux that reports support of sixel shows sixel images itself.
             _ if terminal.sixel && terminal.cell_px.is_some() => {
                 Self::Sixel(terminal.sixel_colors.unwrap_or(256).clamp(2, 256))
             }
@@ -100,7 +89,7 @@ impl Protocol {
         }
     }
 
-    /// Returns the name of the protocol for display to users.
+    /// Returns the name for users.
     pub fn name(self) -> &'static str {
         match self {
             Self::Kitty => "kitty's protocol",
@@ -112,8 +101,7 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns width and height of a cell in pixels. If the image is shown by half blocks, a pixel is
-    /// half of a cell.
+    /// Returns width and height of a cell in pixels, or in half blocks.
     fn cell(&self) -> [usize; 2] {
         match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -121,7 +109,7 @@ impl ImageViewport {
         }
     }
 
-    /// Returns the largest width and height of an image on the screen, in pixels.
+    /// Returns the largest width and height of an image in pixels.
     fn largest(&self) -> [usize; 2] {
         let cell = self.cell();
         let rows = match self.protocol {
@@ -153,8 +141,7 @@ impl ImageViewport {
         let halves = match self.protocol {
             Protocol::Blocks => shown,
             _ => {
-                // In cells at the edges of the image, half blocks would remain visible beside the
-                // image.
+                // Half blocks at the edges would remain visible beside the image.
                 let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
                 [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])]
             }
@@ -162,8 +149,7 @@ impl ImageViewport {
         Ok(ImageLayout { size, shown, halves, place: Rect { x, y, width, height } })
     }
 
-    /// Returns the displayed size in pixels of an image of `size` pixels, scaled down to fit on the
-    /// screen. Images are never enlarged.
+    /// Returns the displayed size of an image, which is never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
         let largest = self.largest();
         let [width, height] = size.map(|n| n as f64);
@@ -176,12 +162,10 @@ impl ImageViewport {
 }
 
 impl ViewerImage {
-    /// Encodes an image for `viewport`, in which it has `layout`. `image` has the displayed size and
-    /// `raster` the size of the half blocks. `png` encodes `image` as a PNG file, if the protocol
-    /// sends one.
+    /// Encodes an image. `image` has the displayed size and `raster` that of the half blocks. `png`
+    /// encodes `image` as a PNG file, if the protocol sends one.
     ///
-    /// # Errors
-    /// Fails if the image cannot be encoded.
+    /// # Errors Fails if the image cannot be encoded.
     pub fn encode(
         viewport: &ImageViewport,
         layout: ImageLayout,
@@ -203,10 +187,8 @@ impl ViewerImage {
         Ok(Self { screen, protocol, layout, raster, transfer })
     }
 
-    /// Returns `(text, color)` for each cell in row `row` of `place`. `text` is a placeholder
-    /// character with a mark, and `color` is the index of its foreground colour. The terminal shows
-    /// the image, which was sent before, in place of such cells. Returns `None` if the protocol
-    /// shows the image without placeholders.
+    /// Returns placeholder character and index of its foreground colour for the cells in row `row`
+    /// of the image; `None` if the protocol uses none.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))

@@ -6,16 +6,13 @@ use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
 use ratatui::layout::Rect;
 
-/// Largest number of horizontal strips of an image. The terminal treats each strip as an image of
-/// its own, and xterm keeps at most 16 images.
+/// Largest number of strips: xterm keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
-/// Returns the bytes that show `image` at `place`. `cell_height` is the height of a cell in pixels. The image is sent in strips of one or
-/// more rows of cells; `colors` is the largest number of colours of a strip. Other output can be
-/// sent between strips.
+/// Returns the bytes that show `image` at `place` in strips of one or more rows of cells, each with
+/// at most `colors` colours. Other output can be sent between strips.
 ///
-/// # Errors
-/// Fails if the image is empty.
+/// # Errors Fails if the image is empty.
 pub fn transfer(
     image: &Raster,
     place: Rect,

@@ -1,35 +1,30 @@
-//! Image encoded as terminal output: its bytes, and the positions at which they may be divided.
+//! Encoded image, and the positions at which it may be divided.
 
 use std::ops::Range;
 
 /// Bytes that make a terminal show an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transfer {
-    /// All bytes of the encoded image: escape sequences, one after another.
+    /// Escape sequences, one after another.
     pub bytes: Vec<u8>,
-    /// Offsets between escape sequences, in ascending order, at which other output may be sent. The
-    /// last offset is the length of `bytes`.
+    /// Offsets between escape sequences, ascending, at which other output may be sent. The last is
+    /// the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if the image's escape sequences may be divided at any byte and ended early by ST
-    /// (string terminator). Other output may follow a divided sequence only after its last byte or
-    /// such an early end.
+    /// `true` if sequences may be divided at any byte and ended early by ST (string terminator).
     pub divisible: bool,
-    /// Bytes that remove the image from the screen, even if only a part of it was sent.
+    /// Bytes that remove the image, even if only a part of it was sent.
     pub remove: Vec<u8>,
-    /// `true` if the image overwrites the cells that it covers. These cells must be drawn again
-    /// after the image is removed.
+    /// `true` if the image overwrites its cells, which must be drawn again after its removal.
     pub destroys: bool,
 }
 
 impl Transfer {
-    /// Returns `(range, is_open)`. `range` is the range of the image's bytes to send next.
-    /// `is_open` is `true` if the range ends inside of an escape sequence. The caller must then
-    /// send the remainder of this sequence, or end it by ST, before any other output. `sent` is the
-    /// number of bytes sent before. `room` is the number of bytes that may be sent now.
+    /// Returns the range of bytes to send after the first `sent`, at most `room`, and `true` if it
+    /// ends inside an escape sequence. The rest of this sequence, or ST, must then be sent before
+    /// any other output.
     ///
-    /// The range holds as many complete sequences as fit into `room`. If not even one sequence
-    /// fits, the result depends on [`Self::divisible`]. A divisible sequence is cut after `room`
-    /// bytes (at least 1). An indivisible one is returned whole and exceeds `room`.
+    /// If not even one sequence fits, a divisible one is cut, and an indivisible one is returned
+    /// whole.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.divisible));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];

@@ -10,50 +10,42 @@ use zerkalo_kernel::primitive::{
 };
 use zerkalo_scene::value::{ascending, total_order};
 
-/// Largest number of possible occluders in the list of a cell, which is a range of directions from
-/// the light. If more primitives overlap the cell, those closest to the light are kept.
+/// Largest number of occluders in the list of a cell. If more primitives overlap the cell, those
+/// closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested,
-/// because it can occlude even shadow rays that start on the outside of the primitive itself.
+/// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested.
 const NO_PRIMITIVE: u32 = u32::MAX;
 
-/// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a
-/// square of a grid over the projection from the light, that is, a range of directions from the
-/// light.
+/// Lists of the primitives that can occlude one light. Each list belongs to a *cell*: a square of a
+/// grid over the projection from the light, that is, a range of directions from it.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
-    /// Number of rows of cells on each face of the light's projection, equal to the number of
-    /// columns.
+    /// Number of rows and of columns of cells on each face of the projection.
     side: usize,
     /// Largest absolute coordinate of the occluders and the light. Rays whose origin has a larger
     /// coordinate traverse the BVH, because their rounding errors exceed the margin of the
     /// occluders' bounds.
     max_coordinate: S,
-    /// Cells (ranges of directions from the light) of all faces of the light's projection, face by
-    /// face and row by row.
+    /// Cells of all faces, face by face and row by row.
     cells: Vec<Cell<S>>,
-    /// Possible occluders of all cells, cell after cell. The entries of a cell are sorted by depth
-    /// (see [`Entry::near`]), nearest to the light first.
+    /// Occluders of all cells, cell after cell, sorted by [`Entry::near`].
     entries: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
 struct Cell<S> {
-    /// Index of the cell's first possible occluder in [`LightBuffer::entries`].
+    /// Range of the cell's occluders in [`LightBuffer::entries`].
     first: u32,
-    /// Index after the cell's last possible occluder in [`LightBuffer::entries`].
     end: u32,
-    /// Depth (see [`Entry::near`]) up to which the cell's list of possible occluders is complete.
-    /// Shadow rays that start at greater depths traverse the BVH.
+    /// Depth (see [`Entry::near`]) up to which the cell's list is complete. Shadow rays that start
+    /// at greater depths traverse the BVH.
     complete_to: S,
 }
 
-/// Possible occluder of a light: a primitive of the BVH. A light buffer is built from a list of
-/// possible occluders.
+/// Possible occluder of a light: a primitive of the BVH.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occluder {
-    /// Bounding sphere of the primitive.
     pub ball: BoundingSphere,
     /// Id of the primitive if shadow rays that start on its outside cannot hit it again. `None` if
     /// they can.
@@ -62,22 +54,19 @@ pub(crate) struct Occluder {
 
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Index of the occluding primitive among those in the scene's BVH.
+    /// Index of the primitive among those in the BVH.
     number: u32,
-    /// Id of the primitive if it cannot occlude shadow rays that start on its own outside;
-    /// [`NO_PRIMITIVE`] if it can.
+    /// See [`Occluder::exempt_primitive`]; otherwise [`NO_PRIMITIVE`].
     exempt_primitive: u32,
     /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
-    /// a point light. For a directional light it is the coordinate of the point along the direction
-    /// in which the light travels, with 0 at the origin.
+    /// a point light. For a directional light it is the coordinate along the direction in which the
+    /// light travels.
     near: S,
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the light buffer of a light. A cell holds the [`MAX_PER_CELL`] occluders closest to
-    /// the light among those that overlap it, and leaves out the others. Returns `None` if at least
-    /// half of `occluders` are left out of most cells that they overlap. Too many shadow rays would
-    /// then traverse the BVH.
+    /// Creates the light buffer of a light. Returns `None` if at least half of `occluders` are left
+    /// out of most cells that they overlap, so that too many shadow rays would traverse the BVH.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -147,13 +136,9 @@ impl<S: Float> LightBuffer<S> {
         Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
     }
 
-    /// Returns the lanes of `active` whose ray is occluded: it hits a primitive nearer than
-    /// `t_max`. The result equals that of [`Aggregate::occluded`] for `candidates`, the possible
-    /// occluders. The rays start on the primitives with the ids `start_primitive`. In the lanes
-    /// `starts_outside` they start on the outside of these primitives.
-    ///
-    /// The rays are passed by reference, because with a copy of them the render of the scene
-    /// `reflecting-tracks` takes 7 % longer.
+    /// Returns the lanes of `active` whose ray is occluded, as [`Aggregate::occluded`] does.
+    /// `candidates` are the possible occluders. The rays start on the primitives `start_primitive`,
+    /// in the lanes `starts_outside` on their outside.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,

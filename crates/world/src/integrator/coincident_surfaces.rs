@@ -18,21 +18,20 @@
 use crate::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use zerkalo_scene::value::{ascending, total_order};
 
-/// Tie distance: the largest distance along the normal at which a surface counts as coincident with
-/// the surface of a hit point. The unit is the rounding error of the largest coordinate. The module
-/// `primitive::csg` uses the same value for surfaces of parts of a compound.
+/// *Tie distance*: the largest distance along the normal at which a surface counts as coincident
+/// with that of a hit point, in rounding errors of the largest coordinate. `primitive::csg` uses the
+/// same value for surfaces of parts of a compound.
 const TIE: f64 = 16.0;
 
-/// Height above coincident surfaces at which rays that leave them start, in tie distances. Surfaces
-/// within one tie distance of each other count as coincident.
+/// Height above coincident surfaces at which rays that leave them start, in tie distances.
 const OFFSET_TIES: f64 = 1.5;
 
-/// Smallest cosine between the normals of two surfaces that count as coincident. Surfaces at larger
-/// angles intersect in a line, and rays cross them in the order of distance.
+/// Smallest cosine between the normals of coincident surfaces. Rays cross surfaces at larger angles
+/// in the order of distance.
 const MIN_COSINE: f64 = 0.5;
 
 /// Kind of a surface, which determines the order in which rays cross coincident surfaces.
@@ -48,19 +47,15 @@ enum SurfaceKind {
     Sheet,
 }
 
-/// Contact of a primitive, in the list of its contacts: another primitive that may touch it.
+/// Another primitive that may touch a primitive.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the touching primitive. For a compound, the id of its first part.
+    /// Id of the touching primitive; for a compound, that of its first part.
     primitive: u32,
-    /// Distance \[scene units\] within which the surfaces of a primitive and of the one that
-    /// touches it count as coincident. It is larger at points with larger rounding errors; see
-    /// [`Contact::tie`].
+    /// Smallest tie distance \[scene units\].
     tie: S,
-    /// Lowest corner of the touching primitive's bounding box; infinite along axes on which it is
-    /// unbounded.
+    /// Corners of the touching primitive's bounding box, infinite where it is unbounded.
     low: [S; 3],
-    /// Highest corner of the touching primitive's bounding box.
     high: [S; 3],
 }
 
@@ -71,18 +66,15 @@ impl<S: Float> Contact<S> {
         Self { primitive, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the distance within which the surfaces of a primitive and of the one that touches it
-    /// count as coincident: the larger of the field `tie` and the parameter `rounding`. The
-    /// parameter is the result of the function [`rounding`] for the points that are tested.
+    /// Returns the tie distance at points with the result `rounding` of the function [`rounding`].
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Returns the lanes whose point may be on the touching primitive: the distance of the point
-    /// from the primitive's bounding box is at most two tie distances (see [`Contact::tie`]). One
-    /// tie distance is the range of the search for coincident surfaces. The other is a margin for
-    /// the rounding error of the search. `rounding` is the parameter of [`Contact::tie`].
+    /// Returns the lanes whose point may be on the touching primitive: at most two tie distances from
+    /// its bounding box. One is the range of the search for coincident surfaces, the other a margin
+    /// for its rounding error.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -93,8 +85,8 @@ impl<S: Float> Contact<S> {
     }
 }
 
-/// Returns the largest rounding error of each point's coordinates, multiplied by [`TIE`]. Surfaces
-/// within this distance count as coincident.
+/// Returns the tie distance at each point: the largest rounding error of its coordinates, times
+/// [`TIE`].
 #[inline(always)]
 fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
@@ -102,11 +94,9 @@ fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
 
 /// Pairs of primitives that may touch each other. In each pair at least one primitive transmits.
 pub(crate) struct Contacts<S> {
-    /// For each primitive, the primitives that may touch it.
+    /// Contacts of each primitive.
     contacts: Vec<Vec<Contact<S>>>,
-    /// Two values for each primitive: the kind of its surface, and the magnitude of its layer. A
-    /// layer is the position of a surface in the order in which a ray crosses coincident surfaces;
-    /// its sign depends on the direction of the ray.
+    /// Kind of the surface of each primitive, and the magnitude of its layer.
     kinds: Vec<(SurfaceKind, S)>,
 }
 
@@ -115,14 +105,13 @@ pub(crate) struct Contacts<S> {
 pub(crate) struct CoincidentState<L: SimdFloat> {
     /// Lanes whose rays start on a surface that may coincide with others.
     pub lanes: L::Mask,
-    /// Ids of the primitives on which the rays start, by lane.
+    /// Ids of the primitives on which the rays start.
     pub primitive: L,
-    /// Points on the primitives at which the rays start.
+    /// Points at which the rays start.
     pub point: Vec3<L>,
-    /// Unit normals of the start surfaces, on the side to which the rays leave.
+    /// Unit normals on the side to which the rays leave.
     pub axis: Vec3<L>,
-    /// Layer of each start surface: its position in the order in which a ray crosses coincident
-    /// surfaces.
+    /// Layers of the start surfaces.
     pub layer: L,
 }
 
@@ -135,8 +124,7 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub primitive: L,
     pub triangle: L,
     pub layer: L,
-    /// Distance between the surface and the origins of rays that leave it. It is so large that the
-    /// origins are beyond all coincident surfaces.
+    /// Distance of ray origins from the surface that is beyond all coincident surfaces.
     pub offset: L,
 }
 
@@ -146,8 +134,7 @@ impl<L: SimdFloat> CoincidentState<L> {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// Returns the state `yes` in lanes where `mask` is true, and `no` elsewhere. The field `lanes`
-    /// is always that of `no`.
+    /// Returns `yes` in the lanes of `mask` and `no` elsewhere. The field `lanes` is that of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -160,13 +147,10 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the primitives that may touch each other. Returns `None` if no primitive that
-    /// transmits touches another one.
-    ///
-    /// `epsilon` is the relative rounding error of coordinates. `input_error` is the absolute
-    /// rounding error of the coordinates in the scene file. `transparent` holds `true` for each
-    /// primitive that transmits. `priority_of` holds the priority of the transparent solid that
-    /// each primitive bounds.
+    /// Finds the primitives that may touch each other; `None` if no primitive that transmits touches
+    /// another one. `transparent` is `true` for primitives that transmit, and `priority_of` is the
+    /// priority of the solid that each bounds. `epsilon` is the relative rounding error of
+    /// coordinates, and `input_error` the absolute one of the scene file.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -224,19 +208,17 @@ impl<S: Float> Contacts<S> {
         lanes: L::Mask,
     ) -> L::Mask {
         let rounding = rounding(point);
-        let (mut near, mut remaining) = (L::mask(false), lanes);
-        while let Some((primitive, primitive_lanes)) = next_distinct(primitives, remaining) {
+        let mut near = L::mask(false);
+        for (primitive, lanes) in distinct(primitives, lanes) {
             for contact in &self.contacts[primitive as usize] {
-                near = near | (primitive_lanes & contact.is_near(point, rounding));
+                near = near | (lanes & contact.is_near(point, rounding));
             }
-            remaining = remaining.and_not(primitive_lanes);
         }
         near
     }
 
-    /// Returns the layer of `primitive`: its position in the order in which a ray crosses
-    /// coincident surfaces. `before` is the layer of the surface from which the rays come. `leaves`
-    /// selects rays that leave the primitive, along its outward normal.
+    /// Returns the layer of `primitive` for rays that come from a surface with the layer `before`.
+    /// `leaves` selects rays that run along the outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, primitive: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[primitive as usize];
         let layer = L::splat(*layer);
@@ -248,31 +230,19 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the surface that the rays cross next among those that coincide with their start
-    /// points. `coincident` is the state of the rays: point, normal and position in the order of
-    /// crossing. `media` are the media of the rays.
+    /// Finds the surface that the rays cross next among those that coincide with their start points.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
         coincident: &CoincidentState<L>,
         media: &MediumStack<L>,
     ) -> CoincidentQuery<L> {
-        let mut out = CoincidentQuery {
-            lanes: L::mask(false),
-            touching: L::mask(false),
-            primitive: coincident.primitive,
-            triangle: L::from_id(0),
-            layer: L::from_f64(L::MAX),
-            offset: L::zero(),
-        };
-        self.search(geometry, coincident, media, &mut out);
-        out
+        self.search(geometry, coincident, media, L::from_f64(L::MAX))
     }
 
-    /// Finds the surface that the rays cross first: their start surface, given in `coincident`, or
-    /// one that coincides with it. The layer (position in the order of crossing) in `coincident` is
-    /// ignored. `leaves` selects rays that run in the direction of the outward normal of the start
-    /// surface. `media` are the media of the rays.
+    /// Finds the surface that the rays cross first: the start surface in `coincident`, whose layer is
+    /// ignored, or one that coincides with it. `leaves` selects rays that run along the outward
+    /// normal of the start surface.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -282,13 +252,23 @@ impl<S: Float> Contacts<S> {
     ) -> CoincidentQuery<L> {
         let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
-        let mut remaining = coincident.lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(coincident.primitive, remaining)
-        {
-            layer = L::select(primitive_lanes, self.layer(primitive, leaves, before), layer);
-            remaining = remaining.and_not(primitive_lanes);
+        for (primitive, lanes) in distinct(coincident.primitive, coincident.lanes) {
+            layer = L::select(lanes, self.layer(primitive, leaves, before), layer);
         }
+        let coincident = CoincidentState { layer: before, ..*coincident };
+        self.search(geometry, &coincident, media, layer)
+    }
+
+    /// Searches the surfaces that coincide with the start points for the one with the lowest layer
+    /// between that of `coincident` and `layer`.
+    #[inline(never)]
+    fn search<L: SimdFloat<Scalar = S>>(
+        &self,
+        geometry: &Aggregate<L>,
+        coincident: &CoincidentState<L>,
+        media: &MediumStack<L>,
+        layer: L,
+    ) -> CoincidentQuery<L> {
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
@@ -297,29 +277,8 @@ impl<S: Float> Contacts<S> {
             layer,
             offset: L::zero(),
         };
-        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, media, &mut out);
-        out
-    }
-
-    /// Searches the surfaces that coincide with the start points of the rays in `coincident`. A
-    /// *layer* is the position of a surface in the fixed order in which a ray crosses coincident
-    /// surfaces. In each lane `out` holds the best candidate so far. A surface whose layer is above
-    /// that of `coincident` and below that of the candidate replaces the candidate. At the end
-    /// `out` therefore holds the surface that the ray crosses next.
-    #[inline(never)]
-    fn search<L: SimdFloat<Scalar = S>>(
-        &self,
-        geometry: &Aggregate<L>,
-        coincident: &CoincidentState<L>,
-        media: &MediumStack<L>,
-        out: &mut CoincidentQuery<L>,
-    ) {
         let rounding = rounding(coincident.point);
-        let mut remaining = coincident.lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(coincident.primitive, remaining)
-        {
-            remaining = remaining.and_not(primitive_lanes);
+        for (primitive, primitive_lanes) in distinct(coincident.primitive, coincident.lanes) {
             for contact in &self.contacts[primitive as usize] {
                 let near = primitive_lanes & contact.is_near(coincident.point, rounding);
                 if near.none() {
@@ -332,9 +291,7 @@ impl<S: Float> Contacts<S> {
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
                 let hit = geometry.closest_to(contact.primitive, &ray, limit);
-                let mut found = near & hit.t.lt(limit);
-                while let Some((other, other_lanes)) = next_distinct(hit.primitive, found) {
-                    found = found.and_not(other_lanes);
+                for (other, other_lanes) in distinct(hit.primitive, near & hit.t.lt(limit)) {
                     let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
                     let cosine = normal.dot(coincident.axis);
                     let leaves = cosine.gt(L::zero());
@@ -360,6 +317,7 @@ impl<S: Float> Contacts<S> {
                 }
             }
         }
+        out
     }
 }
 

@@ -2,7 +2,7 @@
 //! a size.
 
 use crate::integrator::vertex::Vertex;
-use crate::light_choice::LightChoice;
+use crate::lights::choice::LightChoice;
 use std::f64::consts::FRAC_1_PI;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};

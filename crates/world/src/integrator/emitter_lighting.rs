@@ -18,7 +18,7 @@ use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
 use crate::world::{LightSource, World};
 use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct};
 use zerkalo_scene::light::LightSample;
 use zerkalo_scene::material::{BsdfQuery, BsdfValue};
 
@@ -43,16 +43,16 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
-    for source in world.emitters.iter().filter(|source| source.visible) {
+    for (light, source) in world.emitters.visible_lights() {
         let Ray { origin, direction } = path.ray;
-        let t = source.light.hit(origin, direction);
+        let t = light.hit(origin, direction);
         let seen = lanes & t.lt(t_max);
         if seen.none() {
             continue;
         }
-        let mut radiance = path.throughput * L::splat(source.light.radiance);
+        let mut radiance = path.throughput * L::splat(light.radiance);
         if path.lobe_density.lt(L::from_f64(L::MAX)).any() {
-            let density = source.light.density(origin, t);
+            let density = light.density(origin, t, L::from_id(0));
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
         if let Some(left) = media.and_then(|media| media.transmittance(t)) {
@@ -117,10 +117,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
     #[inline(never)]
     pub fn surface_emission(&mut self, hit: &Hit<L>) {
         let path = &*self.path;
-        let mut remaining = self.interaction.has_bsdf;
-        while let Some((primitive, lanes)) = next_distinct(self.interaction.primitive, remaining) {
-            remaining = remaining.and_not(lanes);
-            let Some(source) = self.world.emission.of_primitive(primitive) else { continue };
+        let interaction = self.interaction;
+        for (primitive, lanes) in distinct(interaction.primitive, interaction.has_bsdf) {
+            let Some(source) = self.world.emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
                 && path.lobe_density.lt(L::from_f64(L::MAX)).any()
@@ -212,14 +211,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         origin: Vec3<L>,
     ) -> Option<LightSource<LightSample<L>, L::Scalar>> {
         let numbers = self.sampler.light_2d(self.bounce, index as u32);
-        match self.world.emitters.get(index) {
-            Some(source) => Some(source.with_light(source.light.sample(origin, numbers))),
-            None => {
-                let object = index - self.world.emitters.len();
-                let (light, source) = self.world.emission.sampled(object)?;
-                Some(source.with_light(light.sample(origin, numbers)))
-            }
-        }
+        self.world.emitters.sample(index, origin, numbers)
     }
 }
 
@@ -234,9 +226,6 @@ impl<L: SimdFloat> World<L> {
         distance: L,
         lanes: L::Mask,
     ) -> L::Mask {
-        match index.checked_sub(self.emitters.len()) {
-            Some(object) => self.emission.covered(object, &self.geometry, (ray, distance), lanes),
-            None => L::mask(false),
-        }
+        self.emitters.covered(index, &self.geometry, (ray, distance), lanes)
     }
 }

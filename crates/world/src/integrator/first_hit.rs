@@ -1,18 +1,16 @@
 //! First hits of camera rays, for picking objects with a pointer and for auxiliary images.
 
 use crate::world::World;
-use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 
 /// Object, distance and normal at the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
-    /// Index of the object in the scene's list of objects; `None` for the background.
+    /// Index of the object in the scene; `None` for the background.
     pub object: Option<u32>,
     /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
-    /// Unit geometric normal in scene coordinates, on the side that faces the eye; zero for the
-    /// background.
+    /// Unit geometric normal on the side that faces the eye; zero for the background.
     pub normal: [f32; 3],
     /// `true` if the surface reflects rays (mirror or glossy lobe) on the side that faces the eye.
     pub reflects: bool,
@@ -24,8 +22,7 @@ impl FirstHit {
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-/// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
-/// length. A point is a position in the picture: a column and a row in pixels, with fractions.
+/// Implements [`World::first_hit`].
 #[inline(never)]
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
@@ -37,8 +34,7 @@ pub(crate) fn trace_first_hits<L: SimdFloat>(
     }
 }
 
-/// Writes the first hits of at most `WIDTH` camera rays into `hits`. The rays go through `points`,
-/// positions in the picture in pixels.
+/// Writes the first hits of at most `WIDTH` camera rays.
 fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut [FirstHit]) {
     let point = |lane: usize| points[lane.min(points.len() - 1)];
     let corner_directions = Vec3::from_fn(|lane| {
@@ -47,8 +43,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     let offset = |axis: usize| {
         L::from_fn(|lane| L::Scalar::from_f64(point(lane)[axis] - point(lane)[axis].floor()))
     };
-    let (origin, direction) = world.camera.rays(corner_directions, (offset(0), offset(1)));
-    let ray = Ray { origin, direction };
+    let ray = world.camera.rays(corner_directions, (offset(0), offset(1)));
     let hit = world.geometry.closest(&ray, world.geometry.all());
     let hit_points = ray.at(hit.t);
     let from_eye = hit_points - Vec3::of(world.camera.eye().to_array());
@@ -61,7 +56,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
         let lanes = hit.primitive.id_eq(primitive).bits() & remaining;
         remaining &= !lanes;
         let normal = world.geometry.surface(primitive, hit.triangle, hit_points).normal;
-        let facing = normal.dot(direction);
+        let facing = normal.dot(ray.direction);
         let bsdf = &world.bsdfs[world.bsdf_of[primitive as usize] as usize];
         for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes >> l & 1 != 0) {
             let front = facing.lane(lane).to_f64() < 0.0;

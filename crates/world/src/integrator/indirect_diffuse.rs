@@ -1,4 +1,4 @@
-//! Indirect diffuse light: bounces from matt surfaces, in generations.
+//! Indirect diffuse light: bounces from diffuse surfaces, in generations.
 //!
 //! A generation is the tree of mirror and glass surfaces that a ray reaches. The first generation
 //! starts at the camera, as in a scene without indirect diffuse light. One hit of a generation is
@@ -13,23 +13,21 @@
 
 use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::CoincidentState;
-use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::MediumStack;
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::transmission::{Branch, TransmissionIntegrator};
+use crate::integrator::vertex::Vertex;
 use crate::world::World;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
-use zerkalo_kernel::sampling::PacketSampler;
 use zerkalo_kernel::sampling::warp::cosine_hemisphere;
 
-/// Density \[1/sr\] that multiple importance sampling assumes for rays of diffuse bounces. It is so
-/// small that samples of points on emitters get the full weight. The radiance of environments is
-/// not added to rays of this density.
+/// Density \[1/sr\] that multiple importance sampling assumes for rays of diffuse bounces: so small
+/// that samples of points on emitters get the full weight. Rays of this density do not find
+/// environments.
 pub(crate) const NO_DENSITY: f64 = 1e-30;
 
-/// Limits of indirect diffuse light in a scene: the largest number of bounces, and whether caustics
-/// are included.
+/// Limits of indirect diffuse light in a scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DiffuseLimits {
     /// Largest number of diffuse bounces of a path, greater than 0.
@@ -38,21 +36,18 @@ pub(crate) struct DiffuseLimits {
     pub caustics: bool,
 }
 
-/// Reservoir of weighted reservoir sampling for indirect diffuse light. It keeps one hit per lane,
-/// chosen from all hits of a path between two diffuse bounces. The next diffuse bounce starts at
-/// this hit.
+/// Reservoir of weighted reservoir sampling. It keeps one hit per lane, chosen from all hits of a
+/// generation, at which the next diffuse bounce starts.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    /// Number of packets of hits that were offered to the reservoir so far. It selects the random
-    /// numbers of the next offer.
+    /// Number of offers so far.
     offers: u32,
-    /// Lanes whose reservoir holds a hit, at which the next diffuse bounce may start.
+    /// Lanes whose reservoir holds a hit.
     lanes: L::Mask,
-    /// Sum of the weights of all hits that were offered to the reservoir.
+    /// Sum of the weights of all offered hits.
     sum: L,
-    /// Weight of the chosen hit, to which the probability of its choice is proportional: the
-    /// largest channel of `throughput`.
+    /// Weight of the chosen hit: the largest channel of `throughput`.
     weight: L,
-    /// Throughput of the path up to the chosen hit, times the hit's diffuse albedo.
+    /// Throughput of the path up to the chosen hit, times its diffuse albedo.
     throughput: Vec3<L>,
     origin: Vec3<L>,
     normal: Vec3<L>,
@@ -77,19 +72,18 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `path` to the reservoir. `media` and `coincident` describe a ray that
-    /// leaves a hit on the side from which the path arrived: its media, and the coincident surfaces
-    /// on which it starts. Returns the lanes whose hit surface reflects diffusely. These surfaces
-    /// get no ambient light, because the diffuse bounce computes their indirect light.
+    /// Offers the hits of `vertex`. `media` and `coincident` are those of a ray that leaves a hit on
+    /// the side from which the path arrived. Returns the lanes whose surface reflects diffusely:
+    /// they get no ambient light, because the diffuse bounce computes their indirect light.
     #[inline(never)]
     pub fn offer(
         &mut self,
-        path: &Path<L>,
-        interaction: &SurfaceInteraction<L>,
-        (media, coincident): (&MediumStack<L>, Option<&CoincidentState<L>>),
-        sampler: &PacketSampler<'_, L>,
+        vertex: &Vertex<'_, L>,
+        media: &MediumStack<L>,
+        coincident: Option<&CoincidentState<L>>,
     ) -> L::Mask {
-        let throughput = path.throughput.component_mul(interaction.diffuse);
+        let interaction = vertex.interaction;
+        let throughput = vertex.path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
         // Lights do not illuminate a surface behind a coincident surface, but it has a diffuse
         // bounce like other surfaces.
@@ -100,7 +94,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         self.sum += weight.masked(lanes);
         let mut taken = lanes;
         if (self.lanes & lanes).any() {
-            let keeps = (sampler.reservoir_1d(self.offers) * self.sum).ge(weight);
+            let keeps = (vertex.sampler.reservoir_1d(self.offers) * self.sum).ge(weight);
             taken = lanes.and_not(self.lanes & keeps);
         }
         self.offers += 1;
@@ -131,13 +125,10 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         lanes
     }
 
-    /// Returns the rays that leave the chosen hits by a diffuse bounce. Their directions are
-    /// sampled with `u` and `v`, uniform in [0, 1).
+    /// Returns the rays that leave the chosen hits by a diffuse bounce.
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
-        // The throughput is divided by the probability of the choice, weight / sum. The largest
-        // channel of the throughput equals the weight; after the division it equals the sum of all
-        // weights.
+        // The throughput is divided by the probability of the choice, weight / sum.
         let scale = self.sum / L::select(self.lanes, self.weight, L::one());
         let path = Path {
             ray: Ray { origin: self.origin, direction },
@@ -152,8 +143,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
 }
 
 impl<L: SimdFloat> Integrator<'_, L> {
-    /// Traces camera rays in a scene with indirect diffuse light, within `limits`, and adds the
-    /// radiance to `out`.
+    /// Traces camera rays in a scene with indirect diffuse light.
     #[inline(never)]
     pub fn trace_generations(
         &self,

@@ -3,68 +3,54 @@
 use crate::integrator::surface_textures::{ShadingPoints, albedo_factor, shading_normal};
 use crate::world::World;
 use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct};
 
 /// Surface properties at the hit points of a packet.
 pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Unit shading normal, on the side from which the rays arrive.
     pub normal: Vec3<L>,
     /// Unit geometric normal, on the side from which the rays arrive. It differs from `normal` only
-    /// on smooth meshes and bump-mapped surfaces. Light from the other side of the geometric
-    /// surface does not reach the hit point.
+    /// on smooth meshes and bump-mapped surfaces.
     pub geometric: Vec3<L>,
-    /// Hit points of the packet's rays.
     pub point: Vec3<L>,
-    /// Distance between the hit point and the origins of secondary rays, along the geometric
-    /// normal.
+    /// Distance of the origins of secondary rays from the surface.
     pub offset: L,
-    /// Lanes whose rays hit the front of the primitive: the side to which the normal of the
-    /// primitive itself points.
+    /// Lanes whose rays hit the side to which the normal of the primitive points.
     pub front: L::Mask,
     /// Ids of the primitives that are hit.
     pub primitive: L,
-    /// Index of each hit point's BSDF in the world's list, stored as an id (see
-    /// [`SimdFloat::from_id`]).
+    /// Index of each BSDF, stored as an id (see [`SimdFloat::from_id`]).
     bsdf: L,
-    /// Factor by which textures and vertex colours multiply the albedo of the BSDF.
+    /// Factor of the albedo from textures and vertex colours.
     pub albedo_factor: Vec3<L>,
-    /// Diffuse albedo at the hit points.
+    /// Diffuse albedo.
     pub diffuse: Vec3<L>,
-    /// Lanes whose hit point has a BSDF. All hit points have one, except for those on the back of a
-    /// one-sided surface.
+    /// Lanes with a BSDF: all except for the back of one-sided surfaces.
     pub has_bsdf: L::Mask,
-    /// Lanes whose BSDF reflects light that arrives directly from lights.
+    /// Lanes whose BSDF has a diffuse part or highlights.
     pub direct_mask: L::Mask,
-    /// Lanes whose BSDF has a highlight model: a specular term that is evaluated for light that
-    /// arrives directly from lights.
+    /// Lanes whose BSDF has highlights.
     pub highlight_mask: L::Mask,
-    /// Lanes whose BSDF has a reflection lobe, from which reflected rays are sampled.
+    /// Lanes whose BSDF has a reflection lobe.
     pub reflecting: L::Mask,
-    /// Lanes whose hit point gets no light from any light, because a coincident surface is in front
-    /// of it; see [`Self::shade`].
+    /// Lanes that get no light from lights, because a coincident surface is in front of them.
     pub shaded: L::Mask,
 }
 
 impl<L: SimdFloat> SurfaceInteraction<L> {
-    /// Iterates over the BSDFs that occur in `lanes`: the index of each, and the lanes that have
-    /// it.
+    /// Iterates over the BSDFs in `lanes`: the index of each, and the lanes that have it.
     #[inline(always)]
     pub fn bsdfs(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
-        let (bsdf, mut remaining) = (self.bsdf, lanes);
-        std::iter::from_fn(move || {
-            let (index, lanes) = next_distinct(bsdf, remaining)?;
-            remaining = remaining.and_not(lanes);
-            Some((index as usize, lanes))
-        })
+        distinct(self.bsdf, lanes).map(|(index, lanes)| (index as usize, lanes))
     }
 
-    /// Returns the origins of rays that leave on the side from which the incoming rays arrived.
+    /// Returns the origins of rays that leave on the side of the incoming rays.
     #[inline(always)]
     pub fn ray_origin(&self) -> Vec3<L> {
         self.geometric.mul_add(self.offset, self.point)
     }
 
-    /// Returns the origins of rays that leave on the side opposite to that of the incoming rays.
+    /// Returns the origins of rays that leave on the other side.
     #[inline(always)]
     pub fn ray_origin_behind(&self) -> Vec3<L> {
         self.geometric.mul_add(-self.offset, self.point)
@@ -79,8 +65,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Treats the hit points in `lanes` as unlit: neither lights nor emissive objects are sampled
-    /// for them.
+    /// Shades the hit points in `lanes`: no lights are sampled for them.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
@@ -121,8 +106,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
 }
 
 /// Computes the surface properties at the hits of the active rays. `first` is the first result of
-/// [`next_distinct`]: the id of one of the primitives that are hit, and the lanes whose rays hit
-/// this primitive.
+/// [`distinct`] for the primitives that are hit.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -140,27 +124,24 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Computes the surface properties at the hits of a packet whose rays hit several primitives.
-/// `first` is the id of one of these primitives. The lanes `first_lanes` hit this primitive, and
-/// the lanes `remaining` hit the others.
+/// Computes the surface properties if rays hit several primitives: the lanes `remaining` hit others
+/// than the first.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     ray: &Ray<L>,
     hit: &Hit<L>,
     (first, first_lanes): (u32, L::Mask),
-    mut remaining: L::Mask,
+    remaining: L::Mask,
 ) -> SurfaceInteraction<L> {
     let mut interaction = interact_one::<_, SIMPLE>(world, ray, hit, first, first_lanes);
-    while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+    for (primitive, lanes) in distinct(hit.primitive, remaining) {
         interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes));
-        remaining = remaining.and_not(lanes);
     }
     interaction
 }
 
-/// Computes the surface properties at the hits of `lanes`, which must all be hits on the primitive
-/// `primitive`.
+/// Computes the surface properties at the hits of `lanes`, all on `primitive`.
 #[inline(always)]
 fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

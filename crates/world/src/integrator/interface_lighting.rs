@@ -55,7 +55,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
             }
         }
         let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
-        let transmitting = reflecting & (hit.thin | !hit.outer);
+        let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
         Self { hit, query: hit.query(vertex), reflecting, transmitting }
     }
 

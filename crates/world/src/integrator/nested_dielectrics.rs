@@ -12,16 +12,15 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::vertex::Vertex;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinct};
 use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId};
-use zerkalo_scene::material::{Bsdf, InterfaceQuery};
+use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
-/// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
-/// inside of more solids, the stack holds those listed last in the scene file.
+/// Largest number of solids that a medium stack holds: those listed last in the scene file.
 const MAX_NESTING: usize = 4;
 
-/// Medium stack of each ray: priorities of the solids that the ray is inside of, in descending
-/// order. Priority 0 marks an empty entry. The solid with the highest priority fills the space.
+/// Medium stack: priorities of the solids that each ray is inside of, in descending order. Priority
+/// 0 is vacuum.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
     priorities: [L; MAX_NESTING],
@@ -34,18 +33,18 @@ impl<L: SimdFloat> MediumStack<L> {
         Self { priorities: [L::zero(); MAX_NESTING] }
     }
 
-    /// Returns the priority of the solid that fills the space at the ray; 0 for vacuum.
+    /// Returns the priority of the solid that fills the space.
     #[inline(always)]
     fn top(&self) -> L {
         self.priorities[0]
     }
 
-    /// Returns the mask of lanes whose ray is inside of the solid with `priority`.
+    /// Returns the lanes whose ray is inside of the solid with `priority`.
     pub fn contains(&self, priority: L) -> L::Mask {
         self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
     }
 
-    /// Returns this stack after the rays have left the solid with `priority`.
+    /// Returns the stack without the solid with `priority`.
     #[inline(always)]
     fn without(&self, priority: L) -> Self {
         let mut out = *self;
@@ -58,7 +57,7 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// Returns this stack after the rays have entered the solid with `priority`.
+    /// Returns the stack with the solid with `priority`.
     #[inline(always)]
     fn with(&self, priority: L) -> Self {
         let mut out = self.without(priority);
@@ -75,17 +74,15 @@ impl<L: SimdFloat> MediumStack<L> {
     #[inline(never)]
     fn add_if_inside(&mut self, ray: &Ray<L>, priority: u32, solid: &Aggregate<L>) {
         let hit = solid.closest(ray, solid.all());
-        let mut remaining = hit.t.lt(L::from_f64(L::MAX));
         let mut inside = L::mask(false);
-        while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+        for (primitive, lanes) in distinct(hit.primitive, hit.t.lt(L::from_f64(L::MAX))) {
             let normal = solid.surface(primitive, hit.triangle, ray.at(hit.t)).normal;
             inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
-            remaining = remaining.and_not(lanes);
         }
         *self = Self::select(inside, &self.with(L::from_f64(f64::from(priority))), self);
     }
 
-    /// Returns the stack `yes` in lanes where `mask` is true and `no` elsewhere.
+    /// Returns `yes` in the lanes of `mask` and `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self { priorities: array_from_fn(|i| L::select(mask, yes.priorities[i], no.priorities[i])) }
@@ -97,7 +94,7 @@ fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
-/// Media that the rays of a packet are inside of, with their properties.
+/// Media of a packet of rays, with their properties.
 #[derive(Clone, Copy)]
 pub(crate) struct Media<'a, L: SimdFloat> {
     pub nested_dielectrics: &'a NestedDielectrics<L>,
@@ -105,9 +102,8 @@ pub(crate) struct Media<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> Media<'_, L> {
-    /// Returns the fraction of light that is left after `distance` [scene units], in each channel,
-    /// by Beer's law. `distance` may be the largest finite number. Returns `None` if no solid of
-    /// the world absorbs light.
+    /// Returns the fraction of light that is left after `distance` [scene units] by Beer's law;
+    /// `None` if no solid of the world absorbs light. `distance` may be the largest finite number.
     #[inline(always)]
     pub fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
         let absorption = self.nested_dielectrics.absorption.as_ref()?;
@@ -123,8 +119,7 @@ pub(crate) struct StartRegion {
 }
 
 impl StartRegion {
-    /// Returns `true` if the bounding box of an object overlaps this region, in which camera rays
-    /// start, or if the object has no bounding box.
+    /// Returns `true` if the bounding box of an object overlaps the region, or if it has none.
     pub fn reaches(&self, form: &Form) -> bool {
         form.bounds()
             .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
@@ -135,16 +130,13 @@ impl StartRegion {
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
-    /// Indices of refraction of the transparent solids, by priority; 1 for priority 0 (vacuum).
+    /// Indices of refraction, by priority.
     indices: Vec<L::Scalar>,
-    /// Absorption coefficients of the transparent solids, by priority [1 / scene unit]; 0 for
-    /// priority 0 (vacuum). `None` if no solid absorbs light.
+    /// Absorption coefficients [1 / scene unit], by priority. `None` if no solid absorbs light.
     absorption: Option<Vec<[L::Scalar; 3]>>,
-    /// Transparent solids that may contain the origins of camera rays: the priority of each, and
-    /// its boundary as geometry.
+    /// Priorities and boundaries of the solids that may contain the origins of camera rays.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// Pairs of primitives that may touch each other; at least one of each pair transmits. `None`
-    /// if there are none.
+    /// `None` if no transmissive primitive may touch another one.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
@@ -152,42 +144,36 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
 pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes whose ray hits a transmissive surface.
     pub lanes: L::Mask,
-    /// Lanes whose ray hits the surface from outside of the solid that it bounds.
-    pub outer: L::Mask,
-    /// Lanes whose ray hits a thin surface, which bounds no solid.
-    pub thin: L::Mask,
-    /// Lanes whose ray hits a suppressed boundary. Such a boundary is inside of a solid with a
-    /// higher priority, and the ray passes it unchanged.
+    /// Lanes whose ray hits a boundary inside of a solid with a higher priority. The ray passes it
+    /// unchanged.
     pub suppressed: L::Mask,
-    /// Index of refraction on the side from which the ray arrives.
-    pub n_i: L,
-    /// Index of refraction behind the surface. For thin surfaces, that of their material.
-    pub n_t: L,
-    /// Media that the reflected rays are inside of.
+    pub media: InterfaceMedia<L>,
     pub medium_reflected: MediumStack<L>,
-    /// Media that the transmitted rays are inside of.
     pub medium_transmitted: MediumStack<L>,
 }
 
 impl<L: SimdFloat> InterfaceHit<L> {
+    /// Returns the media of the rays that leave on the side of the incoming rays, whose media are
+    /// `stack`.
+    #[inline(always)]
+    pub fn stack_reflected(&self, stack: &MediumStack<L>) -> MediumStack<L> {
+        MediumStack::select(self.lanes, &self.medium_reflected, stack)
+    }
+
     /// Returns the query of BSDFs at the hit points of `vertex`.
     #[inline(always)]
     pub fn query(&self, vertex: &Vertex<'_, L>) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: vertex.query(),
-            n_i: self.n_i,
-            n_t: self.n_t,
-            outer: self.outer,
-            thin: self.thin,
+            media: self.media,
             reflecting: vertex.interaction.reflecting,
         }
     }
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
-    /// Compiles the transmissive surfaces of `primitives`. `bsdf_of` holds the index of the BSDF of
-    /// each primitive. Camera rays start in the region `start`. Returns `None` if no BSDF
-    /// transmits.
+    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are those with the indices
+    /// `bsdf_of`; `None` if no BSDF transmits. Camera rays start in the region `start`.
     pub fn new(
         geometry: &RecenteredGeometry,
         primitives: &[PrimitiveId],
@@ -235,14 +221,13 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         Some(Self { priority_of, indices, absorption, around_eye, contacts })
     }
 
-    /// Returns one value for each primitive: `true` if it bounds a solid that paths can be inside
-    /// of.
+    /// Returns, for each primitive, `true` if it bounds a solid that paths can be inside of.
     pub fn entered(&self) -> Vec<bool> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Adds to `media` the transparent solids in which camera rays start. In each lane, these are
-    /// the solids whose boundary the ray first hits from inside.
+    /// Adds to `media` the solids in which camera rays start: those whose boundary the ray first hits
+    /// from inside.
     #[inline(always)]
     pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
         for (priority, solid) in &self.around_eye {
@@ -260,9 +245,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the hits of `lanes`, which must be hits on transmissive surfaces. Returns `None` if
-    /// `lanes` is empty. `media` are the media of the rays. `thin_index` is the index of refraction
-    /// of thin surfaces.
+    /// Returns the hits of `lanes` on transmissive surfaces; `None` if `lanes` is empty. `media` are
+    /// the media of the rays, and `thin_index` is the index of refraction of thin surfaces.
     #[inline(never)]
     pub fn cross(
         &self,
@@ -276,13 +260,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         }
         let outer = lanes & interaction.front;
         let mut priority = L::zero();
-        let mut remaining = lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(interaction.primitive, remaining)
-        {
+        for (primitive, lanes) in distinct(interaction.primitive, lanes) {
             let of_primitive = L::from_f64(f64::from(self.priority_of[primitive as usize]));
-            priority = L::select(primitive_lanes, of_primitive, priority);
-            remaining = remaining.and_not(primitive_lanes);
+            priority = L::select(lanes, of_primitive, priority);
         }
         let solid = priority.gt(L::zero());
         let (outside, within) = (media.without(priority), media.with(priority));
@@ -292,23 +272,23 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         };
         let medium_reflected = select(&outside, &within);
         let medium_transmitted = select(&within, &outside);
-        let n_i = self.index(medium_reflected.top());
         Some(InterfaceHit {
             lanes,
-            outer,
-            thin: lanes.and_not(solid),
             suppressed: lanes & solid & equal(medium_reflected.top(), medium_transmitted.top()),
-            n_i,
-            n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+            media: InterfaceMedia {
+                n_i: self.index(medium_reflected.top()),
+                n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+                outer,
+                thin: lanes.and_not(solid),
+            },
             medium_reflected,
             medium_transmitted,
         })
     }
 }
 
-/// Returns the fraction of light that is left after `distance`: exp(-coefficient x distance) for
-/// each channel. `absorption` has the absorption coefficients of the solids, indexed by priority.
-/// `priority` is that of each lane's solid.
+/// Returns the fraction of light that is left after `distance` in the solids with `priority`:
+/// exp(-coefficient x distance).
 #[inline(never)]
 fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
     let of = |lane| absorption[priority.lane(lane).to_f64() as usize];

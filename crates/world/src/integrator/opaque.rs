@@ -2,12 +2,12 @@
 //! lighting and continues the path with one reflected ray, sampled from the reflection lobe.
 
 use crate::integrator::Integrator;
-use crate::integrator::emitter_lighting::ReflectedRays;
+use crate::integrator::emitter_lighting::{ReflectedRays, visible_emitters};
 use crate::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::integrator::interaction::interact;
 use crate::integrator::nested_dielectrics::MediumStack;
 use crate::integrator::path::{Path, Radiance};
-use crate::integrator::vertex::{Vertex, add_visible_light};
+use crate::integrator::vertex::{Vertex, add_background};
 use zerkalo_kernel::lanes::{Mask, SimdFloat, next_distinct};
 
 impl<L: SimdFloat> Integrator<'_, L> {
@@ -35,14 +35,12 @@ impl<L: SimdFloat> Integrator<'_, L> {
             } else {
                 world.geometry.closest_masked(&path.ray, &candidates.primary, active)
             };
-            active = add_visible_light(world, path, hit.t, (active, EMITTERS), None, out);
+            if EMITTERS {
+                visible_emitters(world, path, hit.t, active, None, out);
+            }
+            active = add_background(world, path, hit.t, active, None, out);
             let Some(first) = next_distinct(hit.primitive, active) else { return };
             let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
-            let mut bouncing = None;
-            if EMITTERS && let Some(reservoir) = &mut reservoir {
-                let media = (&MediumStack::vacuum(), None);
-                bouncing = Some(reservoir.offer(path, &interaction, media, sampler));
-            }
             let is_last = bounce == depth;
             let mut vertex = Vertex {
                 world,
@@ -54,6 +52,10 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 media: None,
                 out: &mut *out,
             };
+            let mut bouncing = None;
+            if EMITTERS && let Some(reservoir) = &mut reservoir {
+                bouncing = Some(reservoir.offer(&vertex, &MediumStack::vacuum(), None));
+            }
             vertex.shade::<SIMPLE>(&hit, EMITTERS, bouncing, |_| {
                 let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
                 ReflectedRays { lanes, share: L::one() }

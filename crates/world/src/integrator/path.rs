@@ -1,6 +1,6 @@
 //! State of a packet of paths, and the result of tracing it.
 
-use crate::light_groups::MAX_GROUPS;
+use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 

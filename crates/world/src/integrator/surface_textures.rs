@@ -19,24 +19,21 @@ struct SurfaceTexture<S> {
 
 /// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
-    /// Texture and bump map of each primitive. `None` for primitives with neither.
+    /// `None` for primitives with neither.
     of_primitive: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
 /// Hit points of a packet on one primitive, at which textures are evaluated.
 pub(crate) struct ShadingPoints<L: SimdFloat> {
-    /// Id of the primitive.
     pub primitive: u32,
     /// Ids of the triangles that are hit, if the primitive is a mesh.
     pub triangle: L,
     /// Hit points, with outward normals.
     pub surface: SurfacePoint<L>,
-    /// Lanes that hit the primitive.
     pub lanes: L::Mask,
 }
 
-/// Returns the texture projection that `mapping` selects for a shape with the texture space
-/// `space`.
+/// Returns the projection that `mapping` selects for a shape.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match (mapping, space.default_mapping) {
         (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
@@ -54,9 +51,8 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
 }
 
 impl<L: SimdFloat> SurfaceTextures<L> {
-    /// Compiles the textures and bump maps of `primitives`. `material_of` returns the material of a
-    /// primitive. `origin` is the point in scene coordinates that became the origin of world
-    /// coordinates. Returns `None` if no material has a texture or bump map.
+    /// Compiles the textures and bump maps of `primitives`, in coordinates relative to `origin`;
+    /// `None` if no material has any.
     pub fn new<'a>(
         scene: &Scene,
         primitives: &[PrimitiveId],
@@ -160,8 +156,7 @@ fn surface_texture<L: SimdFloat>(
     world.surface_textures.as_ref()?.of_primitive[primitive as usize].as_ref()
 }
 
-/// Returns the factor by which vertex colour and texture multiply the albedo of the BSDF. Returns
-/// `None` if the primitive has neither.
+/// Returns the factor of the albedo from vertex colour and texture; `None` if there is neither.
 #[inline(never)]
 pub(crate) fn albedo_factor<L: SimdFloat>(
     world: &World<L>,
@@ -185,10 +180,9 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
-/// Returns unit shading normals at the hit points of rays along `direction`. They are interpolated
-/// on smooth meshes and perturbed by bump maps. `geometric` is the geometric normal on the side
-/// from which the rays arrive. The shading normal is on the same side, and is bent so that it faces
-/// the rays. `front` selects lanes in which `geometric` points outwards.
+/// Returns unit shading normals at the hit points of rays along `direction`: interpolated on smooth
+/// meshes, perturbed by bump maps, and bent so that they face the rays. They are on the side of the
+/// normal `geometric`, which faces the rays and points outwards in the lanes `front`.
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,

@@ -3,14 +3,14 @@
 
 use crate::culling::tile::TileCandidates;
 use crate::integrator::Integrator;
-use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
-use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density};
+use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState};
+use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density, visible_emitters};
 use crate::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::integrator::interaction::{SurfaceInteraction, interact};
 use crate::integrator::interface_lighting::RoughInterface;
 use crate::integrator::nested_dielectrics::{InterfaceHit, Media, MediumStack, NestedDielectrics};
 use crate::integrator::path::{Counts, Path, Radiance};
-use crate::integrator::vertex::{Vertex, add_visible_light};
+use crate::integrator::vertex::{Vertex, add_background};
 use zerkalo_kernel::bvh::{Hit, Ray};
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use zerkalo_scene::material::Interface;
@@ -136,92 +136,106 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
         let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
         let emitters = world.has_emitters();
-        let lanes = add_visible_light(world, path, hit.t, (branch.lanes, emitters), media, out);
+        if emitters {
+            visible_emitters(world, path, hit.t, branch.lanes, media, out);
+        }
+        let lanes = add_background(world, path, hit.t, branch.lanes, media, out);
         let Some(first) = next_distinct(hit.primitive, lanes) else { return false };
         let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
-        let coincident = self.nested_dielectrics.contacts.as_ref().and_then(|contacts| {
-            let hits = (&mut hit, &mut interaction);
-            self.coincident(contacts, path, hits, lanes, (behind.as_ref(), stack))
-        });
+        let coincident =
+            self.cross_first(branch, &mut hit, &mut interaction, lanes, behind.as_ref());
+        let (path, stack) = (&mut branch.path, &branch.media);
         let reversed = coincident.as_ref().map(CoincidentState::reversed);
         let interface_hit = self.interface_hit(&interaction, lanes, stack);
         if let Some(interface_hit) = &interface_hit {
             interaction.mask_out(interface_hit.suppressed);
         }
-        let bouncing = reservoir.map(|reservoir| {
-            let media = match &interface_hit {
-                Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, stack),
-                None => *stack,
-            };
-            reservoir.offer(path, &interaction, (&media, reversed.as_ref()), sampler)
-        });
         let interaction = &interaction;
         let mut vertex =
             Vertex { world, path, interaction, candidates, sampler, bounce, media, out };
-        let is_last = bounce == depth;
+        let bouncing = reservoir.map(|reservoir| {
+            let media = interface_hit.as_ref().map_or(*stack, |hit| hit.stack_reflected(stack));
+            reservoir.offer(&vertex, &media, reversed.as_ref())
+        });
         vertex.shade::<false>(&hit, emitters, bouncing, |vertex| {
-            if is_last {
+            if bounce == depth {
                 return ReflectedRays { lanes: L::mask(false), share: L::one() };
             }
             reflected_rays(vertex, interface_hit.as_ref())
         });
-        if is_last {
+        if bounce == depth {
             return false;
         }
-        branch.bounce = bounce + 1;
         let Some(interface_hit) = &interface_hit else {
             branch.lanes = vertex.sample_reflection::<false>(emitters);
             branch.coincident = reversed;
+            branch.bounce += 1;
             return branch.lanes.any();
         };
+        let branches = self.split(&mut vertex, interface_hit, stack, coincident);
+        self.follow(branch, branches, waiting, &mut out.counts)
+    }
+
+    /// Adds the light of emitters at rough interfaces, and returns the reflected and the transmitted
+    /// branch of the paths. `coincident` is the state of transmitted rays.
+    fn split(
+        &self,
+        vertex: &mut Vertex<'_, L>,
+        hit: &InterfaceHit<L>,
+        stack: &MediumStack<L>,
+        coincident: Option<CoincidentState<L>>,
+    ) -> [Branch<L>; 2] {
+        let (world, bounce) = (vertex.world, vertex.bounce + 1);
         let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
-        let rough = RoughInterface::new(&vertex, interface_hit, coincident_lanes);
+        let rough = RoughInterface::new(vertex, hit, coincident_lanes);
         if rough.reflecting.any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }
-        let split = Split::new(&mut vertex, &rough);
-        let reflects = (interaction.reflecting | interface_hit.lanes)
-            & world.reaches_min_weight(split.reflected.throughput);
-        let transmits =
-            interface_hit.lanes & world.reaches_min_weight(split.transmitted.throughput);
+        let Split { reflected, transmitted, .. } = Split::new(vertex, &rough);
+        let reflects = vertex.interaction.reflecting | hit.lanes;
         let reflected = Branch {
-            path: split.reflected,
-            lanes: reflects,
-            media: MediumStack::select(interface_hit.lanes, &interface_hit.medium_reflected, stack),
-            bounce: bounce + 1,
-            coincident: reversed,
+            path: reflected,
+            lanes: reflects & world.reaches_min_weight(reflected.throughput),
+            media: hit.stack_reflected(stack),
+            bounce,
+            coincident: coincident.as_ref().map(CoincidentState::reversed),
         };
         let transmitted = Branch {
-            path: split.transmitted,
-            lanes: transmits,
-            media: interface_hit.medium_transmitted,
-            bounce: bounce + 1,
+            path: transmitted,
+            lanes: hit.lanes & world.reaches_min_weight(transmitted.throughput),
+            media: hit.medium_transmitted,
+            bounce,
             coincident,
         };
-        self.follow(branch, reflected, transmitted, waiting, &mut out.counts)
+        [reflected, transmitted]
     }
 
     /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
-    /// of the surface that the path crosses first (see [`Contacts`]). `behind` is the coincident
-    /// surface behind the start points of the rays, if one was found. Returns the state of rays that
-    /// pass the surface, or `None` if no surfaces coincide.
+    /// of the surface that the path crosses first. `behind` is the coincident surface behind the
+    /// start points of the rays, if one was found. Returns the state of rays that pass the surface,
+    /// or `None` if no surfaces coincide.
     #[inline(never)]
-    fn coincident(
+    fn cross_first(
         &self,
-        contacts: &Contacts<L::Scalar>,
-        path: &Path<L>,
-        (hit, interaction): (&mut Hit<L>, &mut SurfaceInteraction<L>),
+        branch: &Branch<L>,
+        hit: &mut Hit<L>,
+        interaction: &mut SurfaceInteraction<L>,
         lanes: L::Mask,
-        (behind, media): (Option<&CoincidentQuery<L>>, &MediumStack<L>),
+        behind: Option<&CoincidentQuery<L>>,
     ) -> Option<CoincidentState<L>> {
+        let world = self.base.world;
+        let contacts = self.nested_dielectrics.contacts.as_ref()?;
         let uncrossed = lanes.and_not(behind.map_or(L::mask(false), |next| next.lanes));
         let contact_lanes = contacts.near(interaction.primitive, interaction.point, uncrossed);
+        if behind.is_none() && contact_lanes.none() {
+            return None;
+        }
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
             // The surface that the rays have left is in front of the surface that they hit, and
             // occludes all lights on the side of the rays.
-            if self.base.world.shadows {
+            if world.shadows {
                 interaction.shade(next.lanes);
             }
             (layer, coincident_lanes) = (next.layer, next.lanes);
@@ -232,15 +246,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 (interaction.primitive, interaction.point, -interaction.geometric);
             let coincident =
                 CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
-            let first =
-                contacts.first(&self.base.world.geometry, &coincident, !interaction.front, media);
+            let leaves = !interaction.front;
+            let first = contacts.first(&world.geometry, &coincident, leaves, &branch.media);
             if first.lanes.any() {
                 hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
                 if let Some(distinct) = next_distinct(hit.primitive, lanes) {
-                    *interaction =
-                        interact::<_, false>(self.base.world, &path.ray, hit, distinct, lanes);
+                    let ray = &branch.path.ray;
+                    *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
-                    if let (Some(next), true) = (behind, self.base.world.shadows) {
+                    if let (Some(next), true) = (behind, world.shadows) {
                         interaction.shade(next.lanes);
                     }
                 }
@@ -305,15 +319,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (hit, Some(next))
     }
 
-    /// Continues `branch` with the transmitted paths, and with the reflected paths in lanes without
-    /// transmitted ones. Lanes with both store the reflected branch in `waiting`; after
-    /// [`SPLIT_DEPTH`] surfaces they choose one of the two at random. Returns `false` if no path
-    /// continues.
+    /// Continues `branch` with the transmitted paths, and with the reflected ones in other lanes.
+    /// Lanes with both store the reflected branch in `waiting`, or choose one of the two at random
+    /// after [`SPLIT_DEPTH`] surfaces. Returns `false` if no path continues.
     fn follow(
         &self,
         branch: &mut Branch<L>,
-        mut reflected: Branch<L>,
-        mut transmitted: Branch<L>,
+        [mut reflected, mut transmitted]: [Branch<L>; 2],
         waiting: &mut [Option<Branch<L>>],
         counts: &mut Counts,
     ) -> bool {
@@ -374,7 +386,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             throughput: Vec3::zero(),
             lobe_density: L::from_f64(L::MAX),
         };
-        let straight = hit.thin | hit.suppressed;
+        let straight = hit.media.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
         let mut split = Self {
             rough,

@@ -1,7 +1,7 @@
 //! Vertices of a packet of paths: what both integrators do where their rays hit surfaces.
 
 use crate::culling::tile::TileCandidates;
-use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density, visible_emitters};
+use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density};
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::Media;
 use crate::integrator::path::{Path, Radiance};
@@ -27,26 +27,22 @@ pub(crate) struct Vertex<'a, L: SimdFloat> {
     pub out: &'a mut Radiance<L>,
 }
 
-/// Adds the light that is visible along the rays of `path` in the lanes `active`: that of emitters
-/// before the distance `t_max` of the hit, and that of the background and of environments if this is
-/// the largest finite number. `emitters` is `true` if the world may have emitters. Multiplies the
-/// throughput by the transmittance up to the hit. Returns those of the lanes that hit a surface.
+/// Multiplies the throughput of `path` by the transmittance up to its hits at the distance `t`. Adds
+/// the background in those of the lanes `active` that hit no surface, where `t` is the largest finite
+/// number, and returns the others.
 #[inline(always)]
-pub(crate) fn add_visible_light<L: SimdFloat>(
+pub(crate) fn add_background<L: SimdFloat>(
     world: &World<L>,
     path: &mut Path<L>,
-    t_max: L,
-    (active, emitters): (L::Mask, bool),
+    t: L,
+    active: L::Mask,
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) -> L::Mask {
-    if emitters {
-        visible_emitters(world, path, t_max, active, media, out);
-    }
-    if let Some(left) = media.and_then(|media| media.transmittance(t_max)) {
+    if let Some(left) = media.and_then(|media| media.transmittance(t)) {
         path.throughput = path.throughput.component_mul(left);
     }
-    let is_hit = t_max.lt(L::from_f64(L::MAX));
+    let is_hit = t.lt(L::from_f64(L::MAX));
     if let Some(group) = world.background {
         out.groups[group] += path.throughput.masked(active.and_not(is_hit));
     }
@@ -66,7 +62,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         rays: impl FnOnce(&Self) -> ReflectedRays<L>,
     ) {
         let world = self.world;
-        if emitters && !world.emission.is_empty() {
+        if emitters && world.emitters.has_objects() {
             self.surface_emission(hit);
         }
         self.ambient_light::<SIMPLE>(bouncing);

@@ -1,6 +1,6 @@
 //! Reading and encoding of exported images for the image viewer.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::exports::shrink::shrunk;
 use crate::dashboard::run::frames::FramePipeline;
 use crossbeam_channel::Sender;
@@ -9,21 +9,18 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 use zerkalo_render::film::Display;
-use zerkalo_render::image_file::{png_of_rgb, read_exr, read_png};
+use zerkalo_render::image_file::{ReadPicture, png_of_rgb, read_exr, read_png};
 use zerkalo_terminal::cells::Raster;
 use zerkalo_terminal::image::{ImageViewport, Protocol, ViewerImage};
 use zerkalo_terminal::{Capabilities, cell_px};
 
-/// Longest time in which an image may be sent to the terminal. On slow connections the image is
-/// downscaled to keep within this time.
+/// Longest time in which an image may be sent. For slow connections the image is downscaled.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the viewport of the image viewer: the image protocol, the size of the screen, and the
-/// largest number of bytes of an image. `screen` is the number of columns and rows of the terminal,
-/// to which `frames` are sent.
+/// Returns the viewport of the image viewer on a screen of these columns and rows.
 pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
     let terminal = &frames.terminal;
-    // The user may have changed the font size, and thereby the cell size, since the start.
+    // The user may have changed the size of cells since the start.
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
     // A local terminal has no limit.
@@ -32,9 +29,8 @@ pub fn viewport(frames: &FramePipeline, screen: [u16; 2]) -> ImageViewport {
     ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
 }
 
-/// Reads the image at `path` and encodes it for `viewport` in a separate thread. The result is a
-/// [`Message::ViewerImage`], sent to `results`. `display` is the display transform for linear
-/// images.
+/// Reads and encodes the image at `path` in a separate thread, which sends a
+/// [`Message::ViewerImage`] to `results`.
 pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
     let (requested, failed) = (path.clone(), results.clone());
     let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
@@ -47,21 +43,23 @@ pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results
     }
 }
 
-/// Reads the image at `path`, then scales and encodes it for `viewport`. `display` converts the
-/// linear light of an EXR file to 8-bit levels.
+/// Reads, scales and encodes the image at `path`. `display` converts the linear light of an EXR
+/// file.
 fn viewer_image(
     path: &Path,
     display: &Display,
     viewport: &ImageViewport,
 ) -> Result<ViewerImage, String> {
-    let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
-        let picture = read_exr(path)?;
-        (picture.size, picture.pixels.iter().copied().map(display.to_8()).collect())
+    let image = if path.extension().is_some_and(|e| e == "exr") {
+        let ReadPicture { size: [width, height], pixels, .. } = read_exr(path)?;
+        Raster { width, height, pixels: pixels.into_iter().map(display.to_8()).collect() }
     } else {
-        read_png(path)?
+        let image = read_png(path)?;
+        let [width, height] = [image.width(), image.height()].map(|n| n as usize);
+        Raster { width, height, pixels: image.as_raw().as_chunks::<3>().0.to_vec() }
     };
-    let layout = viewport.layout(size)?;
-    let shown = shrunk(&Raster { width: size[0], height: size[1], pixels }, layout.shown);
+    let layout = viewport.layout([image.width, image.height])?;
+    let shown = shrunk(&image, layout.shown);
     let halves = shrunk(&shown, layout.halves);
     ViewerImage::encode(viewport, layout, &shown, halves, |image| {
         let size = layout.shown.map(|n| n as u32);

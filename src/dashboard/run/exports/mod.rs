@@ -1,14 +1,13 @@
-//! Exports of image files: the current picture, or a separate render at a size of the user's
-//! choice.
+//! Exports of image files: the current picture, or a render at a size of the user's choice.
 
 pub mod image_upload;
 pub mod image_viewer;
 pub mod paths;
 mod shrink;
 
-use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
+use crate::dashboard::{Exported, Format, Message};
 use crossbeam_channel::{Sender, bounded};
 use paths::{numbered, scp};
 use std::io;
@@ -25,22 +24,20 @@ use zerkalo_render::{EncodedCheckpoint, Options};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::Existing;
 
-/// Interval at which the progress of a render for an exported image is polled.
+/// Interval at which the progress of a render is polled.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Writer of exported images and checkpoints. It holds the settings that all exports of a scene
-/// share.
+/// Writer of exported images and checkpoints.
 #[derive(Clone)]
 pub struct Exporter {
-    /// Scene file as last read or written. The metadata of exported images contain its name and a
-    /// hash of the scene. `None` for watched films, whose metadata name their scene file.
+    /// Scene file as last read or written; `None` for watched films, whose metadata name their
+    /// scene file.
     pub file: Option<SharedFile>,
-    /// Path of a scene file that was unreadable at the start; `None` if it was readable.
+    /// Path of a scene file that was unreadable at the start.
     pub unreadable_path: Option<PathBuf>,
-    /// Kind of random numbers with which the picture is rendered, for the metadata of the image.
+    /// Kind of random numbers, for the metadata.
     pub sampler: SamplerKind,
-    /// `true` if noisy pixels get more samples than others (adaptive sample allocation), for the
-    /// metadata of the image.
+    /// `true` if sample allocation is adaptive, for the metadata.
     pub adaptive: bool,
 }
 
@@ -68,8 +65,7 @@ impl Exporter {
         })
     }
 
-    /// Returns the provenance of a picture of `scene` for the metadata of the image: scene file,
-    /// random numbers and sample allocation.
+    /// Returns the metadata on the origin of a picture of `scene`.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
         let (source, text) = self.source(scene);
         Provenance {
@@ -89,8 +85,8 @@ impl Exporter {
         numbered(&self.stem(""), "zk", |path| checkpoint.write(path, Existing::Refuse))
     }
 
-    /// Returns the beginning of the names of exported files: the name of the scene file without its
-    /// extension. `source` is the name of a scene file that this process has not read.
+    /// Returns the beginning of file names. `source` is the name of a scene file that this process
+    /// has not read.
     fn stem(&self, source: &str) -> String {
         match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => stem(file.path(), file.document().name()),
@@ -98,8 +94,7 @@ impl Exporter {
         }
     }
 
-    /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
-    /// to it.
+    /// Returns the name of the scene file, and the text that saving `scene` would write to it.
     fn source(&self, scene: &Scene) -> (String, String) {
         match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => {
@@ -118,25 +113,18 @@ pub struct ResizedExport {
     worker: Worker,
 }
 
-/// Request for an export at a size of the user's choice.
 pub struct ExportRequest {
     /// Scene with the requested film size.
     pub scene: Arc<Scene>,
-    /// File format of the image.
     pub format: Format,
-    /// Options of scene compilation and sampling. They include the exposure and tone curve of the
-    /// image.
     pub options: Options,
-    /// Settings of sample allocation (the distribution of samples over the picture), and the stop
-    /// criteria of the render.
     pub settings: Settings,
-    /// Number of threads that trace rays.
     pub threads: usize,
 }
 
 impl ResizedExport {
     /// Starts the thread that renders and writes the image. It sends [`Message::ExportProgress`]
-    /// and finally [`Message::Exported`] to `results`. A cancelled render sends no result.
+    /// and finally [`Message::Exported`], unless it is cancelled.
     pub fn start(
         request: ExportRequest,
         exporter: Exporter,
@@ -156,12 +144,12 @@ impl ResizedExport {
         Ok(Self { cancelled, worker })
     }
 
-    /// Cancels the render of the export. A file that is already being written is completed.
+    /// Cancels the render. A file that is being written is completed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Cancels the render of the export and waits until its thread has ended.
+    /// Cancels the render and waits for the end of its thread.
     pub fn end(self) {
         self.cancel();
         self.worker.join_within(Duration::MAX);
@@ -203,9 +191,8 @@ fn render(
     receiver.recv().ok()
 }
 
-/// Returns the beginning of the names of exported files, such as `room` in `room-2.png`. It is the
-/// name of the scene file at `path` without its extension. If `path` is `None`, `name` takes the
-/// place of the scene file's name.
+/// Returns the beginning of file names, such as `room` in `room-2.png`: the name of the scene file
+/// without its extension, or `name` without a path.
 fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

@@ -5,23 +5,20 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Largest number in the name of an exported file, such as 7 in `room-7.png`. The limit bounds the
-/// time of the search for an unused name.
+/// Largest number in a file name, which bounds the search for an unused one.
 const MOST: u32 = 100_000;
 
 /// Creates a file by calling `write` with the first unused path of `STEM-1.EXTENSION`,
-/// `STEM-2.EXTENSION` and so on. Returns this path. `write` must create the file atomically and
-/// fail if the path exists, so that no name ever refers to an incomplete file.
+/// `STEM-2.EXTENSION` and so on. `write` must create the file atomically and fail if the path
+/// exists.
 ///
-/// # Errors
-/// Fails with the error of `write`, or with a message if no name is unused.
+/// # Errors Fails with the error of `write`, or with a message if no name is unused.
 pub fn numbered<E: Display>(
     stem: &str,
     extension: &str,
     write: impl Fn(&Path) -> Result<(), E>,
 ) -> Result<PathBuf, String> {
-    // A path counts as taken if it is a symbolic link, even if the target of the link does not
-    // exist.
+    // A symbolic link takes a path even without a target.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
         let path = PathBuf::from(format!("{stem}-{number}.{extension}"));
@@ -30,8 +27,7 @@ pub fn numbered<E: Display>(
         }
         match write(&path) {
             Ok(()) => return Ok(path),
-            // Another program has created a file of this name after the check, so the next number
-            // is tried.
+            // Another program has created a file of this name meanwhile.
             Err(_) if is_taken(&path) => {}
             Err(error) => return Err(error.to_string()),
         }
@@ -39,24 +35,22 @@ pub fn numbered<E: Display>(
     Err(format!("all names for files of {stem} are in use"))
 }
 
-/// Returns `path` as an absolute path.
 pub fn full(path: &Path) -> String {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     path.to_string_lossy().into_owned()
 }
 
 /// Returns the argument of scp that copies the file at `path` from this machine:
-/// `user@host:/absolute/path`. If the port of the SSH connection is not 22, the argument is
-/// preceded by `-P PORT `. Path and port are quoted for a shell where necessary.
+/// `user@host:/absolute/path`, after `-P PORT ` if the port of SSH is not 22. Both are quoted for a
+/// shell where necessary.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
     scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
-/// Returns the result of [`scp`] for the given environment. `connection` is the value of the
-/// variable `SSH_CONNECTION` of sshd: addresses and ports in the order `CLIENT PORT SERVER PORT`.
-/// It is empty without SSH.
+/// Returns the result of [`scp`] for the value of `SSH_CONNECTION`, which is `CLIENT PORT SERVER
+/// PORT`, or empty without SSH.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {

@@ -3,8 +3,8 @@
 use zerkalo_render::film::box_means;
 use zerkalo_terminal::cells::{Raster, level, linear};
 
-/// Downscales `image` to `size` (width, height), which is not larger. A new pixel covers an area of
-/// the old image. Its value is the mean of this area in linear light.
+/// Downscales `image` to `size` (width, height), which is not larger. A new pixel is the mean of an
+/// area of the old image in linear light.
 pub fn shrunk(image: &Raster, [width, height]: [usize; 2]) -> Raster {
     if [image.width, image.height] == [width, height] {
         return image.clone();

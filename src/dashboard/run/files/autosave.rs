@@ -1,51 +1,46 @@
 //! Autosave of unsaved edits to a recovery file, delayed until a pause in editing.
 
-use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::dashboard::model::first_line;
+use crate::dashboard::{Message, OrphanedEdits};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
 
-/// Pause in editing after which unsaved edits are written to the recovery file.
+/// Pause in editing after which unsaved edits are written.
 const DEBOUNCE: Duration = Duration::from_millis(400);
-/// Longest time between an edit and its write to the recovery file, even if edits continue.
+/// Longest time between an edit and its write, even if edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene: writes unsaved edits to a recovery file. At the start of the program it
-/// also looks for recovery files with unsaved edits of crashed runs (orphaned edits).
+/// Autosave of a scene. At the start it also looks for unsaved edits of crashed runs (orphaned
+/// edits).
 pub struct Autosave {
-    /// Writer and finder of the recovery files of the scene.
     pub recovery: Recovery,
     /// State folder of the user (XDG), for recovery files that cannot be written beside the scene
     /// file.
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// Scene that this run of the program last wrote to the recovery file. `None` while the file
-    /// has no edits of this run.
+    /// Scene that this run last wrote to the recovery file.
     kept: Option<Arc<Scene>>,
-    /// Unsaved edits of crashed runs that the user has neither recovered nor discarded: one entry
-    /// for each run. The last entry is offered next.
+    /// Orphaned edits that the user has neither recovered nor discarded, one entry for each run.
+    /// The last is offered next.
     found: Vec<Orphan>,
-    /// Cause of the failure if the last write to the recovery file has failed, otherwise `None`. If
-    /// several writes fail in succession, the user is warned only of the first.
+    /// Cause of the failure if the last write has failed. The user is warned only of the first of
+    /// several failures.
     failed: Option<String>,
 }
 
-/// Edits that have not been written to the recovery file.
 struct Pending {
     scene: Arc<Scene>,
-    /// Time of the oldest edit that is not in the recovery file yet.
+    /// Time of the oldest edit that is not in the recovery file.
     first: Instant,
-    /// Time of the newest edit of the scene.
+    /// Time of the newest edit.
     last: Instant,
 }
 
 impl Autosave {
-    /// Creates the autosave of the scene at `path`, or of a scene called `name` if `path` is
-    /// `None`. `state` is the user's state folder, for recovery files that cannot be written beside
-    /// their scene file.
+    /// Creates the autosave of the scene at `path`, or called `name` without a path.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
         Self {
             recovery: Recovery::new(path, name, state.as_deref()),
@@ -57,19 +52,18 @@ impl Autosave {
         }
     }
 
-    /// Updates an existing recovery file to `scene` before `scene` is saved. Without this update, a
-    /// program that is killed during the save would leave older edits in the recovery file, which
-    /// the next start would offer.
+    /// Updates an existing recovery file before `scene` is saved. Otherwise a program that is
+    /// killed during the save would leave older edits, which the next start would offer.
     pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {
         if self.recovery.path().is_some() {
-            // An error is ignored here because the save reports it.
+            // The save reports the error.
             let _ = self.recovery.keep(&file.text_of(scene), file.fingerprint());
             self.kept = Some(Arc::clone(scene));
         }
     }
 
     /// Records that `scene` was written to the scene file at `path`, and removes the recovery file.
-    /// If newer edits than `scene` exist, schedules their write to a recovery file for `path`.
+    /// Schedules the write of newer edits.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path, now: Instant) {
         let newest = self.pending.take().map(|pending| pending.scene).or(self.kept.take());
         self.recovery.forget();
@@ -77,8 +71,7 @@ impl Autosave {
         self.note(newest.filter(|newest| **newest != **scene), now);
     }
 
-    /// Schedules an autosave of `scene`, which was edited at time `now`. If `scene` is `None`,
-    /// cancels a scheduled autosave and removes the recovery file.
+    /// Schedules an autosave of `scene`. `None` cancels it and removes the recovery file.
     pub fn note(&mut self, scene: Option<Arc<Scene>>, now: Instant) {
         match scene {
             Some(scene) => {
@@ -94,15 +87,13 @@ impl Autosave {
         }
     }
 
-    /// Returns the time at which edits must be written to the recovery file. Returns `None` if no
-    /// edits are pending.
+    /// Returns the time at which pending edits must be written.
     pub fn due(&self) -> Option<Instant> {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits to the recovery file. The written text is the one that a save of the
-    /// edited scene to `file` would write. Returns a warning if this write fails, unless the
-    /// previous write failed, too.
+    /// Writes pending edits as a save to `file` would. Returns a warning if this write fails,
+    /// unless the previous one failed, too.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -126,11 +117,9 @@ impl Autosave {
         }
     }
 
-    /// Returns the path of the recovery file that remains when the program ends; `None` if there is
-    /// no such file.
+    /// Returns the path of the recovery file that remains when the program ends.
     ///
-    /// # Errors
-    /// Fails with a message for the user if the last edits could not be written.
+    /// # Errors Fails with a message for the user if the last edits could not be written.
     pub fn kept(&self) -> Result<Option<PathBuf>, String> {
         match (&self.failed, self.recovery.path()) {
             (None, path) => Ok(path.map(Path::to_path_buf)),
@@ -144,12 +133,11 @@ impl Autosave {
         }
     }
 
-    /// Searches for unsaved edits of crashed runs, and removes incomplete files that killed runs of
-    /// the program left. `file` is the scene file, or its path if it is unreadable. Returns
-    /// warnings. If edits were found, also returns an offer to recover one run's edits.
+    /// Searches for orphaned edits, and removes incomplete files of killed runs. `file` is the
+    /// scene file, or the path of an unreadable one. Returns warnings, and an offer to recover one
+    /// run's edits.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
-        // Incomplete scene files are in the folder of the scene file, incomplete exports in the
-        // working directory.
+        // Incomplete exports are in the working directory.
         let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
         let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
         [Some(Path::new(".")), beside, self.state.as_deref()]
@@ -178,9 +166,8 @@ impl Autosave {
         messages
     }
 
-    /// Returns the offer to recover the edits of the next crashed run, or a warning if these edits
-    /// are unreadable. Discards edits that `file` already contains. Returns `None` if no edits are
-    /// left. `file` is the scene file, or its path if it is unreadable.
+    /// Returns the offer to recover the edits of the next crashed run, or a warning if they are
+    /// unreadable. Discards edits that `file` already contains.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
             let orphan = self.found.last()?;
@@ -195,7 +182,7 @@ impl Autosave {
                     changed: file.map_or(true, |file| orphan.base != file.fingerprint()),
                 }),
                 Err(errors) => {
-                    // The recovery file is kept so that the user can repair it.
+                    // The user can repair the recovery file, which is kept.
                     self.found.pop();
                     let why = first_line(&errors);
                     Message::Warning(format!("unsaved edits cannot be read: {why}"))
@@ -204,9 +191,8 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as unsaved edits of this run of the program. `path` is the path of
-    /// an unreadable scene file; a scene file with the recovered text is returned then. If the
-    /// scene file is readable, `path` is `None`, and so is the result.
+    /// Adopts the offered edits. Returns a scene file with the recovered text if `path` is given,
+    /// the path of an unreadable scene file.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());
@@ -214,7 +200,6 @@ impl Autosave {
         file
     }
 
-    /// Discards the offered edits and their recovery file.
     pub fn discard(&mut self) {
         if let Some(orphan) = self.found.pop() {
             orphan.discard();

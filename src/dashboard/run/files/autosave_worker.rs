@@ -1,7 +1,6 @@
-//! Thread that writes the recovery file. It neither reads nor writes the scene file, so that edits
-//! are kept even if an access to the scene file blocks.
+//! Thread that writes the recovery file. It never accesses the scene file, which may block.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::files::autosave::Autosave;
 use crate::dashboard::run::files::{Job, SharedFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
@@ -11,38 +10,34 @@ use std::time::Instant;
 use zerkalo_scene::{Scene, SceneFile};
 
 pub enum AutosaveJob {
-    /// Schedule an autosave of this scene. `None` cancels it and removes the recovery file.
+    /// Schedule an autosave of this scene. `None` removes the recovery file.
     Note(Option<Arc<Scene>>),
-    /// Write scheduled edits now, then report completion by a message to this sender.
+    /// Write scheduled edits now, then send a message.
     Flush(Sender<()>),
-    /// Update an existing recovery file before this scene is saved. The thread drops the sender
-    /// after the update, which disconnects the receiver: the scene may be saved now.
+    /// Update an existing recovery file before this scene is saved. The thread then drops the
+    /// sender.
     Saving(Arc<Scene>, Sender<()>),
-    /// Record that the scene was written to the scene file at this path.
+    /// Record that the scene was written to the file at this path.
     Saved(Arc<Scene>, PathBuf),
-    /// Recover the edits in the last [`Message::OrphanedEdits`]. A crashed run of the program has
-    /// left these edits. They become unsaved edits of the scene.
+    /// Recover the edits of the last [`Message::OrphanedEdits`].
     Recover,
-    /// Discard the edits of the last [`Message::OrphanedEdits`].
     Discard,
-    /// Write scheduled edits, send the path of the recovery file (`None` if there is no such file)
-    /// to this sender, and end the thread.
+    /// Write scheduled edits, send the path of the recovery file, and end the thread.
     End(Sender<Result<Option<PathBuf>, String>>),
 }
 
 /// State of the thread that writes the recovery file.
 pub struct AutosaveWorker {
     pub autosave: Autosave,
-    /// Path of the scene file at the start; `None` for a scene without file.
+    /// Path of the scene file at the start.
     pub path: Option<PathBuf>,
     pub shared: SharedFile,
-    /// Sender of jobs to another thread: the one that reads and writes the scene file.
+    /// Jobs of the thread that reads and writes the scene file.
     pub jobs: Sender<Job>,
     pub results: Sender<Message>,
 }
 
 impl AutosaveWorker {
-    /// Executes the jobs in `inbox` until [`AutosaveJob::End`].
     pub fn run(mut self, inbox: &Receiver<AutosaveJob>) {
         let messages = self.with_file(|autosave, file| autosave.search(file));
         messages.into_iter().for_each(|message| self.send(message));
@@ -54,7 +49,7 @@ impl AutosaveWorker {
             match job {
                 Ok(AutosaveJob::End(reply)) => {
                     self.write();
-                    // Sending fails if the receiver has timed out and is gone.
+                    // The receiver may have timed out.
                     let _ = reply.send(self.autosave.kept());
                     break;
                 }
@@ -73,7 +68,7 @@ impl AutosaveWorker {
             AutosaveJob::Note(scene) => self.autosave.note(scene, Instant::now()),
             AutosaveJob::Flush(done) => {
                 self.write_and_warn();
-                // Sending fails if the receiver has timed out and is gone.
+                // The receiver may have timed out.
                 let _ = done.try_send(());
             }
             AutosaveJob::Saving(scene, _done) => {
@@ -102,8 +97,8 @@ impl AutosaveWorker {
         }
     }
 
-    /// Calls `call` with the scene file as last read or written, or with its path if it has never
-    /// been readable. The path is empty for a scene without a file.
+    /// Calls `call` with the scene file, or with its path (empty without a file) if it has never
+    /// been readable.
     fn with_file<R>(
         &mut self,
         call: impl FnOnce(&mut Autosave, Result<&SceneFile, &Path>) -> R,

@@ -1,6 +1,6 @@
 //! Thread that reads and writes the scene file and checks it for changes by other programs.
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::files::{AutosaveJob, SharedFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 
-/// Interval between checks of the scene file for changes by other programs.
+/// Interval between checks for changes by other programs.
 pub const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// Longest time that a save waits for the update of the recovery file.
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
@@ -19,27 +19,23 @@ pub enum Job {
         scene: Arc<Scene>,
         path: Option<PathBuf>,
         overwrite: bool,
-        /// Receiver that is disconnected as soon as the recovery file is up to date; the scene may
-        /// be saved then.
+        /// Receiver that is disconnected as soon as the recovery file is up to date.
         prepared: Receiver<()>,
     },
-    /// Read the scene file. The result is a [`Message::Loaded`].
+    /// Read the scene file.
     Load,
-    /// Continue with this scene file. Its text was recovered because the scene file on disk is
-    /// unreadable.
+    /// Continue with this text, recovered for an unreadable scene file.
     Adopt(Box<SceneFile>),
     End,
 }
 
 pub struct FileWorker {
-    /// Path of the scene file; `None` for a scene without file.
     pub path: Option<PathBuf>,
     /// Scene file as last read or written; `None` if it has never been readable.
     pub file: Option<SceneFile>,
     /// Stamp of the scene file when it was last read, written or checked.
     pub seen: Option<FileStamp>,
-    /// Folder for the program's state according to the XDG specification; `None` if the user has no
-    /// such folder.
+    /// State folder of the user (XDG).
     pub state: Option<PathBuf>,
     pub autosaves: Sender<AutosaveJob>,
     pub shared: SharedFile,
@@ -47,7 +43,6 @@ pub struct FileWorker {
 }
 
 impl FileWorker {
-    /// Executes jobs of the thread that reads and writes scene files, until [`Job::End`].
     pub fn run(mut self, inbox: &Receiver<Job>) {
         let mut checked = Instant::now();
         loop {
@@ -121,8 +116,7 @@ impl FileWorker {
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // The stamp is taken before the file is read, so that a write during the read counts as a
-        // change.
+        // The stamp is older than the text, so that a write during the read counts as a change.
         self.seen = self.path.as_deref().and_then(FileStamp::of);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {

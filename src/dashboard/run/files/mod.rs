@@ -6,7 +6,7 @@ mod autosave_worker;
 mod file_worker;
 mod shared_file;
 
-use crate::dashboard::message::Message;
+use crate::dashboard::Message;
 use crate::dashboard::run::worker::Worker;
 use autosave::Autosave;
 pub use autosave_worker::AutosaveJob;
@@ -25,28 +25,24 @@ use zerkalo_scene::{Recovery, Scene, SceneFile};
 
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the recovery file when the program ends. If the file cannot be written beside
-/// the scene file in this time, it is written to the user's state folder, with the same time limit.
-/// Together, these two waits and [`SAVED_WITHIN`] are shorter than the grace period after a
+/// Longest wait for the recovery file when the program ends, and then again for one in the state
+/// folder. Together with [`SAVED_WITHIN`], this is shorter than the grace period after a
 /// terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
-/// Handle of two threads: one that reads and writes the scene file, and one that writes the
-/// recovery file.
+/// Handle of the two threads.
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
-    /// Contents of the scene file as last read or written, shared between threads.
     pub shared: SharedFile,
-    /// Newest scene with unsaved edits; `None` if all edits are saved.
+    /// Newest scene with unsaved edits.
     unsaved: Option<Arc<Scene>>,
     threads: Option<[Worker; 2]>,
 }
 
 impl Files {
-    /// Starts the threads. `file` is the scene file, or the path of a scene file that is
-    /// unreadable. The threads send their results to `results`. `state` is the folder for recovery
-    /// files that cannot be written beside their scene file.
+    /// Starts the threads. `file` is the scene file, or the path of an unreadable one. `state` is
+    /// the folder for recovery files that cannot be written beside their scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -58,9 +54,8 @@ impl Files {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // A readable file gets no stamp yet, so that the first check compares its contents. An
-        // unreadable file gets one, so that its errors, which have been reported, are not reported
-        // again.
+        // A readable file gets no stamp yet, so that the first check compares its contents. The
+        // errors of an unreadable one have been reported already.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(FileStamp::of);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
@@ -89,37 +84,33 @@ impl Files {
         Ok(Self { jobs, autosaves, shared, unsaved: None, threads: Some(threads) })
     }
 
-    /// Writes `scene` to the scene file, or to `path`, which then becomes the scene file. If
-    /// `overwrite` is `true`, content that another program has written may be replaced. The result
-    /// is a [`Message::Saved`].
+    /// Writes `scene` to the scene file, or to `path`, which then becomes the scene file.
+    /// `overwrite` permits replacing what another program has written.
     pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
         let (preparing, prepared) = bounded(0);
         self.give_autosave(AutosaveJob::Saving(Arc::clone(&scene), preparing));
         self.give(Job::Save { scene, path, overwrite, prepared });
     }
 
-    /// Schedules an autosave of a scene with unsaved edits. The recovery file is written after a
-    /// pause in editing, after a second of continued edits, or when the program ends. `None`
-    /// removes the recovery file.
+    /// Schedules an autosave: after a pause in editing, after a second of edits, or when the
+    /// program ends. `None` removes the recovery file.
     pub fn autosave(&mut self, scene: Option<Arc<Scene>>) {
         self.unsaved.clone_from(&scene);
         self.give_autosave(AutosaveJob::Note(scene));
     }
 
-    /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
-    /// editing. Waits until the edits are written, but at most for `patience`.
+    /// Writes unsaved edits to the recovery file at once, and waits at most for `patience`.
     pub fn flush(&self, patience: Duration) {
         let (done, completion) = bounded(1);
         self.give_autosave(AutosaveJob::Flush(done));
         let _ = completion.recv_timeout(patience);
     }
 
-    /// Waits for pending writes, at most four seconds in total. Returns the path of the recovery
-    /// file if there are unsaved edits. If the disk of the scene file does not respond in time, the
-    /// edits are kept in the state folder.
+    /// Waits for pending writes, at most four seconds. Returns the path of the recovery file if
+    /// there are unsaved edits. If the disk of the scene file does not respond, they are kept in
+    /// the state folder.
     ///
-    /// # Errors
-    /// Fails with a message for the user if there are unsaved edits that cannot be kept.
+    /// # Errors Fails with a message for the user if there are unsaved edits that cannot be kept.
     pub fn finish(&mut self) -> Result<Option<PathBuf>, String> {
         let Some([files, autosave]) = self.threads.take() else { return Ok(None) };
         self.give(Job::End);
@@ -137,27 +128,23 @@ impl Files {
 
     // Sending fails only after a panic of the thread, which `finish` propagates.
 
-    /// Gives `job` to the thread that reads and writes the scene file.
     pub fn give(&self, job: Job) {
         let _ = self.jobs.send(job);
     }
 
-    /// Gives `job` to the thread that writes the recovery file.
     pub fn give_autosave(&self, job: AutosaveJob) {
         let _ = self.autosaves.send(job);
     }
 }
 
-/// Waits for pending writes when the handle is dropped, as [`Files::finish`] does.
 impl Drop for Files {
     fn drop(&mut self) {
         let _ = self.finish();
     }
 }
 
-/// Writes `scene`, an edited version of the scene in `file`, to the recovery file in the user's
-/// state folder. Returns the path of the recovery file. A separate thread writes it, because the
-/// disk of the state folder may not respond either.
+/// Writes `scene` to a recovery file in the state folder, in a thread of its own, because that disk
+/// may not respond either.
 fn keep_elsewhere(
     scene: &Scene,
     file: &SceneFile,
@@ -167,10 +154,9 @@ fn keep_elsewhere(
     let (reply, kept) = bounded(1);
     thread::spawn(move || {
         let kept = recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf));
-        // This unlocks the recovery file, so that the next start of the program offers the edits in
-        // it.
+        // This unlocks the recovery file for the next start.
         drop(recovery);
-        // Sending fails if the receiver has timed out and is gone.
+        // The receiver may have timed out.
         let _ = reply.send(kept.map_err(|error| error.to_string()));
     });
     let no_answer = || Err("the disk does not respond".to_string());

@@ -9,7 +9,7 @@ mod robust;
 mod states;
 mod styles;
 
-use crate::dashboard::model::Model;
+use crate::dashboard::Model;
 use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};

@@ -2,7 +2,8 @@
 //! `ZERKALO_SCREENS=folder cargo test --test application paint -- --ignored` writes the files.
 //! `cat` shows such a file in a terminal that has the size of the screen.
 
-use crate::dashboard::model::{Colors, Model};
+use crate::dashboard::Model;
+use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::drawn;
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use std::path::Path;

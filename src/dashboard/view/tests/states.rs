@@ -1,15 +1,15 @@
 //! Models of the dashboard in every state that looks different on the screen.
 
-use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{DisplayChannel, Message, OrphanedEdits};
-use crate::dashboard::model::{CompareView, FieldList, Mode, Model, Notice, RunningExport, Tone};
-use crate::dashboard::overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question};
-use crate::dashboard::panel_lines::{PanelLine, scrolled};
+use crate::dashboard::model::{Notice, RunningExport, Tone};
+use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
+use crate::dashboard::{
+    Answer, CommandPalette, CompareView, DisplayChannel, Editor, FieldList, Focus, Form, Message,
+    Mode, Model, OrphanedEdits, Overlay, PanelLine, Pick, Prompt, Question,
+};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};

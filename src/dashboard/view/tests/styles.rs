@@ -1,10 +1,10 @@
 //! Tests of colours and text attributes, which the golden files do not contain (they hold only the
 //! text of the screens).
 
-use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Colors, Model};
+use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::dashboard::view::tests::{drawn, row_text};
+use crate::dashboard::{Focus, Model};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};

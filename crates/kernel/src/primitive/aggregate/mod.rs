@@ -150,8 +150,7 @@ impl<L: SimdFloat> Aggregate<L> {
         out
     }
 
-    /// Returns a subset of the primitives: all primitives in the BVH, and each other primitive for
-    /// whose number `wanted` returns `true`.
+    /// Returns the set of all primitives in the BVH and of the others that `wanted` accepts.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
         for (index, range) in &self.all.ranges {
@@ -166,9 +165,8 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, bvh: self.all.bvh }
     }
 
-    /// Returns the set of all primitives outside the BVH and of those with the numbers
-    /// `primitives`, which must be in the BVH. Rays are tested against each primitive of the set,
-    /// without traversal of the BVH.
+    /// Returns the set of all primitives outside the BVH and of `primitives`, which must be in it,
+    /// for tests without traversal of the BVH.
     pub fn select_indices(&self, primitives: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for primitive in primitives {
@@ -215,9 +213,8 @@ impl<L: SimdFloat> Aggregate<L> {
         self.batches.partition_point(|batch| batch.end <= primitive)
     }
 
-    /// Returns the closest hit of each ray with the primitives of `set`. At equal distances the
-    /// primitive with the lowest number is hit, so that the result is independent of the order of
-    /// the BVH and of the other rays of the packet.
+    /// Returns the closest hit of each ray with the primitives of `set`; at equal distances that of
+    /// the primitive with the lowest number, whatever the order of the BVH.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
         self.closest_masked(ray, set, L::mask(true))
@@ -254,9 +251,8 @@ impl<L: SimdFloat> Aggregate<L> {
         bvh.traverse(ray, hit.t, |primitive, limit| {
             let (index, i) = self.in_bvh[primitive];
             let batch = &self.batches[index as usize];
-            // The limit is widened by rounding errors, so that hits at the distance of the current
-            // hit are found, too. Of two hits at the same distance, `merge` keeps the primitive
-            // with the lower number.
+            // The limit is widened by rounding errors, so that `merge` sees hits at the distance of
+            // the current hit, too, and keeps the primitive with the lower number.
             let mut new = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
             batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut new);
             // Inactive lanes have a negative limit; here they become misses.
@@ -267,8 +263,7 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Iterates over the primitives of `set` that are tested one by one: the batch of each, its
-    /// number in the batch, and its bounding box.
+    /// Iterates over the primitives that are tested one by one: batch, number in it, bounding box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
@@ -351,8 +346,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the lanes of `wanted` whose ray hits one given primitive of the BVH at a distance
-    /// between 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
+    /// Returns the lanes of `wanted` whose ray hits the primitive with the index `number` in
+    /// [`Aggregate::in_tree`] at a distance between 0 and `limit`.
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (index, i) = self.in_bvh[number as usize];
@@ -401,8 +396,8 @@ impl<L: SimdFloat> Aggregate<L> {
         unreachable!("every primitive belongs to a batch")
     }
 
-    /// Returns the mesh primitives and the number of the first one. The others have the following
-    /// numbers, which are the highest of the aggregate. Returns `None` if there are no meshes.
+    /// Returns the meshes and the number of the first one; the others have the following numbers, the
+    /// highest of the aggregate.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         let BatchRange { batch, base, .. } = self.batches.last()?;
         let PrimitiveBatch::Mesh(meshes) = batch else { return None };
@@ -420,10 +415,9 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal of `primitive` at a hit point. `triangle_tag` is
-    /// [`Hit::triangle`]. `at` is the hit point, and the geometric normal on the viewer's side.
-    /// `direction` is the direction of the rays. The angles of the shading normal to the geometric
-    /// normal and to the direction of the viewer are below 90 degrees.
+    /// Returns the shading normal of `primitive` at a hit point. `at` is the hit point, and the
+    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The angles of
+    /// the result to the geometric normal and to the direction of the viewer are below 90 degrees.
     pub fn shading_normal(
         &self,
         (primitive, triangle_tag): (u32, L),
@@ -445,8 +439,7 @@ impl<L: SimdFloat> Aggregate<L> {
         (primitive >= base).then(|| meshes.color((primitive - base) as usize, triangle_tag))?
     }
 
-    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`; `None`
-    /// if it defines none. `triangle_tag` is [`Hit::triangle`].
+    /// Returns the texture coordinates that the geometry of `primitive` defines at `point`, if any.
     pub fn uv(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let batch = &self.batches[self.batch_index(primitive)];
         batch.batch.uv((primitive - batch.base) as usize, triangle_tag, point)

@@ -4,7 +4,7 @@
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::canonical::{Bounds, CanonicalShape};
+use crate::primitive::canonical::{Bounds, CanonicalShape, rows};
 use glam::DVec3;
 
 /// Bounding box of one primitive.
@@ -54,8 +54,7 @@ impl<S: Float> PrimitiveBox<S> {
         let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| oriented) else {
             return Some(made(bounds, None));
         };
-        let rows = scene_from_own.matrix3.inverse().transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let rows = rows(&scene_from_own.matrix3.inverse());
         let middle = 0.5 * (low + high);
         let space = BoxFrame {
             center: vector(scene_from_own.transform_point3(middle)),

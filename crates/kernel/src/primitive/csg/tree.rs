@@ -78,8 +78,7 @@ impl CsgSolid {
         Some(Self { parts, tree })
     }
 
-    /// Returns the image of the solid under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(in crate::primitive) fn transformed(self, map: &DAffine3) -> Self {
         Self { parts: self.parts.into_iter().map(|p| p.transformed(map)).collect(), ..self }
     }
 

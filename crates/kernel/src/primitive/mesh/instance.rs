@@ -6,7 +6,8 @@ use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, rows,
+    segment_distance,
 };
 use crate::primitive::compiled::{SurfacePoint, UvGradients};
 use crate::primitive::form::Form;
@@ -32,8 +33,7 @@ pub struct MeshForm {
 }
 
 impl MeshForm {
-    /// Returns the image of the geometry under the invertible affine map `map`.
-    pub fn transformed(self, map: &DAffine3) -> Self {
+    pub(in crate::primitive) fn transformed(self, map: &DAffine3) -> Self {
         Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }
     }
 }
@@ -41,8 +41,7 @@ impl MeshForm {
 impl CanonicalShape for MeshForm {
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_mesh;
-        let rows = m.matrix3.transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        let rows = rows(&m.matrix3);
         let high = rows.map(|row| self.mesh.support(row));
         let low = rows.map(|row| -self.mesh.support(-row));
         Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
@@ -144,8 +143,7 @@ fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f6
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
     // Lower bound of the ratio of a length in the scene to the same length in mesh space.
-    let columns = inverse.matrix3.to_cols_array();
-    let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+    let shrinks = frobenius_norm(&inverse.matrix3).recip();
     let to_scene = |corner: DVec3| scene_from_mesh.transform_point3(corner);
     mesh.least(
         |bounds| box_distance(bounds, inside) * shrinks,
@@ -234,8 +232,8 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns the values of a vertex attribute, `N` numbers each, at the three vertices of the
-    /// triangle `triangle_tag`. Each lane has its own triangle.
+    /// Returns a vertex attribute of `N` numbers at the three vertices of the triangle
+    /// `triangle_tag`.
     #[inline(always)]
     fn attribute<const N: usize, L: SimdFloat<Scalar = S>>(
         &self,
@@ -315,8 +313,8 @@ impl<S: Float> Meshes<S> {
         Self { meshes: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
-    /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
-    /// the numbers in `range` are tested. The id of a mesh is `base` plus its number.
+    /// Replaces `hit` in the lanes whose ray hits a mesh with a number in `range` nearer than `hit`.
+    /// The id of a mesh is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -382,8 +380,7 @@ impl<S: Float> Meshes<S> {
     ) -> SurfacePoint<L> {
         let instance = &self.meshes[number];
         let triangle = instance.triangle(triangle_tag);
-        // The normal is divided by its largest component. Otherwise the square of its length would
-        // overflow for large triangles and underflow for small ones.
+        // Divided by its largest component, the squared length neither overflows nor underflows.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
@@ -418,8 +415,7 @@ impl<S: Float> Meshes<S> {
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates at `point` in the triangle `triangle_tag`; `None` if the mesh
-    /// file has none.
+    /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
@@ -441,7 +437,7 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the colour of the triangle `triangle_tag`; `None` if the mesh file has no colours.
+    /// See [`Aggregate::color`](crate::primitive::Aggregate::color).
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(
         &self,

@@ -1,9 +1,7 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it
-//! separately, but interleaved; each tests eight boxes or triangles at a time. A triangle is tested
-//! by the same operations in both cases. Both therefore find the same triangle at the same
-//! distance.
+//! The rays of a coherent packet traverse the BVH together, those of other packets separately. A
+//! triangle is tested by the same operations in both cases, so that both find the same one.
 
 use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
@@ -30,24 +28,22 @@ const MAX_COHERENT_SPREAD: f64 = 0.04;
 /// Closest hit of each ray with the triangles of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance of the hit in units of the ray direction's length. It is the distance limit of the
-    /// search if the ray hits no triangle within this limit.
+    /// Distance of the hit; the distance limit of the search without a hit.
     pub t: L,
-    /// Id of the triangle that is hit; undefined without a hit.
+    /// Id of the triangle; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays, each with the coordinate frame of the watertight triangle test. They are the rays of a
-/// packet, or one ray repeated in every lane.
+/// Rays of a packet, or one ray repeated in every lane, with the frame of the watertight triangle
+/// test.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns the ray packet for box tests of the mesh's BVH. The boxes are enlarged by the rounding
-/// errors of the triangle tests. A ray whose distance from an edge is within rounding errors is
-/// therefore tested against the triangles at this edge.
+/// Returns the packet for tests of boxes that are enlarged by the rounding errors of the triangle
+/// tests.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
@@ -62,8 +58,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Returns four vectors for each lane: the origin of its ray, and the three axes of the
-    /// coordinate frame around the ray's direction.
+    /// Returns the origin and the three frame axes of each ray.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -74,42 +69,38 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// Returns rays that are equal in all lanes. `one` has the origin and the three frame axes of
-    /// the ray.
+    /// Repeats one ray, an element of [`ShearedRay::each`], in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Returns two values: the distance at which each ray hits the triangle with these corners, and
-    /// the lanes that hit it. Hits have a positive distance, and may be on either side of the
-    /// triangle.
+    /// Returns the distance at which each ray hits either side of the triangle with these corners,
+    /// and the lanes that hit it.
     ///
-    /// The corners are projected along the ray onto the plane through the ray's origin
-    /// perpendicular to the ray. A corner has the same projection in all triangles that share it.
-    /// The area that an edge spans with the ray's origin is computed with the exact sign, or as 0.
-    /// Hence no ray passes between two triangles that share an edge or a corner (after Woop,
-    /// Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal frame for
-    /// the shear).
+    /// The corners are projected along the ray. A corner has the same projection in all triangles
+    /// that share it, and the area that an edge spans with the ray's origin is computed with the
+    /// exact sign, or as 0. Hence no ray passes between two triangles that share an edge or a corner
+    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
+    /// orthonormal frame for the shear).
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
-        // The products are rounded separately, without fused multiply-add. Rounding preserves the
-        // order of two products, so that their difference never has the wrong sign.
+        // The products are rounded separately, without fused multiply-add, so that the difference
+        // never has the wrong sign.
         let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
         let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        // An edge-on triangle is projected to a line without area. Its t is 0 / 0, which counts as
-        // no hit.
+        // The t of an edge-on triangle, without area, is 0 / 0, which counts as no hit.
         let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of consecutive triangles of a BVH leaf, one triangle per lane. The index
-    /// of the first triangle in the leaf is `part` times the number of lanes.
+    /// Returns the corners of consecutive triangles of a leaf, one per lane. The first one has the
+    /// index `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -119,8 +110,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, the traversal of a ray ends when any triangle on
-/// the ray is found; it need not be the closest one.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, it ends when any triangle on the ray is found.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
@@ -148,16 +138,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
                 // Bounding boxes of the triangles, one per lane. A triangle is tested only if the
                 // packet may enter its box.
-                let low = Vec3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
-                let high = Vec3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
-                let sides = [
-                    low.x.min(c.x),
-                    low.y.min(c.y),
-                    low.z.min(c.z),
-                    high.x.max(c.x),
-                    high.y.max(c.y),
-                    high.z.max(c.z),
-                ];
+                let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+                let sides = [low.x, low.y, low.z, high.x, high.y, high.z];
                 let bits = match &bounds {
                     Some(bounds) => {
                         bounds.enters::<false, L>(|k| sides[k], L::from_f64(L::MAX)).1.bits()
@@ -256,9 +238,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns the closest triangle of the mesh that each ray hits within the distance `limit`. Of
-/// triangles at equal distances it is the one with the lowest number. Directions must have unit
-/// length. Lanes with a limit of 0 or less are inactive.
+/// Returns the closest triangle that each ray hits within the distance `limit`; at equal distances
+/// the one with the lowest number. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)
@@ -270,8 +251,8 @@ pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// Returns the result of [`closest`], for tests and benches. The rays traverse the mesh's BVH as a
-/// packet if `all` is `true`, otherwise separately.
+/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet if
+/// `all` is `true`, otherwise separately.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,

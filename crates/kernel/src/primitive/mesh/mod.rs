@@ -1,8 +1,7 @@
-//! Triangle meshes: their data, their BVH, the intersection of rays with their triangles, and
-//! meshes as primitives.
+//! Triangle meshes: data, BVH, intersection, and meshes as primitives.
 
 mod bvh;
-pub(crate) mod instance;
+pub(super) mod instance;
 pub mod intersection;
 mod normals;
 
@@ -15,13 +14,12 @@ pub use normals::smooth;
 pub struct TriangleMesh {
     /// Vertex positions relative to `center`.
     pub positions: Vec<[f32; 3]>,
-    /// Offset that was subtracted from every vertex. It is nonzero only for a mesh so far from the
-    /// origin, relative to its size, that single precision would lose its shape.
+    /// Offset that was subtracted from every vertex; nonzero only if single precision would lose the
+    /// shape of the mesh, because it is far from the origin.
     pub center: [f64; 3],
     /// Vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normal per vertex. `None` if the file has no normals. If only some vertices have one,
-    /// the others have the mean normal of their triangles.
+    /// Unit normal per vertex. `None` if the file has no normals.
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates per vertex, u to the right and v upwards. `None` if the file has none.
     pub uvs: Option<Vec<[f32; 2]>>,
@@ -58,8 +56,7 @@ impl TriangleMesh {
         center.iter().for_each(|x| update(&x.to_le_bytes()));
         triangles.as_flattened().iter().for_each(|i| update(&i.to_le_bytes()));
         color_of.iter().for_each(|i| update(&i.to_le_bytes()));
-        // With the lengths of the lists in the hash, two meshes whose numbers are divided
-        // differently among the lists have different hashes.
+        // Lengths, because two meshes may divide the same numbers differently among the lists.
         let lengths = [positions.len(), triangles.len(), colors.len()];
         lengths.iter().for_each(|n| update(&(*n as u64).to_le_bytes()));
         update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
@@ -73,8 +70,7 @@ impl TriangleMesh {
             + 2 * self.color_of.len()
     }
 
-    /// Returns the linear base colour of triangle number `triangle`. Returns `None` if the file has
-    /// no colours.
+    /// Returns the linear base colour of a triangle; `None` if the file has no colours.
     pub fn color(&self, triangle: usize) -> Option<[f32; 3]> {
         let index = self.color_of.get(triangle).copied().unwrap_or(0);
         self.colors.get(usize::from(index)).copied()

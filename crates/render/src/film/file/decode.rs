@@ -1,5 +1,5 @@
-//! Reader of film files (`.zk`). It compares every length with the length of the file before it
-//! allocates memory.
+//! Reader of film files. It compares every length with the length of the file before it allocates
+//! memory.
 
 use crate::film::display::Display;
 use crate::film::file::encode::CHECKSUM_BYTES;
@@ -19,11 +19,10 @@ use std::path::{Path, PathBuf};
 use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::truncated;
 
-/// Smallest number of bytes that a tile takes in a film file: the two sample counts (u32 each) of a
-/// tile without samples.
+/// Bytes of the record of a tile without samples, the shortest.
 const RECORD_BYTES: u64 = 8;
 
-/// Error that makes a film file (`.zk`) unusable.
+/// Error that makes a film file unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadError {
     /// Path of the film file.
@@ -43,25 +42,24 @@ impl fmt::Display for ReadError {
 impl std::error::Error for ReadError {}
 
 impl ReadError {
-    /// Creates the error of reading the film file `path`. `what` describes the error, and `remedy`
-    /// advises the user; both are clauses.
+    /// Creates an error; `what` and `remedy` become the fields of these names.
     pub(crate) fn new(path: &Path, what: impl Into<String>, remedy: &str) -> Self {
         Self { path: path.to_path_buf(), what: what.into(), remedy: remedy.to_string() }
     }
 }
 
-/// Returns `true` if the file at `path` begins with the magic bytes of film files (`.zk`).
+/// Returns `true` if the file at `path` begins with the magic bytes of film files.
 pub fn is_film_file(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-/// Reader of a film file (`.zk`). It has already read everything before the tiles.
+/// Reader of a film file. It has already read everything before the tiles.
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
     header: FilmFileHeader,
-    /// First chunk after the header, already read: a `TILE` chunk, or the `DONE` chunk.
+    /// First chunk after the header.
     next: Chunk,
     checksums: crc32fast::Hasher,
 }
@@ -71,7 +69,6 @@ pub struct FilmReader<R> {
 struct Input<R> {
     path: PathBuf,
     bytes: R,
-    /// Number of bytes of the film file that remain to be read.
     left: u64,
 }
 
@@ -84,9 +81,6 @@ struct Chunk {
 
 impl FilmReader<BufReader<File>> {
     /// Opens the film file at `path` and reads everything before the tiles.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read, is no film file, or is damaged.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|e| match e.kind() {
@@ -99,11 +93,7 @@ impl FilmReader<BufReader<File>> {
 }
 
 impl<R: Read> FilmReader<R> {
-    /// Reads everything before the tiles from `bytes`, the contents of a film file of `length`
-    /// bytes. `path` is the name of the file in errors.
-    ///
-    /// # Errors
-    /// Fails if the bytes cannot be read, are no film file, or are damaged.
+    /// Reads everything before the tiles from `bytes`, a film file of `length` bytes.
     pub fn new(path: &Path, bytes: R, length: u64) -> Result<Self, ReadError> {
         let mut input = Input { path: path.to_path_buf(), bytes, left: length };
         let mut checksums = crc32fast::Hasher::new();
@@ -153,28 +143,19 @@ impl<R: Read> FilmReader<R> {
         Ok(Self { input, header, next, checksums })
     }
 
-    /// Returns everything in the file before the tiles: size, scales, seed, light weights,
-    /// metadata.
+    /// Returns everything before the tiles.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
 
-    /// Reads the tiles of the film file. Returns its header and its film.
-    ///
-    /// # Errors
-    ///
-    /// Fails if the file cannot be read or is damaged.
+    /// Reads header and film.
     pub fn read(self) -> Result<(FilmFileHeader, Film), ReadError> {
         let mut film = Film::new(self.header.film.clone());
         let header = self.add_to(&mut film)?;
         Ok((header, film))
     }
 
-    /// Adds the samples of the file to `film`. After an error `film` may contain some of them.
-    ///
-    /// # Errors
-    /// Fails if size, scales, seed or precision differ from those of `film`, or if the file cannot
-    /// be read or is damaged.
+    /// Adds the samples of the file to `film`, which may contain some of them after an error.
     pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, ReadError> {
         if let Err(mismatch) = film.check_header(&self.header.film) {
             return Err(self.input.error(mismatch.to_string(), "name a file of the same render"));
@@ -194,17 +175,13 @@ impl<R: Read> FilmReader<R> {
         })
     }
 
-    /// Reads the file to its end and verifies all checksums. It creates no film.
-    ///
-    /// # Errors
-    /// Fails if the file cannot be read or is damaged.
+    /// Reads the file to its end and verifies all checksums.
     pub fn verify(self) -> Result<FilmFileHeader, ReadError> {
         self.visit_tiles(|_, _| Some(()))
     }
 
-    /// Calls `visit` for each `TILE` chunk. The arguments are a reader of the chunk's tile records
-    /// and the range of the tiles' numbers. Returns the header of the file. If `visit` returns
-    /// `None` because a record is not valid, the result is an error.
+    /// Calls `visit` with the records of each `TILE` chunk and the tiles' numbers; it returns
+    /// `None` for an invalid record. Returns the header.
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
@@ -243,9 +220,8 @@ impl<R: Read> FilmReader<R> {
     }
 }
 
-/// Decodes the `HEAD` chunk of a film file. `length` is the length of the whole file in bytes.
-/// Metadata and further chunks of the result are empty. Returns `None` if a field is not valid, or
-/// if a file of `length` bytes is too short for the tiles of a film with the decoded size.
+/// Decodes the `HEAD` chunk of a film file of `length` bytes. `None` if a field is invalid or the
+/// file too short for its tiles.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
@@ -304,7 +280,7 @@ impl<R: Read> Input<R> {
         )
     }
 
-    /// Reads `length` bytes of the film file. `part` names this part of the file in error messages.
+    /// Reads `length` bytes, the `part` of error messages.
     fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
@@ -349,8 +325,8 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Reader of the fields (numbers, texts) in a byte string, from its start. Each method consumes the
-/// bytes that it reads, and returns `None` if there are too few bytes or the value is not valid.
+/// Reader of little-endian numbers and texts in a byte string. Methods return `None` if there are
+/// too few bytes or the value is invalid.
 pub struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -364,36 +340,34 @@ impl<'a> Fields<'a> {
         self.0.is_empty()
     }
 
-    /// Reads `length` bytes. Returns `None` if fewer are left.
+    /// Reads `length` bytes.
     pub fn take(&mut self, length: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.0.split_at_checked(length)?;
         self.0 = rest;
         Some(taken)
     }
 
-    /// Reads an unsigned 8-bit number. Returns `None` at the end of the bytes.
+    /// Reads an unsigned 8-bit number.
     pub fn u8(&mut self) -> Option<u8> {
         self.take(1).map(|bytes| bytes[0])
     }
 
-    /// Reads an unsigned 32-bit number, little-endian. Returns `None` if too few bytes are left.
+    /// Reads an unsigned 32-bit number.
     pub fn u32(&mut self) -> Option<u32> {
         self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
     }
 
-    /// Reads an unsigned 64-bit number, little-endian. Returns `None` if too few bytes are left.
+    /// Reads an unsigned 64-bit number.
     pub fn u64(&mut self) -> Option<u64> {
         self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
     }
 
-    /// Reads a 64-bit floating-point number, little-endian. Returns `None` if too few bytes are
-    /// left.
+    /// Reads a 64-bit floating-point number.
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }
 
-    /// Reads a UTF-8 text that is preceded by its length in bytes (u32). Returns `None` if too few
-    /// bytes are left or they are not UTF-8.
+    /// Reads a UTF-8 text after its length in bytes (u32).
     pub fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         String::from_utf8(self.take(length)?.to_vec()).ok()

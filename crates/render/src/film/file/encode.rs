@@ -1,4 +1,4 @@
-//! Writer of film files (`.zk`).
+//! Writer of film files.
 
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 use zerkalo_scene::disk::{Existing, WriteError, replace_file};
 
-/// Number of bytes of the checksum at the end of a film file's chunk.
+/// Number of bytes of the checksum at the end of a chunk.
 pub(super) const CHECKSUM_BYTES: usize = 4;
 
 impl FilmFileHeader {
@@ -53,8 +53,7 @@ pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which must be below [`tile_chunks`]. A tile in
-/// which only some pixels have their first sample is written as a tile without samples.
+/// Encodes `TILE` chunk `index`. A tile in its first pass is written as one without samples.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
@@ -65,13 +64,10 @@ pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     })
 }
 
-/// Encodes the last chunk of a film file. `pieces` are the encoded header and the encoded tile
-/// chunks. The chunk has one checksum of the header's bytes and of the checksums of the tile
-/// chunks.
+/// Encodes the last chunk of a film file. `pieces` are the encoded header and tile chunks.
 pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
-    // The header consists of several chunks. The checksum covers all of its bytes. Of each tile
-    // chunk it covers only the checksum at the end.
+    // Of a tile chunk the checksum covers only the checksum at its end.
     for (i, piece) in pieces.iter().enumerate() {
         let start = if i == 0 { 0 } else { piece.len() - CHECKSUM_BYTES };
         checksum.update(&piece[start..]);
@@ -83,13 +79,8 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     })
 }
 
-/// Writes a film file from its encoded pieces: header, tiles, end. `existing` chooses whether an
-/// existing file at `path` is replaced or the call fails. The old file is replaced only when the
-/// new one is complete and stored on the disk.
-///
-/// # Errors
-/// Fails if the file cannot be written, or if it exists and `existing` does not permit replacing
-/// it. An existing file is then unchanged.
+/// Writes a film file from its encoded pieces: header, tiles, end. An old file is unchanged after
+/// an error.
 pub fn write_film_file(
     path: &Path,
     pieces: &[Vec<u8>],

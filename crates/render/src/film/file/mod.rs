@@ -1,4 +1,4 @@
-//! Film files (`.zk`): a film with all its integer sums, and what is needed to continue its render.
+//! Film files: a film with all its integer sums, and what is needed to continue its render.
 //!
 //! All numbers are little-endian. A file consists of
 //!
@@ -17,8 +17,8 @@
 //!
 //! A text has its length in bytes (u32) before it. A tile record consists of
 //!
-//! - the numbers of samples per pixel in the replicates A and B, the two halves of the samples (u32
-//!   each). If both are 0, the record ends here;
+//! - the numbers of samples per pixel in the replicates A and B (u32 each). If both are 0, the
+//!   record ends here;
 //! - the number of samples above the largest value that the film can store (u64);
 //! - the number of invalid samples (u64);
 //! - the number of invalid samples whose positions are stored (u8), and for each of them its index
@@ -48,7 +48,7 @@ use std::collections::BTreeMap;
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
 /// Version of the film file format that is written and read.
 const VERSION: u32 = 1;
-/// Number of tiles in a `TILE` chunk of a film file; the last chunk may have fewer.
+/// Number of tiles in a `TILE` chunk, fewer in the last one.
 const TILES_PER_CHUNK: usize = 64;
 /// Largest width and height, in pixels, of a film that is read from a file.
 const MAX_SIDE: usize = 1 << 17;
@@ -61,10 +61,10 @@ const META: Tag = *b"META";
 const TILES: Tag = *b"TILE";
 const DONE: Tag = *b"DONE";
 
-/// Contents of a film file except for the tiles.
+/// Contents of a film file before the tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmFileHeader {
-    /// Size, scales, random seed and precision of the film.
+    /// Properties of the film.
     pub film: Header,
     /// Weight of each light group in the picture.
     pub weights: LightWeights,
@@ -74,13 +74,12 @@ pub struct FilmFileHeader {
     pub display: Display,
     /// Keys and values that describe the picture, as in picture files.
     pub metadata: Vec<(String, String)>,
-    /// Further chunks of the film file by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not
-    /// allowed.
+    /// Further chunks by tag, other than `HEAD`, `META`, `TILE` and `DONE`.
     pub chunks: BTreeMap<Tag, Vec<u8>>,
 }
 
 impl FilmFileHeader {
-    /// Returns the name of the scene file that was rendered. Returns `None` if the metadata lack it.
+    /// Returns the name of the scene file, if the metadata have it.
     pub fn source(&self) -> Option<&str> {
         self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
     }

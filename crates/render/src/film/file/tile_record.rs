@@ -1,17 +1,17 @@
-//! Encoding of tiles in film files (`.zk`).
+//! Encoding of tiles in film files.
 
 use crate::film::TILE;
 use crate::film::file::decode::Fields;
 use crate::film::invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 use crate::film::tile::{TILE_PIXELS, Tile};
 
-/// Largest value of a single sample as an integer, that is, multiplied by its light group's scale.
+/// Largest value of a sample times the scale of its light group.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
-/// Number of bytes of one of the film's integer sums in memory.
+/// Bytes of an integer sum in memory.
 const WORD: usize = 8;
 
-/// Appends the film file's record of `tile` to `out`; `None` stands for a tile without samples.
+/// Appends the record of `tile` to `out`.
 pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.counts() != [0; 2]) else {
         return out.extend([0; 8]);
@@ -38,9 +38,7 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends a plane to `out`: the integer sum with the index `i` of each pixel. `pixels` has all
-/// sums of each pixel. The plane begins with one byte, the number of low bytes that the largest sum
-/// needs. Every sum follows with this number of bytes.
+/// Appends a plane to `out`: sum `i` of each pixel.
 fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
     let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;
@@ -50,8 +48,7 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     }
     let start = out.len();
     let end = start + pixels.len() * bytes;
-    // Each sum is written with all of its eight bytes. The next sum overwrites the high bytes,
-    // which are zero.
+    // Each sum is written with eight bytes; the next one overwrites the high ones, which are zero.
     out.resize(end + WORD, 0);
     for (n, sums) in pixels.iter().enumerate() {
         out[start + n * bytes..][..WORD].copy_from_slice(&sums[i].to_le_bytes());
@@ -59,8 +56,7 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     out.truncate(end);
 }
 
-/// Reads the film file's record of a tile into `tile`, which must be empty. Returns `None` if the
-/// record is not valid.
+/// Reads a record into `tile`, which must be empty. `None` if it is invalid.
 pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
     let counts = [fields.u32()?, fields.u32()?];
     let saturated_samples = fields.u64()?;
@@ -119,8 +115,7 @@ fn invalid_samples(fields: &mut Fields) -> Option<Vec<InvalidSample>> {
     (samples.is_sorted() && samples.iter().all(|s| s.replicate < 2)).then_some(samples)
 }
 
-/// Iterates over the pixels of a tile that are inside the picture, row by row. The argument is the
-/// width and height, in pixels, of this part of the tile.
+/// Iterates row by row over the pixels of a tile inside the picture.
 fn inside([width, height]: [usize; 2]) -> impl Iterator<Item = usize> {
     (0..height).flat_map(move |y| (0..width).map(move |x| y * TILE + x))
 }

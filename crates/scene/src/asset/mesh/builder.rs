@@ -57,10 +57,6 @@ impl<'a> Builder<'a> {
 
     /// Reserves memory for the given numbers of further vertices and triangles. The caller must
     /// check before that the file is long enough for them.
-    ///
-    /// # Errors
-    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`], or if there is not
-    /// enough memory.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         self.check_limits(vertices, triangles)?;
         let reserved = self.positions.try_reserve(vertices);
@@ -72,9 +68,6 @@ impl<'a> Builder<'a> {
 
     /// Checks that the mesh stays within its limits if the given numbers of vertices and triangles
     /// are added.
-    ///
-    /// # Errors
-    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`].
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
@@ -131,9 +124,6 @@ impl<'a> Builder<'a> {
 
     /// Sets the linear base colour of the triangles added from now on. Triangles added before the
     /// first call are white.
-    ///
-    /// # Errors
-    /// Fails if there are more than 65536 colours.
     pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
         if self.colors.is_empty() && !self.triangles.is_empty() {
             self.colors.push([1.0; 3]);
@@ -150,9 +140,6 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds a triangle. `place` returns the location of the triangle in the file.
-    ///
-    /// # Errors
-    /// Fails if the triangle names a vertex that does not exist, or the mesh exceeds a limit.
     pub fn triangle(
         &mut self,
         corners: [u32; 3],
@@ -175,9 +162,6 @@ impl<'a> Builder<'a> {
     }
 
     /// Adds a polygon as triangles: a fan around its first corner.
-    ///
-    /// # Errors
-    /// Fails in the same cases as [`Builder::triangle`].
     pub fn polygon(
         &mut self,
         corners: &[u32],
@@ -190,10 +174,6 @@ impl<'a> Builder<'a> {
     }
 
     /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0.
-    ///
-    /// # Errors
-    /// Fails if no triangle has an area, a number is not finite, a coordinate is out of range, or
-    /// the mesh is too large or too small.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
         self.check_limits(0, 0)?;
         let source = self.source;
@@ -274,9 +254,6 @@ impl<'a> Builder<'a> {
 
     /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
     /// triangles.
-    ///
-    /// # Errors
-    /// Fails if no triangle is left.
     fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
         let before = self.triangles.len();
         let has_area = |t: &[u32; 3]| {

@@ -25,9 +25,6 @@ pub(super) fn parse_bytes(path: &Path) -> u64 {
 }
 
 /// Parses a mesh file in memory. The format is determined by the extension of the file name.
-///
-/// # Errors
-/// Fails if the file is not a valid mesh.
 pub(super) fn parse(source: FileContents) -> Result<TriangleMesh, AssetError> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {

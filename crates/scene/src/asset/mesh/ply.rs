@@ -90,9 +90,6 @@ fn indices<T: TryInto<u32>>(list: Vec<T>) -> Vec<u32> {
 }
 
 /// Parses a PLY file.
-///
-/// # Errors
-/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let parser = Parser::<Record>::new();
     let mut reader = Reader::new(&source.bytes[..]);

@@ -2,17 +2,18 @@
 //! and kinds of materials, for the user.
 
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::light_groups::LightGroupSource;
+use crate::lights::groups::LightGroupSource;
 use crate::world::World;
 use zerkalo_kernel::lanes::SimdFloat;
+use zerkalo_scene::light::KIND_KEYS;
 use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel, Transmission};
 use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
 /// commas, in one line.
-pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
+pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
     let (bsdfs, groups) = (&world.bsdfs, &world.groups.members);
-    let [sampled, unsampled] = world.emission.counts();
+    let (emissive, unsampled) = world.emitters.object_counts();
     let any_specular =
         |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
     let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
@@ -59,16 +60,16 @@ pub(super) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     };
     let light_count = |kind: &str| {
         let is_kind = |source: &&LightGroupSource| match source {
-            LightGroupSource::Light(i) => scene.lights[*i].kinds() == [kind],
+            LightGroupSource::Light(i) => scene.lights[*i].kind.key() == kind,
             _ => false,
         };
         groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
     };
-    for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"] {
+    for kind in KIND_KEYS {
         parts.extend(counted(light_count(kind), &format!("{kind} light")));
     }
     parts.extend(present([(world.light_choice.is_some(), "choice of lights")]));
-    parts.extend(counted(sampled + unsampled, "emissive object"));
+    parts.extend(counted(emissive, "emissive object"));
     if unsampled > 0 {
         parts.push(format!("{unsampled} of them without sampled points"));
     }

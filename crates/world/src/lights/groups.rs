@@ -1,51 +1,48 @@
-//! Light groups. A light group is the part of the picture that comes from one source: a light, an
-//! emissive material, ambient light or the background. It is proportional to the colour and
-//! intensity of the source. The film stores each group separately, so that colour and intensity can
-//! change without new samples.
+//! Light groups. A *light group* is the part of the picture that comes from one source: a light, an
+//! emissive material, ambient light or the background. It is proportional to the *emission* of the
+//! source, its colour times its intensity. The film stores each group separately, so that emissions
+//! can change without new samples.
 
-use crate::light_choice::ManyLights;
-use crate::radiance_range::{RadianceRange, SceneDistances};
-use glam::DVec3;
+use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
+use crate::lights::choice::ManyLights;
+use std::collections::HashMap;
 use zerkalo_kernel::lanes::Float;
-use zerkalo_scene::light::{DeltaLight, Emitter, EnvironmentLight, Light};
+use zerkalo_scene::light::Light;
 use zerkalo_scene::material::Material;
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{Object, Scene};
 
-/// Largest number of light groups for lights and emissive materials. If a scene has more lights and
-/// emissive materials than that, several of them share the last of these groups.
+/// Largest number of light groups for lights and emissive materials. Further ones share the last of
+/// these groups.
 const MAX_LIGHT_GROUPS: usize = 8;
 
-/// Largest number of light groups: those of lights and emissive materials, one for ambient light,
-/// and one for the background.
+/// Largest number of light groups, with ambient light and background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Largest size \[bytes\] of the film's integer sums. Lights get groups of their own until the sums
-/// reach this size; further lights share the last group.
+/// Largest size of the film's integer sums \[bytes\]. Lights get groups of their own until the sums
+/// reach it.
 const FILM_BYTES: u64 = 1 << 30;
 
-/// Bytes that the film stores per pixel for one light group. Each of the two replicates, which are
-/// halves of the samples, has one sum of eight bytes for each of three channels.
+/// Bytes of the film per pixel and light group: two replicates, three channels, eight bytes.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
-/// Source of the light in one light group.
+/// Source of a light group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
-    /// Ambient light of the scene.
+    /// Ambient light.
     Ambient,
-    /// Background: the radiance of rays that miss all primitives.
+    /// Radiance of rays that miss all primitives.
     Background,
-    /// One light; the value is its index in the scene.
+    /// Light by its index in the scene.
     Light(usize),
-    /// Emission of all objects with one material; the value is the name of the material.
+    /// Emission of all objects with the material of this name.
     Material(String),
-    /// Several lights and materials. The tracer multiplies the samples of each by its colour and
-    /// intensity.
+    /// Several lights and materials. The tracer multiplies the samples of each by its emission.
     Shared(Vec<LightGroupSource>),
 }
 
 impl LightGroupSource {
-    /// Returns the lights and materials in the light group; empty for ambient light and background.
+    /// Returns the lights and materials in the group; empty for ambient light and background.
     pub fn emitting(&self) -> &[Self] {
         match self {
             Self::Ambient | Self::Background => &[],
@@ -54,9 +51,8 @@ impl LightGroupSource {
         }
     }
 
-    /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
-    /// black.
-    pub(super) fn emission(&self, scene: &Scene) -> [f64; 3] {
+    /// Returns the emission of a light or material; black for other sources.
+    pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
@@ -68,21 +64,20 @@ impl LightGroupSource {
 /// Light groups of a scene, except for groups that would be black in every sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
-    /// Sources of the light groups, in the order of the film's sums: one source for each group.
+    /// Source of each group, in the order of the film's sums.
     pub members: Vec<LightGroupSource>,
     /// `true` if some surface reflects light that arrives directly from lights.
-    pub(super) lit: bool,
+    pub(crate) lit: bool,
     /// `true` if some surface reflects ambient light.
-    pub(super) ambient: bool,
-    /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
-    pub(super) many: ManyLights,
+    pub(crate) ambient: bool,
+    pub(crate) many: ManyLights,
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
-    /// materials share one group. Otherwise each has a group of its own, with two exceptions that
-    /// share the last group: the lights of a kind (point or spot) of which the scene has many (see
-    /// `ManyLights`), and the lights and materials beyond the largest number of groups.
+    /// Creates the light groups of `scene`. Lights and emissive materials have groups of their own,
+    /// with three exceptions that share the last group: all of them if `merge_lights` is `true`,
+    /// the lights of a kind of which the scene has many (see `ManyLights`), and those beyond the
+    /// largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -125,22 +120,20 @@ impl LightGroups {
         Self { members, lit, ambient, many }
     }
 
-    /// Returns the number of light groups that would remain if all lights and emissive materials
-    /// shared one.
+    /// Returns the number of groups that would remain if all lights and emissive materials shared
+    /// one.
     pub fn merged_count(&self) -> usize {
         let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
         self.members.len() - lights.saturating_sub(1)
     }
 
-    /// Returns the index of the light group whose source is `wanted`. Returns `None` if there is no
-    /// such group.
+    /// Returns the index of the group whose source is `wanted`.
     pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Returns three values for each light in a light group: its index in the scene, the index of
-    /// the group, and its emission. The tracer multiplies the light's samples by the emission,
-    /// which is 1 for a light with a group of its own.
+    /// Returns each light in a group: its index in the scene, the index of the group, and the
+    /// emission by which the tracer multiplies its samples, which is 1 in a group of its own.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let light = |source: &LightGroupSource| match source {
             LightGroupSource::Light(i) => Some(*i),
@@ -149,9 +142,7 @@ impl LightGroups {
         self.emitting(scene, light)
     }
 
-    /// Returns three values for each emissive material: its name, the index of its light group, and
-    /// its emission. The tracer multiplies the material's samples by the emission, which is 1 for a
-    /// material with a group of its own.
+    /// Returns each emissive material as [`LightGroups::lights`] returns lights, by its name.
     pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
         let material = |source: &LightGroupSource| match source {
             LightGroupSource::Material(name) => Some(name.clone()),
@@ -160,9 +151,8 @@ impl LightGroups {
         self.emitting(scene, material)
     }
 
-    /// Returns three values for each source (light or emissive material) that `select` accepts: the
-    /// result of `select`, the index of the light group, and the emission. The tracer multiplies
-    /// the source's samples by the emission, which is 1 for a source with a group of its own.
+    /// Returns the sources that `select` accepts, each with its group and the emission by which the
+    /// tracer multiplies its samples.
     fn emitting<T>(
         &self,
         scene: &Scene,
@@ -179,10 +169,9 @@ impl LightGroups {
         out
     }
 
-    /// Returns the red, green and blue factor by which the film's sums of each light group are
-    /// multiplied in the picture of `scene`. `scene` may differ from the compiled scene in colours,
-    /// intensities and on/off switches of lights, emission of materials, ambient light and
-    /// background.
+    /// Returns the factors by which the film's sums of each group are multiplied in the picture of
+    /// `scene`, which may differ from the compiled scene in emissions and on/off switches, ambient
+    /// light and background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -193,7 +182,7 @@ impl LightGroups {
         self.members.iter().map(weight).collect()
     }
 
-    /// Returns the name of each light group, for layers of image files.
+    /// Returns the name of each group, for layers of image files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         let name = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => "ambient".to_string(),
@@ -208,27 +197,15 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`]. `origin`
-    /// is the point in scene coordinates that becomes the origin of the compiled geometry.
-    /// `emitter` compiles a light with a size; it returns `None` for other lights.
-    pub(super) fn scales<S: Float>(
+    /// Returns the scale of each group: the number of integer steps per unit of radiance in the
+    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `ranges` has that of
+    /// each light, by its index in the scene, for intensity 1.
+    pub(crate) fn scales<S: Float>(
         &self,
         scene: &Scene,
-        origin: DVec3,
-        emitter: impl Fn(&Light) -> Option<Emitter<S>>,
+        ranges: &HashMap<usize, RadianceRange>,
         distances: &SceneDistances,
     ) -> Vec<f64> {
-        let range_of_light = |i: usize| {
-            let light = &scene.lights[i];
-            if let Some(environment) = EnvironmentLight::new(light) {
-                return Some(distances.environment(environment.map(), light.visible));
-            }
-            if let Some(emitter) = emitter(light) {
-                return Some(distances.emitter(&emitter, light.visible));
-            }
-            Some(distances.light(&DeltaLight::<S>::new(light, origin)?))
-        };
         let range_of_material = |name: &str| {
             let has_material = |object: &usize| scene.objects[*object].materials().contains(&name);
             let objects = (0..scene.objects.len()).filter(has_material);
@@ -237,7 +214,7 @@ impl LightGroups {
         let range_of_one = |source: &LightGroupSource| match source {
             LightGroupSource::Ambient => Some(distances.ambient()),
             LightGroupSource::Background => Some(distances.background()),
-            LightGroupSource::Light(i) => range_of_light(*i),
+            LightGroupSource::Light(i) => ranges.get(i).copied(),
             LightGroupSource::Material(name) => range_of_material(name),
             LightGroupSource::Shared(_) => None,
         };
@@ -264,7 +241,7 @@ impl LightGroups {
 }
 
 /// Returns the names of the materials that emit light and are used, in order of first use.
-pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
+pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for name in scene.objects.iter().flat_map(Object::materials) {
         let emits = scene.materials.get(name).is_some_and(Material::emits);
@@ -275,27 +252,26 @@ pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
     names
 }
 
-/// Returns the emission of a light: colour times intensity, black if it is off.
-pub(super) fn emission(light: &Light) -> [f64; 3] {
+/// Returns the emission of a light; black if it is off.
+pub(crate) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
 
 /// Returns `true` if the light is on and its emission is not black.
-pub(super) fn emits(light: &Light) -> bool {
+pub(crate) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
 
-/// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
-/// or the camera sees it. `lit` is `true` if some surface reflects direct light.
-pub(super) fn contributes(light: &Light, lit: bool) -> bool {
-    let has_radiance = light.surface().is_some() || light.environment.is_some();
-    emits(light) && (lit || light.visible && has_radiance)
+/// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light
+/// (`lit`) or the camera sees it.
+pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
+    emits(light) && (lit || light.visible && light.has_radiance())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light_choice::MIN_LIGHTS;
+    use crate::lights::choice::MIN_LIGHTS;
 
     const LIGHTS: &str = "
         [ambient]
@@ -316,6 +292,10 @@ mod tests {
 
     fn scene(text: &str) -> Scene {
         Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn move_right(light: &mut Light) {
+        light.position_mut().unwrap()[0] = 5.0;
     }
 
     fn can_reuse(groups: &LightGroups, scene: &Scene, change: impl Fn(&mut Scene)) -> bool {
@@ -347,12 +327,12 @@ mod tests {
         }));
         // Lights that do not emit may move or be absent.
         assert!(reusable(|s| s.lights[1].intensity = 9.0));
-        assert!(reusable(|s| s.lights[1].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(reusable(|s| move_right(&mut s.lights[1])));
         assert!(reusable(|s| s.lights.truncate(s.lights.len() - 1)));
         assert!(reusable(|s| s.lights.clear()));
         assert!(reusable(|s| {
             s.lights[0].on = false;
-            s.lights[0].point.as_mut().unwrap().position[0] = 5.0;
+            move_right(&mut s.lights[0]);
         }));
     }
 
@@ -363,7 +343,7 @@ mod tests {
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         assert!(!reusable(|s| s.lights[1].on = true));
         assert!(!reusable(|s| s.background.color = Color::WHITE));
-        assert!(!reusable(|s| s.lights[0].point.as_mut().unwrap().position[0] = 5.0));
+        assert!(!reusable(|s| move_right(&mut s.lights[0])));
         assert!(!reusable(|s| s.lights[0].falloff = zerkalo_scene::light::Falloff::InverseSquare));
         assert!(!reusable(|s| s.lights.push(s.lights[0].clone())));
         assert!(!reusable(|s| s.camera.eye[0] += 0.5));

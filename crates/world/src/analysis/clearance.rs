@@ -5,7 +5,7 @@ use zerkalo_kernel::primitive::Form;
 
 /// Returns a lower bound of the distance between `point` and the closest surface of the objects
 /// `forms`. See [`CanonicalShape::clearance`](zerkalo_kernel::primitive::CanonicalShape::clearance).
-pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
+pub(crate) fn clearance(forms: &[Form], point: DVec3) -> f64 {
     forms.iter().filter_map(|form| form.clearance(point)).fold(f64::INFINITY, f64::min)
 }
 

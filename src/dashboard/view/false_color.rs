@@ -1,24 +1,23 @@
-//! False-colour images of numbers such as depth and noise, with the scales that map numbers to
-//! colours.
+//! False-colour images of numbers.
 //!
-//! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). The
-//! lightness of this map rises evenly. Equal steps on the scale therefore look equal, even to
-//! viewers without colour vision.
+//! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015), whose
+//! lightness rises evenly. Equal steps therefore look equal, even to viewers without colour vision.
 
-/// Logarithmic mapping of a range of positive numbers to the colours of a colour map.
+use zerkalo_terminal::cells::level;
+
+/// Logarithmic mapping of positive numbers to the colours of a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Lower end of the range of numbers. It is shown dark, or bright if the scale is reversed.
+    /// Lower end, which is dark unless the scale is reversed.
     pub low: f64,
-    /// Upper end of the range of numbers. It is shown bright, or dark if the scale is reversed.
+    /// Upper end, which is bright unless the scale is reversed.
     pub high: f64,
-    /// `true` if the scale is reversed: `low` is then bright.
     pub reversed: bool,
 }
 
 impl Scale {
-    /// Creates a logarithmic scale from the smallest to the largest positive finite number of
-    /// `values`. The scale is from 1 to 10 if there are no such numbers.
+    /// Creates a scale from the smallest to the largest positive finite number of `values`, or from
+    /// 1 to 10 without any.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
@@ -31,8 +30,8 @@ impl Scale {
         Self { low, high, reversed: false }
     }
 
-    /// Returns the relative position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN
-    /// is shown like `low`.
+    /// Returns the position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN is shown
+    /// like `low`.
     pub fn part(&self, value: f64) -> f64 {
         let [low, high, value] = [self.low, self.high, value].map(f64::ln);
         let part = if high > low { (value - low) / (high - low) } else { 1.0 };
@@ -40,21 +39,18 @@ impl Scale {
         if self.reversed { 1.0 - part } else { part }
     }
 
-    /// Returns the number at the relative position `part` of the colour map. `part` is from 0
-    /// (dark) to 1 (bright).
+    /// Returns the number at the position `part` of the colour map.
     pub fn value(&self, part: f64) -> f64 {
         let part = if self.reversed { 1.0 - part } else { part };
         self.low * (self.high / self.low).powf(part)
     }
 
-    /// Returns the colour of `value` on this scale.
     pub fn color(&self, value: f64) -> [u8; 3] {
         magnitude(self.part(value))
     }
 }
 
-/// Returns the colour at the relative position `part` of the colour map, from 0 (dark) to 1
-/// (bright). Other values are clamped.
+/// Returns the colour at a position of the colour map, clamped to 0 (dark) to 1 (bright).
 pub fn magnitude(part: f64) -> [u8; 3] {
     let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
     [color.r, color.g, color.b]
@@ -63,8 +59,7 @@ pub fn magnitude(part: f64) -> [u8; 3] {
 /// False colour of a difference of 0.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// Returns the false colour of the signed difference `part`: blue at -1 (darker), nearly black at
-/// 0, orange at 1 (brighter). Values outside of -1..=1 are clamped.
+/// Returns the colour of a signed difference, clamped: blue at -1, nearly black at 0, orange at 1.
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -76,24 +71,23 @@ pub fn difference(part: f64) -> [u8; 3] {
     })
 }
 
-/// Returns the false colour of the object with number `id`. Consecutive numbers have distant hues.
+/// Returns the colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // The hue advances by the golden angle from one number to the next, so that no hue is repeated.
-    // Three pairs of lightness and chroma are used in turn, so that objects of similar hue differ
-    // as well.
+    // The hue advances by the golden angle, so that none is repeated. Objects of similar hue differ
+    // in lightness and chroma.
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
     let lightness = [0.74, 0.58, 0.86][id as usize % 3];
     let chroma = [0.13, 0.15, 0.09][id as usize % 3];
     displayable(lightness, chroma, hue)
 }
 
-/// Converts OKLab in polar form to sRGB. Chroma is lowered until the colour is within the gamut.
+/// Converts OKLab in polar form to sRGB, with a chroma within the gamut.
 fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
     let mut chroma = chroma;
     loop {
         let linear = linear_from_oklab(lightness, chroma * hue.cos(), chroma * hue.sin());
         if chroma < 0.005 || linear.iter().all(|c| (0.0..=1.0).contains(c)) {
-            return linear.map(|c| crate::cells::oklab::level(c as f32));
+            return linear.map(|c| level(c as f32));
         }
         chroma *= 0.95;
     }
@@ -114,10 +108,10 @@ fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
     ]
 }
 
-/// False colour of a pixel whose camera ray hits no object.
+/// Colour of a pixel whose camera ray hits no object.
 pub const NO_HIT: [u8; 3] = [14, 14, 16];
 
-/// Returns the false colour of a unit normal. Each component is mapped from -1..=1 to 0..=255.
+/// Returns the colour of a unit normal, by components.
 pub fn normal_color(normal: [f32; 3]) -> [u8; 3] {
     normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
 }
@@ -125,7 +119,7 @@ pub fn normal_color(normal: [f32; 3]) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cells::Oklab;
+    use zerkalo_terminal::cells::Oklab;
 
     #[test]
     fn scale_and_its_inverse_agree() {

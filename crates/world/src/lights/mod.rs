@@ -1,0 +1,9 @@
+//! Lights of a compiled scene: light groups, the choice among many lights, emitters, and lights on
+//! surfaces.
+
+pub(crate) mod choice;
+pub(crate) mod emissive_forms;
+pub(crate) mod emissive_sheets;
+pub(crate) mod emitters;
+pub(crate) mod groups;
+pub(crate) mod on_surfaces;
