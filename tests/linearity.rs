@@ -151,18 +151,12 @@ fn translation_by_a_million_units_does_not_change_the_picture() {
     // These coordinates are multiples of a power of two that stay exact under the translation.
     let dyadic = parsed(
         r#"
-[film]
-size = [48, 36]
-[camera]
-eye = [0.5, 1.25, 4.0]
-target = [0.0, 0.5, 0.0]
-[background]
-color = [0.1, 0.2, 0.3]
+film.size = [48, 36]
+camera = { eye = [0.5, 1.25, 4.0], target = [0.0, 0.5, 0.0] }
+background.color = [0.1, 0.2, 0.3]
+materials.mirror = { reflection = 0.9, roughness = 0.1 }
 [[light]]
 point = { position = [2.0, 4.0, 3.0] }
-[materials.mirror]
-reflection = 0.9
-roughness = 0.1
 [[object]]
 shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }
 [[object]]

@@ -55,7 +55,7 @@ pub struct Bias {
 }
 
 impl Bias {
-    /// Returns `true` if the pictures differ by more than noise can explain: in the mean brightness
+    /// Returns `true` if the pictures differ by more than noise can explain: by the mean brightness
     /// by more than four standard errors, or in the pixels by more than [`Self::least_levels`].
     pub fn is_seen(&self) -> bool {
         self.levels > self.least_levels || self.z.abs() > 4.0
