@@ -3,7 +3,6 @@
 use crate::features::row::*;
 use crate::harness::*;
 use zerkalo_render::RegionRender;
-use zerkalo_render::image_file::Bands;
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
