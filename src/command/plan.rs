@@ -69,14 +69,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     warn_of_precision(&scene, &options.world);
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
-    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
-    while pilot.step().is_none() {
-        if let Some(noise) = pilot.noise_levels() {
-            bar.set_message(format!("pilot: noise {noise:.2} of {pilot_noise} 8-bit levels"));
-        }
-        bar.tick();
-    }
-    bar.finish_and_clear();
+    trace(&mut pilot, pilot_noise);
     let state = &pilot.state;
     let settings = PlanSettings {
         source: path.display().to_string(),
@@ -110,6 +103,18 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         pilot.seconds
     ))?;
     Ok(part.plan)
+}
+
+/// Traces the pilot until it ends, and shows its noise.
+fn trace(pilot: &mut SyncRender, target: f64) {
+    let bar = ProgressBar::new_spinner().with_style(style("{spinner} {msg}  {elapsed}"));
+    while pilot.step().is_none() {
+        if let Some(noise) = pilot.noise_levels() {
+            bar.set_message(format!("pilot: noise {noise:.2} of {target} 8-bit levels"));
+        }
+        bar.tick();
+    }
+    bar.finish_and_clear();
 }
 
 /// Plans the samples that the merged film at `path` lacks.

@@ -24,7 +24,7 @@ use zerkalo_scene::process_memory::resident_memory;
 use zerkalo_terminal::Signals;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
-const DEFAULT_NOISE_CODES: f64 = 0.5;
+const DEFAULT_NOISE_LEVELS: f64 = 0.5;
 
 /// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
@@ -69,57 +69,67 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         Some(division) => in_regions(job, division.regions.rows)?,
         None => as_a_whole(job, checkpoint)?,
     };
-    let Rendered { report, end, precision, biased, set_after, write_seconds, kept } = rendered;
-    let printed = print_line(&summary(output.path(), size, &report, end));
-
+    let end = rendered.end;
+    let printed = print_line(&summary(output.path(), size, &rendered.report, end));
     if let Some(path) = &args.stats {
-        let stats = Stats {
-            scene: args.scene.display().to_string(),
-            scene_hash: hash,
-            output: args.output.display().to_string(),
-            version: env!("CARGO_PKG_VERSION"),
-            size,
-            seed: args.compute.seed,
-            sampler: args.sampler.name(),
-            precision,
-            lanes: report.lanes,
-            threads: args.compute.threads(),
-            adaptive: !args.uniform,
-            samples: report.samples,
-            spp_min: report.spp.min,
-            spp_mean: report.spp.mean,
-            spp_max: report.spp.max,
-            rays: report.rays,
-            seconds: report.seconds,
-            compile_seconds: report.compile_seconds,
-            write_seconds,
-            total_seconds: started.elapsed().as_secs_f64(),
-            samples_per_second: report.samples_per_second(),
-            first_picture_seconds: report
-                .first_picture_seconds
-                .map(|s| s + set_after.as_secs_f64()),
-            noise_levels: report.noise.map(|n| n.rmse_levels),
-            noise_levels_p95: report.noise.map(|n| n.p95_levels),
-            rmse_linear: report.noise.map(|n| n.rmse_linear),
-            bad_samples: report.bad_samples,
-            saturated_samples: report.saturated_samples,
-            saturated_pixels: report.saturated_pixels,
-            biased,
-            peak_rss_bytes: resident_memory().map(|resident| resident.peak),
-            stopped_by: match end {
-                End::Done(reason) => reason.name(),
-                End::Signal(_) => "signal",
-            },
-        };
+        let stats = stats(args, hash, size, &rendered, started.elapsed());
         disk::write(path, stats.json().as_bytes())?;
     }
     printed?;
-    if let Some(Err(error)) = kept {
+    if let Some(Err(error)) = rendered.kept {
         return Err(error.into());
     }
     match end {
         End::Done(_) => Ok(()),
         End::Signal(status) => Err(Failure::Signalled(status)),
+    }
+}
+
+fn stats(
+    args: &RenderArgs,
+    scene_hash: String,
+    size: [u32; 2],
+    rendered: &Rendered,
+    total: Duration,
+) -> Stats {
+    let report = &rendered.report;
+    Stats {
+        scene: args.scene.display().to_string(),
+        scene_hash,
+        output: args.output.display().to_string(),
+        version: env!("CARGO_PKG_VERSION"),
+        size,
+        seed: args.compute.seed,
+        sampler: args.sampler.name(),
+        precision: rendered.precision,
+        lanes: report.lanes,
+        threads: args.compute.threads(),
+        adaptive: !args.uniform,
+        samples: report.samples,
+        spp_min: report.spp.min,
+        spp_mean: report.spp.mean,
+        spp_max: report.spp.max,
+        rays: report.rays,
+        seconds: report.seconds,
+        compile_seconds: report.compile_seconds,
+        write_seconds: rendered.write_seconds,
+        total_seconds: total.as_secs_f64(),
+        samples_per_second: report.samples_per_second(),
+        first_picture_seconds: report
+            .first_picture_seconds
+            .map(|s| s + rendered.set_after.as_secs_f64()),
+        noise_levels: report.noise.map(|n| n.rmse_levels),
+        noise_levels_p95: report.noise.map(|n| n.p95_levels),
+        rmse_linear: report.noise.map(|n| n.rmse_linear),
+        bad_samples: report.bad_samples,
+        saturated_samples: report.saturated_samples,
+        saturated_pixels: report.saturated_pixels,
+        biased: rendered.biased.clone(),
+        peak_rss_bytes: resident_memory().map(|resident| resident.peak),
+        stopped_by: match rendered.end {
+            End::Done(reason) => reason.name(),
+            End::Signal(_) => "signal",
+        },
     }
 }
 
@@ -189,9 +199,10 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
         signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
     };
     let (scene, settings) = (Arc::new(scene), schedule_settings(args));
-    let (rows, observer) = ((rows, args.compute.threads()), &mut observe);
-    let mut render = RegionRender::new(&scene, &options, settings, rows, provenance, observer)?;
-    let results = render.write(args.bits, output).map(|(report, stopped_by)| {
+    let threads = args.compute.threads();
+    let mut render = RegionRender::new(&scene, &options, settings, rows, threads)?;
+    let results = render.write(&provenance, args.bits, output, &mut observe);
+    let results = results.map(|(report, stopped_by)| {
         let world = &render.state().world;
         (report, stopped_by, world.precision(), world.biases())
     });
@@ -307,7 +318,7 @@ fn options(args: &RenderArgs) -> Options {
 fn schedule_settings(args: &RenderArgs) -> Settings {
     let has_target =
         args.spp.is_some() || args.noise.is_some() || args.rmse.is_some() || args.time.is_some();
-    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
+    let noise_levels = if has_target { args.noise } else { Some(DEFAULT_NOISE_LEVELS) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let linear = noise_levels.is_none() && (args.rmse.is_some() || linear_file);
     let criterion = if linear { Criterion::Linear } else { Criterion::Levels };

@@ -2,7 +2,7 @@
 
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::text::wrapped_rows;
-use crate::dashboard::{BORDER, Model, Overlay};
+use crate::dashboard::{BORDER, Form, Layout, Model, Overlay};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
@@ -60,17 +60,7 @@ impl Model {
             Overlay::Pick(pick) => {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
-            Overlay::Form(form) => {
-                // The form leaves the picture visible, which previews the new object or light.
-                let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
-                let columns = side.min(width);
-                let x = width - columns;
-                let frame = Rect { x, y: 0, width: columns, height: height - 2 };
-                let problem = form.problem.is_some()
-                    || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
-                let (list, help) = split(frame.inner(BORDER), problem);
-                OverlayLayout { frame, input: Rect::default(), list, help }
-            }
+            Overlay::Form(form) => self.form_layout(&layout, form),
             Overlay::Prompt(prompt) => {
                 let columns = 64.min(width - 2);
                 let text = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
@@ -90,6 +80,18 @@ impl Model {
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
         })
+    }
+
+    fn form_layout(&self, layout: &Layout, form: &Form) -> OverlayLayout {
+        let [width, height] = self.screen;
+        // The form leaves the picture visible, which previews the new object or light.
+        let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
+        let columns = side.min(width);
+        let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
+        let problem = form.problem.is_some()
+            || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
+        let (list, help) = split(frame.inner(BORDER), problem);
+        OverlayLayout { frame, input: Rect::default(), list, help }
     }
 
     /// Returns the area of the lines of the outline; `None` if it is hidden.

@@ -2,6 +2,7 @@
 
 use crate::harness::*;
 use zerkalo_kernel::sampling::CameraDimensions;
+use zerkalo_scene::material::InterfaceMedia;
 
 pub type Vector = [f64; 3];
 
@@ -159,10 +160,12 @@ impl Sides {
     pub fn query<L: SimdFloat>(self, at: (Vector, Vector), fold: bool) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: query(at, fold),
-            n_i: L::from_f64(self.n_i),
-            n_t: L::from_f64(self.n_t),
-            outer: L::mask(self.n_i <= self.n_t),
-            thin: L::mask(self.thin),
+            media: InterfaceMedia {
+                n_i: L::from_f64(self.n_i),
+                n_t: L::from_f64(self.n_t),
+                outer: L::mask(self.n_i <= self.n_t),
+                thin: L::mask(self.thin),
+            },
             reflecting: L::mask(true),
         }
     }

@@ -138,39 +138,87 @@ impl Decoder {
     }
 
     fn byte(&mut self, byte: u8) {
+        match self.state {
+            State::Paste | State::PausedPaste => self.paste(byte),
+            State::Ground | State::Character => self.character(byte),
+            State::Escape => self.escape(byte),
+            State::Introducer(introducer) => self.introduced(introducer, byte),
+            State::ControlSequence
+            | State::Console
+            | State::X10Mouse
+            | State::SingleShift(_)
+            | State::String(_) => self.sequence(byte),
+            State::StringEscape(_) if byte == b'\\' => self.end_string(b"\x1b\\"),
+            State::StringEscape(_) => {
+                // Another sequence interrupts the string.
+                self.restart();
+                self.state = State::Escape;
+                self.byte(byte);
+            }
+        }
+    }
+
+    fn character(&mut self, byte: u8) {
         match (self.state, byte) {
-            (State::Paste | State::PausedPaste, _) => self.paste(byte),
             (State::Ground, ESC) => {
                 self.restart();
                 self.state = State::Escape;
             }
-            (State::Ground, _) | (State::Character, 0x80..=0xbf) => {
+            (State::Ground, _) | (_, 0x80..=0xbf) => {
                 self.interpreter.is_character_complete = false;
                 self.parse(&[byte]);
                 let is_complete = self.interpreter.is_character_complete;
                 self.state = if is_complete { State::Ground } else { State::Character };
             }
             // An incomplete UTF-8 character produces no key.
-            (State::Character, _) => {
+            _ => {
                 self.restart();
                 self.byte(byte);
             }
-            (State::Escape, ESC) => self.interpreter.press(Key::plain(Code::Esc)),
-            (State::Escape, b'[' | b'O' | b'P' | b']' | b'_') => {
-                self.state = State::Introducer(byte);
-            }
-            (State::Escape, _) => {
+        }
+    }
+
+    fn escape(&mut self, byte: u8) {
+        match byte {
+            ESC => self.interpreter.press(Key::plain(Code::Esc)),
+            b'[' | b'O' | b'P' | b']' | b'_' => self.state = State::Introducer(byte),
+            _ => {
                 self.interpreter.alt = true;
                 self.in_ground(byte);
             }
+        }
+    }
 
-            (State::Introducer(b'['), b'[') => self.state = State::Console,
-            (State::Introducer(b'['), b'M') => self.state = State::X10Mouse,
-            (State::Introducer(b'['), 0x20..=0x7e) => {
+    fn introduced(&mut self, introducer: u8, byte: u8) {
+        match (introducer, byte) {
+            (b'[', b'[') => self.state = State::Console,
+            (b'[', b'M') => self.state = State::X10Mouse,
+            (b'[', 0x20..=0x7e) => {
                 self.parse(b"\x1b[");
                 self.state = State::ControlSequence;
                 self.byte(byte);
             }
+            (b'O', b'0'..=b'9' | 0x40..=0x7e) => {
+                self.state = State::SingleShift(0);
+                self.byte(byte);
+            }
+            (b'[' | b'O', _) => {
+                self.abandon();
+                self.in_ground(byte);
+            }
+            _ => {
+                self.interpreter.is_apc = introducer == b'_';
+                self.interpreter.reply = Reply::Other;
+                self.string_length = 0;
+                self.parse(if introducer == b']' { b"\x1b]" } else { b"\x1bP" });
+                self.state = State::String(introducer);
+                self.byte(byte);
+            }
+        }
+    }
+
+    fn sequence(&mut self, byte: u8) {
+        match (self.state, byte) {
             (State::ControlSequence, 0x20..=0x3f) => self.parse(&[byte]),
             (State::ControlSequence, 0x40..=0x7e) => {
                 self.parse(&[byte]);
@@ -185,11 +233,6 @@ impl Decoder {
                     self.complete(x10_mouse(&report));
                 }
             }
-
-            (State::Introducer(b'O'), b'0'..=b'9' | 0x40..=0x7e) => {
-                self.state = State::SingleShift(0);
-                self.byte(byte);
-            }
             (State::SingleShift(modifiers), b'0'..=b'9') => {
                 let digit = u16::from(byte - b'0');
                 let modifiers = modifiers.saturating_mul(10).saturating_add(digit);
@@ -197,23 +240,6 @@ impl Decoder {
             }
             (State::SingleShift(modifiers), 0x40..=0x7e) => {
                 self.complete(single_shift(modifiers, byte));
-            }
-
-            (
-                State::Introducer(b'[' | b'O') | State::ControlSequence | State::SingleShift(_),
-                _,
-            ) => {
-                self.abandon();
-                self.in_ground(byte);
-            }
-
-            (State::Introducer(introducer), _) => {
-                self.interpreter.is_apc = introducer == b'_';
-                self.interpreter.reply = Reply::Other;
-                self.string_length = 0;
-                self.parse(if introducer == b']' { b"\x1b]" } else { b"\x1bP" });
-                self.state = State::String(introducer);
-                self.byte(byte);
             }
             (State::String(introducer), ESC) => self.state = State::StringEscape(introducer),
             (State::String(b']'), BEL) => self.end_string(b"\x07"),
@@ -225,13 +251,7 @@ impl Decoder {
                     self.parse(&[byte]);
                 }
             }
-            (State::StringEscape(_), b'\\') => self.end_string(b"\x1b\\"),
-            (State::StringEscape(_), _) => {
-                // Another sequence interrupts the string.
-                self.restart();
-                self.state = State::Escape;
-                self.byte(byte);
-            }
+            _ => self.in_ground(byte),
         }
     }
 

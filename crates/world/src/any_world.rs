@@ -1,4 +1,4 @@
-//! Compiled scenes (worlds) in single or double precision behind one type.
+//! Worlds in single or double precision behind one type.
 
 use crate::analysis::precision;
 use crate::compile::RecenteredGeometry;
@@ -16,8 +16,7 @@ pub enum Precision {
     Single,
     /// Double precision: 53-bit significands, four or eight SIMD lanes.
     Double,
-    /// Single precision if its errors are too small to be visible in the picture of the scene,
-    /// otherwise double precision.
+    /// Single if its errors are too small to be visible in the picture, otherwise double.
     #[default]
     Auto,
 }
@@ -25,19 +24,18 @@ pub enum Precision {
 /// Options of scene compilation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Floating-point precision for which the scene is compiled.
+    /// Precision for which the scene is compiled.
     pub precision: Precision,
-    /// `true` if all lights and emissive materials share one light group (part of the picture that
-    /// the film stores separately). The film is then smaller, but a change of a light's colour or
-    /// intensity requires new samples.
+    /// `true` if all lights and emissive materials share one light group. The film is then smaller,
+    /// but a change of a light's emission requires new samples.
     pub merge_lights: bool,
 }
 
 /// Compiled scene in the precision that the scene requires or that the user has chosen.
 pub enum AnyWorld {
-    /// Scene compiled for single precision.
+    /// Single precision.
     Single(World<Single>),
-    /// Scene compiled for double precision.
+    /// Double precision.
     Double(World<Double>),
 }
 
@@ -51,8 +49,7 @@ macro_rules! dispatch {
     };
 }
 
-/// Returns `true` if the errors of single precision would be visible in the picture of `scene`:
-/// [`Precision::Auto`] then chooses double precision.
+/// Returns `true` if [`Precision::Auto`] chooses double precision for `scene`.
 pub fn requires_double(scene: &Scene) -> bool {
     !single_suffices(scene, &RecenteredGeometry::new(scene))
 }
@@ -94,33 +91,29 @@ impl AnyWorld {
         }
     }
 
-    /// Returns the name of each light group (part of the picture that the film stores separately).
+    /// Returns the name of each light group.
     pub fn group_names(&self) -> Vec<String> {
         dispatch!(self, world => world.group_names.clone())
     }
 
-    /// Returns the light groups of the compiled scene: the parts of the picture that the film
-    /// stores separately.
+    /// Returns the light groups.
     pub fn light_groups(&self) -> &LightGroups {
         dispatch!(self, world => &world.groups)
     }
 
-    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a position in the picture: a column and a row in pixels, with
-    /// fractions.
+    /// Writes the first hit of the camera ray through each of `points`, positions in the picture
+    /// \[pixels\], into `hits`, a slice of the same length.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         dispatch!(self, world => world.first_hit(points, hits))
     }
 
-    /// Returns the scale of each light group. The film stores radiance in integers; the scale is
-    /// the number of integer steps per unit of radiance, a power of two.
+    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
+    /// the film, a power of two.
     pub fn group_scales(&self) -> Vec<f64> {
         dispatch!(self, world => world.scales.clone())
     }
 
-    /// Returns the weight (red, green, blue) of each light group in the picture of `scene`. The
-    /// scene may differ from the compiled one in colours, intensities and on/off switches of
-    /// lights.
+    /// Returns the factors of each light group in the picture of `scene`, see [`LightGroups::mix`].
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         dispatch!(self, world => world.groups.mix(scene))
     }

@@ -27,12 +27,11 @@ use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface, Light};
 use zerkalo_scene::material::{Bsdf, Material};
 use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 
-/// Geometry of all objects in double precision, translated so that the scene's centre is the
-/// origin.
+/// Geometry of all objects in double precision, relative to the scene's centre.
 pub(crate) struct RecenteredGeometry {
-    /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
+    /// The scene's centre.
     pub origin: DVec3,
-    /// Geometry of each object in canonical form, with its transform applied.
+    /// Canonical form of each object, with its transform applied.
     pub forms: Vec<Form>,
     /// Largest absolute coordinate, relative to `origin`, of the camera's lens and of all shapes
     /// with finite bounds.
@@ -65,9 +64,7 @@ impl RecenteredGeometry {
         Self { origin, forms, extent }
     }
 
-    /// Returns the largest rounding error of the coordinates in the scene file. The error is in
-    /// proportion to the distance between the scene's centre and the origin of the file's
-    /// coordinates.
+    /// Returns the largest rounding error of the coordinates in the scene file.
     pub fn input_error(&self) -> f64 {
         f64::EPSILON * self.origin.abs().max_element()
     }
@@ -77,16 +74,13 @@ impl RecenteredGeometry {
 struct CompiledMaterials<'a, S> {
     /// Distinct materials, in order of first use.
     materials: Vec<&'a Material>,
-    /// BSDF of each of `materials`.
     bsdfs: Vec<Bsdf<S>>,
-    /// Indices into `materials`. The outer list has an entry for each object, the inner list has an
-    /// entry for each part of the object.
+    /// Indices into `materials`, one for each part of each object.
     of_object: Vec<Vec<u32>>,
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// Compiles the materials of all objects and their parts. `default` replaces materials whose
-    /// names the scene does not define.
+    /// `default` replaces materials whose names the scene does not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
@@ -121,13 +115,12 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.materials[self.index(primitive) as usize]
     }
 
-    /// Returns the materials of the parts of object number `object`.
     fn of_parts(&self, object: usize) -> Vec<&'a Material> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
 
-    /// Moves flat emissive objects off the opaque surfaces on which they lie. `eye` is the position
-    /// of the camera. Returns `None` if no object is moved.
+    /// Moves flat emissive objects off the opaque surfaces on which they lie. Returns `None` if no
+    /// object is moved.
     fn move_emissive_sheets(
         &self,
         geometry: &RecenteredGeometry,
@@ -151,19 +144,15 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         move_off_surfaces(geometry, (&emits, &transmits), eye, emitter_lift::<S>(geometry))
     }
 
-    /// Returns `true` if some material reflects light that arrives directly from lights.
     fn has_direct(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
     }
 
-    /// Returns `true` if some material reflects ambient light.
     fn has_ambient(&self) -> bool {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
     }
 
-    /// Returns the limits of indirect diffuse light: the largest number of bounces, and whether
-    /// caustics are included. Returns `None` if the scene switches indirect diffuse light off, or
-    /// if no material is diffuse.
+    /// Returns the limits of indirect diffuse light; `None` if the scene has none.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
@@ -171,26 +160,24 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         (traced && self.materials.iter().any(is_matt)).then_some(DiffuseLimits { depth, caustics })
     }
 
-    /// Returns `true` if some surface reflects or transmits rays.
     fn has_secondary(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() || bsdf.transmission.is_some())
     }
 }
 
-/// Height of emitters (lights with a size) above the surfaces that they touch. The unit is the
-/// larger of two rounding errors: that of the scene's extent, and that of the coordinates in the
-/// scene file. Rays that leave a surface start at about half this height, below the emitter, so
-/// they can hit the emitter.
+/// Height of lights with a size above the surfaces that they touch, in the larger of two rounding
+/// errors: that of the scene's extent, and that of the coordinates in the scene file. Rays that
+/// leave a surface start at about half this height, so that they can hit the light.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns a distance that serves two purposes. Points are sampled at this height above emissive
-/// objects. Lights with a size are moved by this distance off the finite surfaces that they touch.
+/// Returns the height at which points are sampled above emissive objects, and by which lights with
+/// a size are moved off the finite surfaces that they touch.
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Largest distance by which a sphere light, or a light whose centre is on no surface, is moved off
-/// the surfaces that it touches. The unit is the light's radius or shorter side.
+/// Largest lift of a sphere light, or a light whose centre is on no surface, in radii or shorter
+/// sides.
 const MAX_LIFT: f64 = 1e-4;
 
 /// Returns the distance by which a light with the surface `surface` is moved off the surfaces that
@@ -218,7 +205,6 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface
     lifts.fold(lift.min(max_lift), f64::max)
 }
 
-/// Returns the target of shadow rays to `light`, whose compiled form is `delta`.
 fn shadow_ray_target<S: Float>(
     geometry: &RecenteredGeometry,
     light: &Light,
@@ -231,8 +217,6 @@ fn shadow_ray_target<S: Float>(
     ShadowRayTarget { light: delta, on_surface }
 }
 
-/// Lights of a scene and their light groups, with the scale of each group: the number of integer
-/// steps per unit of radiance in the film.
 struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
@@ -290,8 +274,6 @@ impl<S: Float> CompiledLights<S> {
         Self { groups, scales, sources, choice, emitters, environments }
     }
 
-    /// Returns the target of shadow rays to each light without a size: the position of the light,
-    /// or the direction to it.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
@@ -320,9 +302,6 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// Compiled culling of a scene: the method that makes the candidate lists of a tile (primitives
-/// that a ray must be tested against), the candidates of all rays of the picture together, and the
-/// light buffers.
 struct CompiledCulling<S> {
     mode: CullingMode,
     all_candidates: TileCandidates,
@@ -330,8 +309,6 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling data of a scene. `outside_only` has one entry for each primitive:
-    /// `true` if rays hit it only from outside.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -375,8 +352,26 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns the region in which camera rays start: a sphere around the eye. It contains the lens and
-/// every start point on the near plane.
+/// Returns a sphere around the lens if all camera rays start there. With a near plane, they start on
+/// the plane and thus possibly inside a primitive.
+fn lens_of(scene: &Scene, camera: &PerspectiveCamera) -> Option<BoundingSphere> {
+    let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
+    (scene.camera.near == 0.0).then_some(lens)
+}
+
+/// Returns the structure that finds the hits of rays with `forms`.
+fn structure_of(scene: &Scene, forms: &[Form]) -> AccelerationStructure {
+    match scene.trace.acceleration {
+        Acceleration::Auto => AccelerationStructure::fastest(forms),
+        Acceleration::None => AccelerationStructure::List("bare list"),
+        Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
+        Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
+        Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
+        Acceleration::Bvh => AccelerationStructure::Bvh,
+    }
+}
+
+/// Returns a sphere around the eye that contains the lens and every start point on the near plane.
 fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
@@ -408,14 +403,7 @@ impl<L: SimdFloat> World<L> {
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye());
         let recentered = moved.as_ref().unwrap_or(recentered);
-        let structure = match scene.trace.acceleration {
-            Acceleration::Auto => AccelerationStructure::fastest(&recentered.forms),
-            Acceleration::None => AccelerationStructure::List("bare list"),
-            Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
-            Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
-            Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
-            Acceleration::Bvh => AccelerationStructure::Bvh,
-        };
+        let structure = structure_of(scene, &recentered.forms);
         let geometry = Aggregate::with_structure(&recentered.forms, structure);
         let primitives = geometry.sources();
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
@@ -423,22 +411,13 @@ impl<L: SimdFloat> World<L> {
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
         let lights =
             CompiledLights::new(scene, recentered, &materials, primitives, &camera, merge_lights);
-        let nested_dielectrics = NestedDielectrics::new(
-            recentered,
-            primitives,
-            &bsdf_of,
-            &materials.bsdfs,
-            start_region(scene, &camera),
-        );
-        let entered = nested_dielectrics
-            .as_ref()
-            .map_or(vec![false; bsdf_of.len()], NestedDielectrics::entered);
-        // Without a near plane, camera rays start on the lens. With one, they start on the plane
-        // and thus possibly inside of a primitive; `start` is `None` then.
-        let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
-        let start = (scene.camera.near == 0.0).then_some(lens);
+        let start = start_region(scene, &camera);
+        let nested_dielectrics =
+            NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, start);
+        let entered = nested_dielectrics.as_ref().map(NestedDielectrics::entered);
+        let entered = entered.unwrap_or_else(|| vec![false; bsdf_of.len()]);
         let forms = primitives.iter().map(|id| &recentered.forms[id.form]);
-        let outside_only = outside_only(forms, start, &entered);
+        let outside_only = outside_only(forms, lens_of(scene, &camera), &entered);
         let culling =
             CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
         let smooth =
@@ -446,7 +425,6 @@ impl<L: SimdFloat> World<L> {
         let colored =
             geometry.is_colored() || textures.as_ref().is_some_and(SurfaceTextures::is_colored);
         let has_background = scene.background.color.0 != [0.0; 3];
-        let background = lights.groups.find(&LightGroupSource::Background);
         let mut world = Self {
             smooth,
             colored,
@@ -463,7 +441,10 @@ impl<L: SimdFloat> World<L> {
             bsdf_of,
             bsdfs: materials.bsdfs,
             ambient: lights.groups.find(&LightGroupSource::Ambient),
-            background: background.filter(|_| has_background),
+            background: lights
+                .groups
+                .find(&LightGroupSource::Background)
+                .filter(|_| has_background),
             group_names: lights.groups.names(scene),
             groups: lights.groups,
             scales: lights.scales,

@@ -29,28 +29,11 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let document = read_scene_and_warn(&args.scene)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
-    let display = args.picture.display();
     let reference = args.reference.as_ref();
+    let display = args.picture.display();
     let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
     let reference = reference.transpose()?;
-    let threads = args.compute.threads();
-    let experiments = match (&args.only, args.full) {
-        (experiments, _) if !experiments.is_empty() => experiments.clone(),
-        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
-        _ => SHORT.to_vec(),
-    };
-    let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
-    let mut targets = args.noise.clone();
-    targets.sort_by(|a, b| b.total_cmp(a));
-    let plan = Plan {
-        targets,
-        experiments,
-        repetitions: usize::from(args.repetitions),
-        seconds,
-        threads,
-        seed: args.compute.seed,
-        display,
-    };
+    let plan = plan(args);
     let world = AnyWorld::compile(&scene, &world::Options::default());
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
@@ -66,7 +49,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
 
     let report = table::MeasureReport {
         scene: &args.scene,
-        threads,
+        threads: plan.threads,
         lanes,
         single,
         measurement: &measurement,
@@ -85,6 +68,26 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     match signals.caught() {
         Some(status) => Err(Failure::Signalled(status)),
         None => Ok(()),
+    }
+}
+
+fn plan(args: &MeasureArgs) -> Plan {
+    let experiments = match (&args.only, args.full) {
+        (experiments, _) if !experiments.is_empty() => experiments.clone(),
+        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
+        _ => SHORT.to_vec(),
+    };
+    let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
+    let mut targets = args.noise.clone();
+    targets.sort_by(|a, b| b.total_cmp(a));
+    Plan {
+        targets,
+        experiments,
+        repetitions: usize::from(args.repetitions),
+        seconds,
+        threads: args.compute.threads(),
+        seed: args.compute.seed,
+        display: args.picture.display(),
     }
 }
 

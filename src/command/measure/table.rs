@@ -1,6 +1,6 @@
 //! Results of `zerkalo measure` as a text table.
 
-use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
+use crate::measure::{Experiment, Measured, Measurement, Median, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
@@ -136,36 +136,7 @@ impl fmt::Display for MeasureReport<'_> {
             writeln!(f, "{warning}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
-        writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
-        writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
-        for target in &m.targets {
-            let expected = m.expected.iter().find(|e| e.levels == *target);
-            match (default.time_to(*target), expected) {
-                (Some(c), _) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
-                (None, Some(e)) => writeln!(
-                    f,
-                    "  {target:>7}  {:>18}  {:>18}",
-                    format!("~ {}", between((e.seconds_low, e.seconds_high))),
-                    "expected"
-                )?,
-                (None, None) => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
-            }
-        }
-        if let (Some(slope), Some((speed, spread))) =
-            (default.slope(), default.samples_per_second())
-        {
-            writeln!(
-                f,
-                "  error ~ samples^({:.2} ±{:.2}); {:.1} million samples per second {}",
-                slope.value,
-                slope.standard_error,
-                speed * 1e-6,
-                percent(spread)
-            )?;
-        }
-        if !m.expected.is_empty() {
-            writeln!(f, "  ~ extrapolated from the convergence so far")?;
-        }
+        self.times(f, default)?;
         let mut last = Experiment::Default;
         for measured in &m.measured[1..] {
             if measured.experiment != last {
@@ -190,6 +161,41 @@ impl fmt::Display for MeasureReport<'_> {
 }
 
 impl MeasureReport<'_> {
+    fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
+        let m = self.measurement;
+        writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
+        writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
+        for target in &m.targets {
+            let expected = m.expected.iter().find(|e| e.levels == *target);
+            match (default.time_to(*target), expected) {
+                (Some(c), _) => writeln!(f, "  {target:>7}  {:>18}  {:>18.0}", reached(&c), c.spp)?,
+                (None, Some(e)) => writeln!(
+                    f,
+                    "  {target:>7}  {:>18}  {:>18}",
+                    format!("~ {}", between((e.seconds_low, e.seconds_high))),
+                    "expected"
+                )?,
+                (None, None) => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
+            }
+        }
+        if let (Some(slope), Some(Median { value: speed, spread })) =
+            (default.slope(), default.samples_per_second())
+        {
+            writeln!(
+                f,
+                "  error ~ samples^({:.2} ±{:.2}); {:.1} million samples per second {}",
+                slope.value,
+                slope.standard_error,
+                speed * 1e-6,
+                percent(spread)
+            )?;
+        }
+        if !m.expected.is_empty() {
+            writeln!(f, "  ~ extrapolated from the convergence so far")?;
+        }
+        Ok(())
+    }
+
     fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
         writeln!(
             f,
@@ -222,7 +228,7 @@ impl MeasureReport<'_> {
             (None, None) => (format!("> {}", time(followed())), String::new()),
         };
         let spp = reached_at.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
-        let rate = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
+        let rate = measured.samples_per_second().map_or(0.0, |speed| speed.value * 1e-6);
         write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
         match measured.bias {
             Some(b) if b.is_seen() => writeln!(f, "   {:.2} levels (z = {:.0})", b.levels, b.z),

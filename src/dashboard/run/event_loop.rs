@@ -72,10 +72,7 @@ impl Dashboard {
                 Some(Duration::ZERO) => (&wakeup, None),
                 wait => (&silence, wait),
             };
-            let timer = match wait.into_iter().chain(wants_snapshot).min() {
-                Some(wait) => after(wait),
-                None => never(),
-            };
+            let timer = wait.into_iter().chain(wants_snapshot).min().map_or(never(), after);
             select! {
                 recv(input) -> event => match event {
                     Ok(Ok(event)) => self.enqueue(event, &mut waiting),
@@ -90,15 +87,11 @@ impl Dashboard {
                 recv(done) -> message => if let Ok(message) = message {
                     self.dispatch(message);
                 },
-                recv(written) -> frame => {
-                    if let Ok(written) = frame {
-                        self.frames.record_written();
-                        match written {
-                            Ok(at) => self.latency.written(at),
-                            Err(_) => return Ok(Some(HUNG_UP)),
-                        }
-                    }
-                }
+                recv(written) -> frame => if let Ok(result) = frame {
+                    self.frames.record_written();
+                    let Ok(at) = result else { return Ok(Some(HUNG_UP)) };
+                    self.latency.written(at);
+                },
                 recv(signals) -> event => {
                     if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
                         return Ok(Some(status));

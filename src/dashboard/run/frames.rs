@@ -137,9 +137,7 @@ impl FramePipeline {
         if upload.open {
             self.flow.sent_unasked(now, bytes.len());
         } else {
-            if let Some(through) = self.flow.ack_request() {
-                bytes.extend(cursor_request(through).as_bytes());
-            }
+            self.request_ack(&mut bytes);
             self.flow.sent(now, bytes.len(), true, 0);
         }
         self.send(bytes, now);
@@ -241,13 +239,17 @@ impl FramePipeline {
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
-        if let Some(through) = self.flow.ack_request() {
-            bytes.extend(cursor_request(through).as_bytes());
-        }
+        self.request_ack(&mut bytes);
         self.sent += bytes.len() as u64;
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.send(bytes, now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
+    }
+
+    fn request_ack(&self, bytes: &mut Vec<u8>) {
+        if let Some(through) = self.flow.ack_request() {
+            bytes.extend(cursor_request(through).as_bytes());
+        }
     }
 
     pub fn record_written(&mut self) {

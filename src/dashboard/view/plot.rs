@@ -64,10 +64,9 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let inner = area.inner(BORDER);
     let points = &model.convergence.points;
     let Some(last) = points.last() else {
-        let middle = inner.height / 2;
         let text = "no estimate of the noise yet";
         let indent = usize::from(inner.width).saturating_sub(columns(text)) / 2;
-        painter.row(inner, middle).skip(indent).put(text, theme.dim());
+        painter.row(inner, inner.height / 2).skip(indent).put(text, theme.dim());
         return;
     };
     let mut title = painter.edge(area, 0);
@@ -86,44 +85,42 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
     let Some(plot) = axes(inner, &x, &y, painter) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
-    // A canvas supports colours, but no other style.
-    let color = |style: Style| style.fg.unwrap_or(Color::Reset);
-    let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
-        x1,
-        y1,
-        x2,
-        y2,
-        color: color(style),
-    };
     Canvas::default()
         .marker(Marker::Braille)
         .x_bounds([0.0, 1.0])
         .y_bounds([0.0, 1.0])
         .paint(|canvas| {
-            let mut dashed = |from: (f64, f64), to: (f64, f64), dash: f64, style| {
-                let at =
-                    |part: f64| (from.0 + (to.0 - from.0) * part, from.1 + (to.1 - from.1) * part);
-                for i in 0..DASHES {
-                    let part = i as f64 / DASHES as f64;
-                    canvas.draw(&line(at(part), at(part + dash / DASHES as f64), style));
-                }
-            };
             if let Some(target) = target {
-                dashed((0.0, y.part(target)), (1.0, y.part(target)), 0.5, theme.good());
+                let ends = [0.0, 1.0].map(|x| (x, y.part(target)));
+                dashes(ends, 0.5, theme.good()).for_each(|dash| canvas.draw(&dash));
             }
             if let Some((seconds, noise)) = reached {
-                let from = place(last.seconds, last.noise_levels);
-                dashed(from, place(seconds, noise), 0.4, theme.dim());
+                let ends = [place(last.seconds, last.noise_levels), place(seconds, noise)];
+                dashes(ends, 0.4, theme.dim()).for_each(|dash| canvas.draw(&dash));
             }
             canvas.layer();
             for pair in points.windows(2) {
-                let [a, b] = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_levels));
-                canvas.draw(&line(a, b, theme.accent()));
+                let ends = [pair[0], pair[1]].map(|p| place(p.seconds, p.noise_levels));
+                canvas.draw(&line(ends, theme.accent()));
             }
             let point = place(last.seconds, last.noise_levels);
-            canvas.draw(&line(point, point, theme.accent()));
+            canvas.draw(&line([point; 2], theme.accent()));
         })
         .render(plot, painter.buffer);
+}
+
+/// Returns a line between two points. A canvas supports colours, but no other style.
+fn line([(x1, y1), (x2, y2)]: [(f64, f64); 2], style: Style) -> Line {
+    Line { x1, y1, x2, y2, color: style.fg.unwrap_or(Color::Reset) }
+}
+
+/// Returns the dashes between two points, which cover the share `covered` of the line.
+fn dashes([a, b]: [(f64, f64); 2], covered: f64, style: Style) -> impl Iterator<Item = Line> {
+    let at = move |part: f64| (a.0 + (b.0 - a.0) * part, a.1 + (b.1 - a.1) * part);
+    (0..DASHES).map(move |i| {
+        let start = i as f64 / DASHES as f64;
+        line([start, start + covered / DASHES as f64].map(at), style)
+    })
 }
 
 /// Number of dashes of a dashed line.

@@ -92,18 +92,25 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     if let Some(link) = &model.link {
         parts.push(part(6, vec![plain(rate(link.rate)), dim(" "), dim(mode(link.mode))]));
     }
-    if watching {
-        return parts;
+    if !watching {
+        parts.extend(machine(model, report, theme));
     }
+    parts
+}
+
+/// Returns the precision and the threads of the render.
+fn machine(model: &Model, report: &Report, theme: &Theme) -> [Part; 2] {
+    let dim = |text: &str| (text.to_string(), theme.dim());
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
-    parts.push(part(7, vec![dim(precision)]));
     let threads = match report.threads {
         1 => "1 thread".to_string(),
         n => format!("{n} threads"),
     };
     let priority = if model.low_priority { ", low priority" } else { "" };
-    parts.push(part(5, vec![dim(&threads), dim(priority)]));
-    parts
+    [
+        Part { expendable: 7, text: vec![dim(precision)] },
+        Part { expendable: 5, text: vec![dim(&threads), dim(priority)] },
+    ]
 }
 
 /// Formats a rate, such as `118 KB/s`. More digits would change too often to read.

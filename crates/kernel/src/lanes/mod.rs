@@ -297,6 +297,17 @@ pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mas
     Some((id, mask & ids.id_eq(id)))
 }
 
+/// Iterates over the distinct ids in the lanes of `mask`: each id, and the lanes that have it.
+#[inline(always)]
+pub fn distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> impl Iterator<Item = (u32, L::Mask)> {
+    let mut remaining = mask;
+    std::iter::from_fn(move || {
+        let (id, lanes) = next_distinct(ids, remaining)?;
+        remaining = remaining.and_not(lanes);
+        Some((id, lanes))
+    })
+}
+
 /// Constant 1.5 x 2^52. Adding it to a double with a magnitude below 2^51 rounds to the nearest
 /// integer, which is the difference between the bits of the sum and those of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;

@@ -11,4 +11,4 @@ pub mod warp;
 pub use packet_sampler::{
     CameraDimensions, PacketSampler, SampleBlock, SampleSettings, Sampler, SamplerKind,
 };
-pub use piecewise_constant_2d::PiecewiseConstant2D;
+pub use piecewise_constant_2d::{PiecewiseConstant2D, PixelSample};

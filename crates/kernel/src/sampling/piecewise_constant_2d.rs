@@ -25,6 +25,16 @@ pub struct PiecewiseConstant2D {
     columns_of_rows: Vec<f32>,
 }
 
+/// Direction sampled from the distribution.
+pub struct PixelSample {
+    /// Horizontal position in the image, 0..=1.
+    pub x: f64,
+    /// Cosine of the polar angle.
+    pub cos: f64,
+    /// Density of the direction \[1/sr\].
+    pub density: f64,
+}
+
 impl PiecewiseConstant2D {
     /// Creates the distribution over an image.
     pub fn new([columns, rows]: [usize; 2], pixels: &[[f32; 3]]) -> Self {
@@ -96,9 +106,8 @@ impl PiecewiseConstant2D {
     }
 
     /// Samples a direction from the distribution. `u` and `v` are uniform in [0, 1); `u` selects
-    /// the column and `v` the row. Returns three values: the horizontal position in the image, from
-    /// 0 to 1; the cosine of the polar angle; and the density \[1/sr\] of the direction.
-    pub fn sample(&self, u: f64, v: f64) -> (f64, f64, f64) {
+    /// the column and `v` the row.
+    pub fn sample(&self, u: f64, v: f64) -> PixelSample {
         let row = interval(&self.rows, |x| *x <= v);
         let t = (v - self.rows[row]) / (self.rows[row + 1] - self.rows[row]);
         let columns = self.columns_of_row(row);
@@ -108,7 +117,7 @@ impl PiecewiseConstant2D {
         let cos =
             self.cosines[row] + t.clamp(0.0, 1.0) * (self.cosines[row + 1] - self.cosines[row]);
         let x = (column as f64 + s.clamp(0.0, 1.0)) / self.columns as f64;
-        (x, cos, self.density_in(row, column))
+        PixelSample { x, cos, density: self.density_in(row, column) }
     }
 
     /// Returns the density \[1/sr\] of the direction at position `[x, y]`, 0..=1.
@@ -199,7 +208,8 @@ mod tests {
             let mut counts = vec![[0u32; SIZE[0]]; SIZE[1]];
             for i in 0..n * n {
                 let number = |k: usize| (k as f64 + 0.5) / n as f64;
-                let (x, cos, density) = distribution.sample(number(i % n), number(i / n));
+                let PixelSample { x, cos, density } =
+                    distribution.sample(number(i % n), number(i / n));
                 let row = distribution.cosines.partition_point(|c| *c >= cos).max(1) - 1;
                 let column = (x * SIZE[0] as f64) as usize;
                 counts[row][column] += 1;
@@ -233,7 +243,7 @@ mod tests {
             };
             let n = 400_000;
             for _ in 0..n {
-                let (x, cos, _) = distribution.sample(unit(), unit());
+                let PixelSample { x, cos, .. } = distribution.sample(unit(), unit());
                 let row = distribution.cosines.partition_point(|c| *c >= cos).max(1) - 1;
                 counts[row * SIZE[0] + (x * SIZE[0] as f64) as usize] += 1.0;
             }

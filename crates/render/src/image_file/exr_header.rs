@@ -39,10 +39,12 @@ impl<W: Write + Seek> Write for Ordered<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let Some(buffer) = &mut self.buffer else { return self.sink.write(bytes) };
         buffer.extend_from_slice(bytes);
-        if let Some((mut attributes, rest)) = buffer.get(PREAMBLE..).and_then(attributes) {
+        if let Some(mut attributes) = buffer.get(PREAMBLE..).and_then(attributes) {
             attributes.sort_unstable();
-            self.sink.write_all(&[&buffer[..PREAMBLE], &attributes.concat(), rest].concat())?;
-            self.header_len = buffer.len() - rest.len() + 1;
+            let sorted = attributes.concat();
+            self.header_len = PREAMBLE + sorted.len() + 1;
+            buffer[PREAMBLE..self.header_len - 1].copy_from_slice(&sorted);
+            self.sink.write_all(buffer)?;
             self.buffer = None;
         }
         Ok(bytes.len())
@@ -62,10 +64,9 @@ impl<W: Write + Seek> Seek for Ordered<W> {
     }
 }
 
-/// Splits `bytes`, an OpenEXR header without its first [`PREAMBLE`] bytes. Returns two values: the
-/// bytes of each attribute, and the bytes from the zero byte at the end of the header on. Returns
-/// `None` if the header is incomplete.
-fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
+/// Returns the attributes in `bytes`, an OpenEXR header without its first [`PREAMBLE`] bytes. `None`
+/// if the header is incomplete.
+fn attributes(mut bytes: &[u8]) -> Option<Vec<&[u8]>> {
     let mut found = Vec::new();
     while *bytes.first()? != 0 {
         let name = bytes.iter().position(|b| *b == 0)? + 1;
@@ -75,7 +76,7 @@ fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
         found.push(bytes.get(..end)?);
         bytes = &bytes[end..];
     }
-    Some((found, bytes))
+    Some(found)
 }
 
 #[cfg(test)]

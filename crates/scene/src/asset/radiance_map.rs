@@ -16,7 +16,7 @@ use exr::meta::header::Header;
 use exr::prelude::traits::*;
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
-use zerkalo_kernel::sampling::PiecewiseConstant2D;
+use zerkalo_kernel::sampling::{PiecewiseConstant2D, PixelSample};
 
 /// Largest number of pixels in a row or column of an environment image.
 const MAX_MAP_SIDE: u32 = 16_384;
@@ -35,6 +35,15 @@ pub struct RadianceMap {
     pixels: Vec<[f32; 3]>,
     distribution: PiecewiseConstant2D,
     mean: [f64; 3],
+}
+
+/// Direction sampled by [`RadianceMap::sample`].
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionSample {
+    /// Unit vector of the direction.
+    pub direction: [f64; 3],
+    /// Density with which it is sampled \[1/sr\].
+    pub density: f64,
 }
 
 impl RadianceMap {
@@ -145,13 +154,12 @@ impl RadianceMap {
     }
 
     /// Samples a direction with a density that follows the luminance of the image. `u` and `v` are
-    /// uniform in [0, 1). Returns two values: the unit vector of the direction, and the density
-    /// \[1/sr\] with which it is sampled.
-    pub fn sample(&self, u: f64, v: f64) -> ([f64; 3], f64) {
-        let (x, cos, density) = self.distribution.sample(u, v);
+    /// uniform in [0, 1).
+    pub fn sample(&self, u: f64, v: f64) -> DirectionSample {
+        let PixelSample { x, cos, density } = self.distribution.sample(u, v);
         let (sin_phi, cos_phi) = (TAU * x).sin_cos();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        ([-sin * sin_phi, cos, sin * cos_phi], density)
+        DirectionSample { direction: [-sin * sin_phi, cos, sin * cos_phi], density }
     }
 
     /// Returns the density \[1/sr\] of [`RadianceMap::sample`].
@@ -357,7 +365,7 @@ FORMAT=32-bit_rle_rgbe
         for i in 0..2000u32 {
             let u = (f64::from(i) + 0.5) / 2000.0;
             let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
-            let (direction, density) = map.sample(u, v);
+            let DirectionSample { direction, density } = map.sample(u, v);
             let length: f64 = direction.iter().map(|x| x * x).sum();
             assert!((length - 1.0).abs() < 1e-12);
             let expected = map.density(direction);
@@ -409,7 +417,8 @@ FORMAT=32-bit_rle_rgbe
         let [mean, ..] = map.mean();
         for i in 0..200_000u32 {
             let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
-            let (direction, density) = map.sample((f64::from(i) + 0.5) / 200_000.0, v);
+            let DirectionSample { direction, density } =
+                map.sample((f64::from(i) + 0.5) / 200_000.0, v);
             let weight = map.radiance(direction)[0] / density;
             assert!(weight <= 17.0 * 4.0 * PI * mean, "{weight}, {mean}");
         }

@@ -1,28 +1,23 @@
-//! Compiled lights without a size (delta lights), white and of unit strength. Colour and intensity
-//! of a light are applied to the film's sums, so that new colours and intensities need no new
-//! samples.
+//! Compiled lights without a size, white and of unit strength.
 
 use crate::light::{LightSample, SpotCone};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
-/// Delta light: a light without a size, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
-    /// Point or spot light: light from one point.
+    /// Point or spot light.
     Point {
-        /// Position of the light, relative to the scene's centre.
+        /// Relative to the scene's centre.
         position: [S; 3],
-        /// Falloff: `true` if the irradiance at normal incidence is 1 / d^2 at the distance d;
-        /// `false` if it is pi at every distance, so that a white diffuse surface has the radiance
-        /// 1.
+        /// `true` if the irradiance at normal incidence is 1 / d^2 at the distance d; `false` if it
+        /// is pi at every distance, so that a white diffuse surface has the radiance 1.
         inverse_square: bool,
-        /// Cone that limits the light of a spot; `None` for a point light.
+        /// `None` for a point light.
         cone: Option<SpotCone<S>>,
     },
-    /// Directional light. The irradiance at normal incidence is pi, so that a white diffuse surface
-    /// has the radiance 1.
+    /// The irradiance at normal incidence is pi.
     Directional {
         /// Unit vector towards the distant light.
         wi: [S; 3],
@@ -30,8 +25,7 @@ pub enum DeltaLight<S> {
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Returns the position of the light relative to the scene's centre; `None` for a directional
-    /// light.
+    /// Returns the position of a point or spot light.
     pub fn position(&self) -> Option<DVec3> {
         match self {
             Self::Point { position, .. } => Some(DVec3::from(position.map(S::to_f64))),
@@ -39,7 +33,6 @@ impl<S: Float> DeltaLight<S> {
         }
     }
 
-    /// Returns `true` if the irradiance decreases with the square of the distance.
     pub fn is_inverse_square(&self) -> bool {
         matches!(self, Self::Point { inverse_square: true, .. })
     }
@@ -70,10 +63,8 @@ impl<S: Float> DeltaLight<S> {
         LightSample { wi, distance, irradiance, density: L::from_f64(L::MAX) }
     }
 
-    /// Returns the irradiance that the light, with unit strength, causes at normal incidence at the
-    /// scene's centre. If the irradiance falls with the square of the distance and the light is
-    /// nearer to the centre than `radius`, returns the irradiance at the distance `radius` from the
-    /// light.
+    /// Returns the irradiance at normal incidence at the scene's centre. A light with falloff that
+    /// is nearer than `radius` counts as if it were at this distance.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {

@@ -26,13 +26,11 @@ const DISTANT: f64 = 0.5;
 pub struct Emitter<S> {
     surface: Surface<S>,
     sides: Sides<S>,
-    /// Radiance at intensity 1.
     pub radiance: S,
     /// Centre of a bounding sphere of all sampled points, relative to the scene's centre.
     pub center: DVec3,
     /// Radius of that bounding sphere.
     pub radius: f64,
-    /// Area of the surface.
     pub area: f64,
 }
 
@@ -52,8 +50,7 @@ enum Surface<S> {
         axes: [[S; 3]; 3],
         radius: S,
     },
-    /// Up to [`MAX_FACES`] triangles. The triangle to sample is chosen in proportion to its solid
-    /// angle.
+    /// Up to [`MAX_FACES`] triangles, chosen in proportion to their solid angles.
     Faces {
         triangles: Vec<Triangle<S>>,
         /// `true` if the triangles enclose a convex solid; no triangle then occludes another.
@@ -65,8 +62,7 @@ enum Surface<S> {
         /// 1 - cos(angular radius).
         one_minus_cos: S,
     },
-    /// More than [`MAX_FACES`] triangles. The triangle to sample is chosen in proportion to its
-    /// area.
+    /// More than [`MAX_FACES`] triangles, chosen in proportion to their areas.
     Mesh(Vec<Triangle<S>>),
 }
 
@@ -107,7 +103,6 @@ impl<S: Float> Sides<S> {
 
 /// Sampled point of an emitter, as seen from the receiver.
 pub(super) struct PointSample<L: SimdFloat> {
-    /// Unit vector from the receiver towards the point.
     pub wi: Vec3<L>,
     pub distance: L,
     /// Density \[1/sr\] of the directions that other triangles share with this one.
@@ -197,7 +192,6 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Returns `true` for a disk at an infinite distance.
     pub fn is_distant(&self) -> bool {
         self.area == f64::INFINITY
     }
@@ -250,9 +244,9 @@ impl<S: Float> Emitter<S> {
     /// Samples a point of the surface for each of the receivers at `origin`. `u` and `v` are uniform
     /// in [0, 1).
     ///
-    /// A sphere or distant disk is sampled by the cone that it subtends, a rectangle by solid angle, a disk by area.
-    /// Of at most 32 triangles, one is chosen in proportion to its solid angle. Of more triangles,
-    /// one is chosen in proportion to its area. The chosen triangle is sampled by solid angle.
+    /// A sphere or distant disk is sampled by the cone that it subtends, a rectangle by solid
+    /// angle, a disk by area. Of at most 32 triangles, one is chosen in proportion to its solid
+    /// angle, of more in proportion to its area. The chosen triangle is sampled by solid angle.
     /// Rectangles and triangles whose solid angle is too small for this are sampled by area.
     #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
@@ -403,7 +397,6 @@ fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
     L::one() / (one_minus_cos * L::from_f64(TAU))
 }
 
-/// Returns the components of `v` along the three unit vectors `axes`.
 #[inline(always)]
 fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
     axes.map(|axis| Vec3::splat(axis).dot(v))

@@ -36,7 +36,6 @@ description! {
 }
 
 impl Environment {
-    /// Returns the name of the image file; `None` for a gradient.
     pub fn file(&self) -> Option<&str> {
         (!self.file.is_empty()).then_some(self.file.as_str())
     }
@@ -87,7 +86,6 @@ impl LightDesc for Environment {
 /// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
-    /// Sine and cosine of the environment's rotation about the vertical.
     rotation: (f64, f64),
 }
 
@@ -101,23 +99,19 @@ impl EnvironmentLight {
         Some(Self { map, rotation: environment.rotation.to_radians().sin_cos() })
     }
 
-    /// Returns the image of the environment. For a gradient, this is the image of one column that
-    /// represents it.
     pub fn map(&self) -> &RadianceMap {
         &self.map
     }
 
-    /// Rotates `direction` of lane `lane` from scene coordinates into the coordinates of the
-    /// environment image.
+    /// Rotates a direction from scene coordinates into those of the image.
     fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
         let (sin, cos) = self.rotation;
         let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
         [x * cos - z * sin, y, x * sin + z * cos]
     }
 
-    /// Returns two values for the unit vectors `direction`: the radiance that arrives from them,
-    /// and the density \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero
-    /// outside of `lanes`.
+    /// Returns the radiance that arrives from the unit vectors `direction`, and the density
+    /// \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero outside `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
         let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
@@ -140,11 +134,11 @@ impl EnvironmentLight {
         let (mut wi, mut irradiance) = ([[0.0, 1.0, 0.0]; MAX_WIDTH], [[0.0; 3]; MAX_WIDTH]);
         let mut density = [1.0; MAX_WIDTH];
         for_each(lanes, |lane| {
-            let (direction, p) = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
-            let [x, y, z] = direction;
+            let sample = self.map.sample(u.lane(lane).to_f64(), v.lane(lane).to_f64());
+            let [x, y, z] = sample.direction;
             wi[lane] = [x * cos + z * sin, y, z * cos - x * sin];
-            irradiance[lane] = self.map.radiance(direction).map(|l| l / p);
-            density[lane] = p;
+            irradiance[lane] = self.map.radiance(sample.direction).map(|l| l / sample.density);
+            density[lane] = sample.density;
         });
         LightSample {
             wi: Vec3::from_fn(|lane| wi[lane].map(L::Scalar::from_f64)),

@@ -4,14 +4,11 @@ use crate::light::{Environment, Spot};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Light in canonical form.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightForm<'a> {
-    /// Light from one point.
     Point {
-        /// Position of the light.
         position: DVec3,
-        /// Cone that limits the light; `None` if it goes in all directions.
+        /// `None` for light in all directions.
         cone: Option<&'a Spot>,
     },
     /// Light from infinitely far away.
@@ -23,7 +20,6 @@ pub enum LightForm<'a> {
     },
     /// Light from a surface without a body: rays pass through it, and it casts no shadow.
     Surface(EmissiveSurface),
-    /// Light from all directions.
     Environment(&'a Environment),
 }
 
@@ -38,32 +34,22 @@ impl LightForm<'_> {
     }
 }
 
-/// Surface that emits light.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EmissiveSurface {
-    /// Sphere.
     Sphere {
-        /// Centre of the sphere.
         center: DVec3,
-        /// Radius of the sphere.
         radius: f64,
     },
-    /// Rectangle.
     Rectangle {
-        /// Centre of the rectangle.
         center: DVec3,
         /// Unit vectors across and up the rectangle, and along the normal of its front.
         axes: [DVec3; 3],
-        /// Width and height of the rectangle.
         size: [f64; 2],
     },
-    /// Disk.
     Disk {
-        /// Centre of the disk.
         center: DVec3,
         /// Perpendicular unit vectors, the third of which is the normal of the disk's front.
         axes: [DVec3; 3],
-        /// Radius of the disk.
         radius: f64,
     },
     /// Triangles with areas greater than 0, counter-clockwise as seen from the front.
@@ -100,7 +86,6 @@ impl EmissiveSurface {
         }
     }
 
-    /// Returns the area of the surface.
     pub fn area(&self) -> f64 {
         match self {
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
@@ -123,8 +108,8 @@ impl EmissiveSurface {
         }
     }
 
-    /// Returns the size of the surface's details: the radius of a sphere or disk, the shorter side
-    /// of a rectangle, or the square root of the total area of triangles.
+    /// Returns the size of the surface's details: the shorter side of a rectangle, or the square
+    /// root of the total area of triangles.
     pub fn thickness(&self) -> f64 {
         match self {
             Self::Sphere { radius, .. } | Self::Disk { radius, .. } => *radius,

@@ -1,5 +1,7 @@
 //! Lights: their descriptions, one kind a file, and the compiled forms that kernels sample.
 
+#![allow(missing_docs, reason = "fields and variants whose names say it")]
+
 mod compiled;
 mod delta;
 mod directional;
@@ -34,24 +36,17 @@ use crate::value::{Color, Description, Field, ValidationError, choices};
 use glam::DVec3;
 use registry::LightTable;
 
-/// Light of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
-    /// Name of the light; may be empty.
+    /// May be empty.
     pub name: String,
-    /// Kind of the light, with the values of its keys.
     pub kind: LightKind,
-    /// Colour, by which the intensity is multiplied.
     pub color: Color,
-    /// Intensity in the unit that depends on the kind, `unit` and `falloff`.
+    /// In the unit that depends on `kind`, `unit` and `falloff`.
     pub intensity: f64,
-    /// Unit of the intensity of a light with a surface.
     pub unit: LightUnit,
-    /// Falloff of a point or spot light with the distance.
     pub falloff: Falloff,
-    /// `false` hides the light from the camera and from mirrors.
     pub visible: bool,
-    /// `false` switches the light off.
     pub on: bool,
 }
 
@@ -84,7 +79,7 @@ impl Light {
         self.kind.form()
     }
 
-    /// Returns the surface of a light with a size; `None` for any other light.
+    /// Returns the surface of a light with a size.
     pub fn surface(&self) -> Option<EmissiveSurface> {
         match self.form() {
             LightForm::Surface(surface) => Some(surface),
@@ -92,7 +87,7 @@ impl Light {
         }
     }
 
-    /// Returns the position of a point or spot light; `None` for any other light.
+    /// Returns the position of a point or spot light.
     pub fn apex(&self) -> Option<DVec3> {
         match self.form() {
             LightForm::Point { position, .. } => Some(position),
@@ -114,7 +109,6 @@ impl Light {
         }
     }
 
-    /// Returns the environment of an environment light; `None` for any other light.
     pub fn environment(&self) -> Option<&Environment> {
         match self.form() {
             LightForm::Environment(environment) => Some(environment),
@@ -122,7 +116,6 @@ impl Light {
         }
     }
 
-    /// Returns [`Light::environment`] as a mutable reference.
     pub fn environment_mut(&mut self) -> Option<&mut Environment> {
         match &mut self.kind {
             LightKind::Environment(environment) => Some(environment),
@@ -135,28 +128,25 @@ impl Light {
         }
     }
 
-    /// Returns the position of the light, or the centre of its surface. `None` for distant lights.
+    /// Returns the position of the light, or the centre of its surface.
     pub fn position(&self) -> Option<[f64; 3]> {
         self.kind.clone().handles().position.copied()
     }
 
-    /// Returns [`Light::position`] as a mutable reference.
     pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
         self.kind.handles().position
     }
 
     /// Returns the direction in which a directional light travels, the axis of a spot light, or the
-    /// normal of a rectangle or disk light; `None` for any other light.
+    /// normal of a rectangle or disk.
     pub fn direction(&self) -> Option<[f64; 3]> {
         self.kind.clone().handles().direction.copied()
     }
 
-    /// Returns [`Light::direction`] as a mutable reference.
     pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
         self.kind.handles().direction
     }
 
-    /// Returns the validation errors of the light's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kind_faults = self.kind.faults();
         let unused_key = if self.falloff == Falloff::InverseSquare && self.apex().is_none() {

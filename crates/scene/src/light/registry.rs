@@ -32,11 +32,10 @@ pub trait LightDesc: Description {
 /// Values of a light that determine its position and direction.
 #[derive(Debug, Default)]
 pub struct Handles<'a> {
-    /// Position of the light, or centre of its surface. `None` for distant lights.
+    /// Position of the light, or centre of its surface.
     pub position: Option<&'a mut [f64; 3]>,
     /// Direction in which the light travels, axis of its cone, or normal of its surface.
     pub direction: Option<&'a mut [f64; 3]>,
-    /// Direction of the height of a rectangle.
     pub up: Option<&'a mut [f64; 3]>,
 }
 
@@ -53,7 +52,6 @@ pub struct Placement {
 
 macro_rules! kinds {
     ($($(#[doc = $doc:literal])+ $key:ident => $variant:ident($kind:ident),)+) => {
-        /// Kind of a light, with the values of its keys.
         #[derive(Clone, Debug, PartialEq)]
         pub enum LightKind {
             $($(#[doc = $doc])+ $variant($kind),)+
@@ -78,7 +76,6 @@ macro_rules! kinds {
             ),
         )+];
 
-        /// Keys of the kinds of lights.
         pub const KIND_KEYS: &[&str] = &[$(stringify!($key)),+];
 
         impl LightKind {
@@ -103,14 +100,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the key of the kind.
             pub fn key(&self) -> &'static str {
                 match self {
                     $(Self::$variant(_) => stringify!($key),)+
                 }
             }
 
-            /// Converts the kind, which must be valid, to its canonical form.
             pub fn form(&self) -> LightForm<'_> {
                 match self {
                     $(Self::$variant(kind) => kind.form(),)+
@@ -161,7 +156,6 @@ macro_rules! kinds {
         }
 
         impl LightTable {
-            /// Returns the keys of kinds that are given, with their values.
             fn kinds(&mut self) -> Vec<(&'static str, LightKind)> {
                 let kinds = [
                     $(self.$key.take().map(|kind| (stringify!($key), LightKind::from(kind))),)+

@@ -4,31 +4,28 @@
 use std::f64::consts::TAU;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 
-/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle, as a
-/// multiple of the rounding error (epsilon) of the number type. Surfaces of smaller solid angle are
-/// sampled by area. At this solid angle, rounding moves the sampled points by 1e-5 of the surface's
-/// size.
+/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle,
+/// otherwise by area, in rounding errors of the number type. There, rounding moves the sampled
+/// points by 1e-5 of the surface's size.
 const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Returns the density \[1/sr\] of the directions to a flat surface on which points are sampled
-/// uniformly: distance^2 / (area cos(angle to the normal)). `distance` is the distance of the
-/// surface in the sampled direction. `height` is the coordinate of the surface along its normal,
-/// relative to the receiver. It is negative if the receiver is in front of the surface. Otherwise
-/// the density is zero.
+/// uniformly: distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the
+/// surface along its normal, relative to the receiver: negative if the receiver is in front of it;
+/// otherwise the density is zero.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
     density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
 }
 
-/// Cone of the directions from a receiver point to a spherical emitter. From a point inside of the
-/// sphere it contains all directions.
+/// Cone of the directions from a receiver to a sphere; all directions from inside the sphere.
 pub(super) struct Cone<L: SimdFloat> {
     pub axis: Vec3<L>,
     pub one_minus_cos: L,
-    /// Squared distance from the receiver point to the centre of the sphere.
+    /// Squared distance from the receiver to the centre of the sphere.
     pub distance2: L,
-    /// Lanes whose receiver point is inside of the sphere.
+    /// Lanes whose receiver is inside the sphere.
     pub inside: L::Mask,
 }
 
@@ -60,16 +57,15 @@ impl<L: SimdFloat> Cone<L> {
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Interval of the rectangle's coordinates along its width, relative to the receiver point.
+    /// Interval of coordinates along the width, relative to the receiver.
     x: [L; 2],
     y: [L; 2],
-    /// Coordinate of the rectangle's plane along its normal, relative to the receiver point;
-    /// negative if the point is in front of the rectangle.
+    /// Coordinate of the plane along the normal, relative to the receiver; negative if the receiver
+    /// is in front.
     height: L,
     area: L,
     solid_angle: L,
-    /// Lanes in which the rectangle is sampled by solid angle; in the others it is too small and is
-    /// sampled by area.
+    /// Lanes in which the rectangle is large enough to be sampled by solid angle.
     by_angle: L::Mask,
 }
 
@@ -87,8 +83,8 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         Self { x, y, height: z, area, solid_angle, by_angle }
     }
 
-    /// Samples a point of the rectangle. Returns its coordinates across and up, relative to the
-    /// receiver point. `u` and `v` are uniform in [0, 1).
+    /// Samples a point by `u` and `v`, which are uniform in [0, 1). Returns its coordinates across
+    /// and up, relative to the receiver.
     #[inline(always)]
     pub fn sample(&self, u: L, v: L) -> [L; 2] {
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
@@ -129,10 +125,9 @@ impl<L: SimdFloat> SphericalRectangle<L> {
     }
 }
 
-/// Returns the solid angle of a rectangle as the sum of the solid angles of two triangles. The
-/// formula of Van Oosterom and Strackee (1983) for a triangle is an arc tangent, which has no
-/// cancellation at small angles. `[x0, x1]` and `[y0, y1]` are the intervals of the rectangle's
-/// coordinates relative to the receiver point, and `z` is the coordinate of its plane.
+/// Returns the solid angle of a rectangle as the sum of two triangles. The formula of Van Oosterom
+/// and Strackee (1983) for a triangle is an arc tangent, which has no cancellation at small angles.
+/// The parameters are those of [`SphericalRectangle`].
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {
@@ -159,8 +154,7 @@ pub(super) struct SphericalTriangle<L: SimdFloat> {
     /// Volume of the parallelepiped that the three unit vectors span.
     volume: L,
     pub solid_angle: L,
-    /// Lanes in which the triangle is sampled by solid angle; in the others it is too small and is
-    /// sampled by area.
+    /// Lanes in which the triangle is large enough to be sampled by solid angle.
     pub by_angle: L::Mask,
 }
 

@@ -57,8 +57,7 @@ impl LightDesc for Spot {
     }
 }
 
-/// Largest value of [`SpotCone::scale`], the reciprocal width of the cone's soft edge. A cone
-/// without a soft edge gets this value, which is finite in single precision.
+/// Largest value of [`SpotCone::scale`], of a cone without a soft edge; finite in single precision.
 const SHARP: f64 = 1e30;
 
 /// Cone of a spot light. It gives the factor, 0..=1, by which the light's intensity is multiplied
@@ -73,20 +72,18 @@ const SHARP: f64 = 1e30;
 pub struct SpotCone<S> {
     /// Unit vector from lit points on the cone's axis towards the light.
     pub axis: [S; 3],
-    /// Value of s = 1 - cos(angle to the axis) at the outer cone.
+    /// Value of s at the outer cone.
     pub outer: S,
-    /// Reciprocal width of the cone's soft edge: 1 / (s_outer - s_inner), at most `SHARP`, where s
-    /// = 1 - cos(angle to the axis).
+    /// Reciprocal width of the soft edge: 1 / (s_outer - s_inner), at most `SHARP`.
     pub scale: S,
 }
 
-/// Value of [`SpotCone::outer`] for a cone that contains all directions. Rounding may give s =
-/// 1 - cos(angle to the axis) a value above 2, its exact maximum, so the limit is larger.
+/// Value of [`SpotCone::outer`] for all directions: above 2, the largest value of s, because of
+/// rounding.
 const ALL_DIRECTIONS: f64 = 3.0;
 
 impl<S: Float> SpotCone<S> {
-    /// Returns the cone of a light that emits equally in all directions. The cone's factor of the
-    /// intensity is exactly 1.
+    /// Returns the cone of all directions, whose factor is exactly 1.
     pub fn of_all_directions() -> Self {
         let axis = [0.0, 1.0, 0.0].map(S::from_f64);
         Self { axis, outer: S::from_f64(ALL_DIRECTIONS), scale: S::from_f64(SHARP) }
@@ -107,8 +104,6 @@ impl<S: Float> SpotCone<S> {
         }
     }
 
-    /// Returns the factor of the spot's intensity, 0..=1, at surface points. `wi` is the unit
-    /// vector from each point to the light.
     #[inline(always)]
     pub(super) fn factor<L: SimdFloat<Scalar = S>>(&self, wi: Vec3<L>) -> L {
         let Self { axis, outer, scale } = *self;
@@ -116,9 +111,8 @@ impl<S: Float> SpotCone<S> {
     }
 }
 
-/// Returns the factor of a spot's intensity, 0..=1, at surface points. Each lane has a spot of its
-/// own; `axis`, `outer` and `scale` are the fields of its [`SpotCone`]. `wi` is the unit vector
-/// from each point to its light.
+/// Returns the factor of a spot's intensity, 0..=1, at surface points. `axis`, `outer` and `scale`
+/// are the fields of each lane's [`SpotCone`]. `wi` is the unit vector from the point to the light.
 #[inline(always)]
 pub fn spot_factor<L: SimdFloat>(wi: Vec3<L>, axis: Vec3<L>, outer: L, scale: L) -> L {
     let s = (wi - axis).length_squared() * L::from_f64(0.5);

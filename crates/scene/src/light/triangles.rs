@@ -6,17 +6,15 @@ use crate::light::solid_angle::{SphericalTriangle, density_of_area};
 use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 
-/// Largest number of triangles of an emitter up to which the triangle to sample is chosen in
-/// proportion to its solid angle. For this choice, the solid angles of all triangles are computed
-/// for each receiver.
+/// Largest number of triangles that are chosen in proportion to their solid angles, which are
+/// computed for each receiver.
 pub(super) const MAX_FACES: usize = 32;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle<S> {
     corner: [S; 3],
-    /// Edges from the first corner of the triangle to the two others.
+    /// From the first corner of the triangle to the two others.
     edges: [[S; 3]; 2],
-    /// Unit normal of the triangle's front.
     normal: [S; 3],
     area: S,
     /// Start of the range of random numbers in [0, 1) for which this triangle is chosen by area;
@@ -91,7 +89,6 @@ pub(super) struct FacesSeen<'a, L: SimdFloat> {
     origin: Vec3<L>,
     /// Solid angle of each triangle that emits light to the receiver; 0 for the others.
     angles: [L; MAX_FACES],
-    /// Sum of all `angles`.
     total: L,
     /// Lanes in which backs of triangles may emit light to the receiver: never from a convex solid
     /// to a receiver outside it.
@@ -99,8 +96,7 @@ pub(super) struct FacesSeen<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> FacesSeen<'a, L> {
-    /// Computes the solid angles of `triangles` from the receivers at `origin`. `convex` is `true`
-    /// if they enclose a convex solid.
+    /// `convex` is `true` if the triangles enclose a convex solid.
     #[inline(always)]
     pub fn new(
         triangles: &'a [Triangle<L::Scalar>],
@@ -156,7 +152,6 @@ impl<'a, L: SimdFloat> FacesSeen<'a, L> {
     }
 }
 
-/// Returns an array with the value of `f` for each lane number.
 #[inline(always)]
 fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
     let mut out = [0; MAX_WIDTH];
@@ -168,9 +163,7 @@ fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
 
 /// Triangle in each lane, with the receiver of light at the origin.
 struct PacketTriangle<L> {
-    /// Corners of the triangle relative to the receiver.
     corners: [Vec3<L>; 3],
-    /// Unit normal of the triangle's front.
     normal: Vec3<L>,
     /// Start of the range of random numbers in [0, 1) for which the triangle is chosen.
     start: L,
@@ -182,7 +175,6 @@ struct PacketTriangle<L> {
 /// Lifted triangle as seen from the receiver.
 struct SeenTriangle<L: SimdFloat> {
     spherical: SphericalTriangle<L>,
-    /// Corners relative to the receiver.
     corners: [Vec3<L>; 3],
     /// Coordinate of the triangle's plane relative to the receiver, along the normal of the side to
     /// which the triangle is lifted. Negative in lanes whose receiver gets light.
@@ -190,7 +182,7 @@ struct SeenTriangle<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> PacketTriangle<L> {
-    /// Returns the same triangle in all lanes, relative to the receivers at `origin`.
+    /// Returns the same triangle in all lanes.
     #[inline(always)]
     fn splat(triangle: &Triangle<L::Scalar>, origin: Vec3<L>) -> Self {
         let corner = Vec3::splat(triangle.corner) - origin;
@@ -205,8 +197,8 @@ impl<L: SimdFloat> PacketTriangle<L> {
         }
     }
 
-    /// Gathers the triangles with the given index in each lane, relative to the receivers at
-    /// `origin`. An index past the end counts as the last triangle.
+    /// Gathers the triangle with the given index in each lane. An index past the end counts as the
+    /// last triangle.
     #[inline(always)]
     fn gather(
         triangles: &[Triangle<L::Scalar>],

@@ -41,7 +41,9 @@ impl<S: Float> Reflectance<S> {
         let mode = material.fresnel_mode();
         let index2 = match mode {
             Fresnel::Dielectric => [material.ior.powi(2) - 1.0; 3],
-            _ => f0.map(|f| index_from_f0(f).powi(2) - 1.0),
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => {
+                f0.map(|f| index_from_f0(f).powi(2) - 1.0)
+            }
         };
         let total = f0.map(|f| f >= 1.0 - f64::powi(2.0, -24));
         Self {

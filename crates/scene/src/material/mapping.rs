@@ -87,7 +87,9 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
         (Projection::Planar, Some(Axis::Y)) => [x, -z, y],
         (Projection::Spherical | Projection::Cylindrical, Some(Axis::X)) => [z, x, y],
         (Projection::Spherical | Projection::Cylindrical, Some(Axis::Z)) => [y, z, x],
-        _ => [x, y, z],
+        (Projection::Planar, None | Some(Axis::Z))
+        | (Projection::Spherical | Projection::Cylindrical, None | Some(Axis::Y))
+        | (Projection::Box | Projection::Uv, _) => [x, y, z],
     };
     DMat3::from_cols(rows[0], rows[1], rows[2]).transpose()
 }

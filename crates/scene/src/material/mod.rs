@@ -16,7 +16,7 @@ pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
 pub use microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
 pub use refraction::{FresnelSplit, Interface};
-pub use rough_interface::{InterfaceQuery, InterfaceSample};
+pub use rough_interface::{InterfaceMedia, InterfaceQuery, InterfaceSample};
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,
@@ -173,7 +173,7 @@ impl Material {
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
-            _ => Color::WHITE,
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => Color::WHITE,
         };
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }

@@ -1,4 +1,4 @@
-//! Reflection and transmission at rough interfaces between transparent query.
+//! Reflection and transmission at rough interfaces between transparent media.
 //!
 //! Each microfacet reflects and refracts like clear glass, about its own normal (Walter et al.
 //! 2007, *Microfacet Models for Refraction through Rough Surfaces*). The lobes `cone` and `square`
@@ -14,11 +14,9 @@ use zerkalo_kernel::sampling::warp;
 /// to the incident ones: the half vector then has at most three valid digits in single precision.
 const MIN_REFRACTION: f64 = 1e-3;
 
-/// Incident rays at interfaces, for which a BSDF is sampled or evaluated.
+/// Media on both sides of an interface, and the side from which rays arrive.
 #[derive(Clone, Copy, Debug)]
-pub struct InterfaceQuery<L: SimdFloat> {
-    /// Incident rays, and the normal of the surface.
-    pub rays: BsdfQuery<L>,
+pub struct InterfaceMedia<L: SimdFloat> {
     /// Index of refraction on the side of the incident rays.
     pub n_i: L,
     /// Index of refraction behind the interface; at a thin surface, the index of its material.
@@ -27,6 +25,15 @@ pub struct InterfaceQuery<L: SimdFloat> {
     pub outer: L::Mask,
     /// Lanes of thin surfaces, which bound no solid and do not refract.
     pub thin: L::Mask,
+}
+
+/// Incident rays at interfaces, for which a BSDF is sampled or evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct InterfaceQuery<L: SimdFloat> {
+    /// Incident rays, and the normal of the surface.
+    pub rays: BsdfQuery<L>,
+    /// Media of the interface.
+    pub media: InterfaceMedia<L>,
     /// Lanes in which the reflection lobe of the BSDF counts; total internal reflection counts in
     /// all lanes.
     pub reflecting: L::Mask,
@@ -36,14 +43,15 @@ impl<L: SimdFloat> InterfaceQuery<L> {
     /// Returns the refraction at facets with the unit normal `normal`.
     #[inline(always)]
     pub fn interface(&self, normal: Vec3<L>) -> Interface<L> {
-        Interface::new(self.rays.incident, normal, self.n_i, self.n_t)
+        Interface::new(self.rays.incident, normal, self.media.n_i, self.media.n_t)
     }
 
     /// Returns the lanes with equal indices of refraction on both sides of the interface, except
     /// those of thin surfaces. Rays are not refracted in these lanes, even by a rough surface.
     #[inline(always)]
     fn same(&self) -> L::Mask {
-        (self.n_i.le(self.n_t) & self.n_t.le(self.n_i)).and_not(self.thin)
+        (self.media.n_i.le(self.media.n_t) & self.media.n_t.le(self.media.n_i))
+            .and_not(self.media.thin)
     }
 }
 
@@ -104,11 +112,11 @@ impl<S: Float> Bsdf<S> {
         let k_r = self.strength::<L>().masked(query.reflecting);
         let fresnel = self.reflection_fresnel.times(|| vh, k_r * shares.reflected * shadowing);
         let mirrored = n.mul_add(nl * L::from_f64(-2.0), reflected);
-        let transmitted = Vec3::select(query.thin, mirrored, interface.refracted);
+        let transmitted = Vec3::select(query.media.thin, mirrored, interface.refracted);
         let (nt, lh) = (-transmitted.dot(n), -transmitted.dot(h));
         let behind = facets.shadowing_behind((nh, nv, vh), (nt, lh));
         let behind = behind.masked(valid & nt.gt(zero) & lh.gt(zero));
-        let passed = L::select(query.same(), one, L::select(query.thin, shadowing, behind));
+        let passed = L::select(query.same(), one, L::select(query.media.thin, shadowing, behind));
         InterfaceSample {
             reflected,
             reflected_weight: fresnel + Vec3::gray(shares.tir * shadowing),
@@ -132,7 +140,7 @@ impl<S: Float> Bsdf<S> {
         let sample = self.sample(&query.rays, uv);
         let kept = one.masked(sample.direction.dot(n).gt(zero));
         let reflection = sample.weight.masked(query.reflecting) * shares.reflected;
-        let straight = Vec3::select(query.thin, incident, interface.refracted);
+        let straight = Vec3::select(query.media.thin, incident, interface.refracted);
         let direction = spread(&self.lobe, straight, uv);
         let wrong = direction.dot(n).ge(zero);
         let (direction, passed) = if fold {
@@ -160,7 +168,7 @@ impl<S: Float> Bsdf<S> {
     ) -> L {
         let axis = || {
             let refracted = query.interface(query.rays.normal).refracted;
-            Vec3::select(query.thin, query.rays.incident, refracted).renormalize()
+            Vec3::select(query.media.thin, query.rays.incident, refracted).renormalize()
         };
         let density = match &self.lobe {
             ReflectionLobe::Mirror => L::from_f64(L::MAX),
@@ -215,12 +223,14 @@ impl<S: Float> Bsdf<S> {
         let reflected = self.reflection_fresnel.times(|| vh, k_r * shares.reflected * shadowing)
             + Vec3::gray(shares.tir * shadowing);
         let through = facets.shadowing_behind((nh, nv, vh), (no, oh));
-        let passed = shares.transmitted * L::select(query.thin, shadowing, through);
+        let passed = shares.transmitted * L::select(query.media.thin, shadowing, through);
         let value = Vec3::select(behind, Vec3::gray(passed), reflected) * density;
         // At nearly equal indices the half vector of refraction has too few valid digits, because
         // it is the difference of two nearly equal vectors.
-        let same = behind.and_not(query.thin)
-            & (query.n_t - query.n_i).abs().le(query.n_i * L::from_f64(MIN_REFRACTION));
+        let same = behind.and_not(query.media.thin)
+            & (query.media.n_t - query.media.n_i)
+                .abs()
+                .le(query.media.n_i * L::from_f64(MIN_REFRACTION));
         let possible = density.gt(L::zero()).and_not(same);
         BsdfValue {
             value: value.masked(possible),
@@ -262,7 +272,9 @@ impl<S: Float> Bsdf<S> {
         query: &InterfaceQuery<L>,
     ) -> FresnelSplit<L> {
         match &self.transmission {
-            Some(transmission) => interface.split(transmission, query.outer, query.thin),
+            Some(transmission) => {
+                interface.split(transmission, query.media.outer, query.media.thin)
+            }
             None => FresnelSplit { reflected: L::one(), transmitted: L::zero(), tir: L::zero() },
         }
     }
@@ -301,9 +313,9 @@ fn facet<L: SimdFloat>(
     behind: L::Mask,
 ) -> Facet<L> {
     let BsdfQuery { incident, normal: n, .. } = query.rays;
-    let refracts = behind.and_not(query.thin);
+    let refracts = behind.and_not(query.media.thin);
     let reflected = Vec3::select(behind, direction.reflect(n), direction) - incident;
-    let refracted = direction * query.n_t - incident * query.n_i;
+    let refracted = direction * query.media.n_t - incident * query.media.n_i;
     let half = Vec3::select(refracts, refracted, reflected);
     // Points the half vector to the viewer's side.
     let half = half * L::one().copysign(half.dot(n));
@@ -315,8 +327,11 @@ fn facet<L: SimdFloat>(
     let (no, oh) = (direction.dot(n), direction.dot(h));
     let (no, oh) = (L::select(behind, -no, no), L::select(behind, -oh, oh));
     let (d, visible) = (facets.density(tan2), facets.visibility(nh, nv, vh));
-    let jacobian =
-        L::select(refracts, query.n_t * query.n_t * oh / length2, L::from_f64(0.25) / vh);
+    let jacobian = L::select(
+        refracts,
+        query.media.n_t * query.media.n_t * oh / length2,
+        L::from_f64(0.25) / vh,
+    );
     let zero = L::zero();
     let valid = vh.gt(zero) & nv.gt(zero) & no.gt(zero);
     let valid = valid.and_not(refracts.and_not(oh.gt(zero)));

@@ -334,6 +334,19 @@ impl FlowControl {
         }
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
+        self.measure_rate(frame, at, last_acked, known);
+        true
+    }
+
+    /// Updates the rate by the acknowledgement of `frame` at `at`. `last_acked` is the previous one,
+    /// and `known` the known round trip, if it is not too long.
+    fn measure_rate(
+        &mut self,
+        frame: InFlight,
+        at: Duration,
+        last_acked: Option<[Duration; 2]>,
+        known: Option<Duration>,
+    ) {
         // The rate is the number of bytes divided by the time in which replies to them could
         // arrive: from 0.9 to 1 round trips after the frame was sent, but not before the previous
         // acknowledgement, to the acknowledgement. A round trip longer than that is not used.
@@ -373,7 +386,6 @@ impl FlowControl {
                 self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
             }
         }
-        true
     }
 
     /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.

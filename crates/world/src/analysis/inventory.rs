@@ -12,47 +12,12 @@ use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
 /// commas, in one line.
 pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
-    let (bsdfs, groups) = (&world.bsdfs, &world.groups.members);
+    let groups = &world.groups.members;
     let (emissive, unsampled) = world.emitters.object_counts();
-    let any_specular =
-        |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
-    let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
-        bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
-    };
-    let any_transmission = |dielectric: bool| {
-        let is_kind = |t: &Transmission<L::Scalar>| t.dielectric == dielectric;
-        bsdfs.iter().any(|bsdf| bsdf.transmission.as_ref().is_some_and(is_kind))
-    };
-    let any_facets = |test: fn(&FacetNormals) -> bool| {
-        let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
-        bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
-            ReflectionLobe::MicrofacetDistribution(facets) => test(&facets.normals),
-            ReflectionLobe::Mirror
-            | ReflectionLobe::Cone { .. }
-            | ReflectionLobe::Square { .. } => false,
-        })
-    };
-    let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
     let mut parts = vec![world.geometry.to_string()];
     let textures = world.surface_textures.as_ref().map(SurfaceTextures::features);
     parts.extend(textures.into_iter().flatten().map(String::from));
-    parts.extend(present([
-        (any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong"),
-        (
-            any_specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
-            "Cook-Torrance",
-        ),
-        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
-        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
-        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),
-        (any_facets(|normals| matches!(normals, FacetNormals::Beckmann)), "Beckmann lobe"),
-        (any_facets(|normals| matches!(normals, FacetNormals::Ggx)), "GGX lobe"),
-        (any_transmission(false), "transmission"),
-        (any_transmission(true), "dielectric"),
-        (bsdfs.iter().any(|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
-        (bsdfs.iter().any(Bsdf::absorbs), "absorption"),
-        (absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)), "absorbing horizon"),
-    ]));
+    parts.extend(material_features(scene, world));
     let counted = |n: usize, name: &str| match n {
         0 => None,
         1 => Some(format!("1 {name}")),
@@ -61,7 +26,10 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     let light_count = |kind: &str| {
         let is_kind = |source: &&LightGroupSource| match source {
             LightGroupSource::Light(i) => scene.lights[*i].kind.key() == kind,
-            _ => false,
+            LightGroupSource::Ambient
+            | LightGroupSource::Background
+            | LightGroupSource::Material(_)
+            | LightGroupSource::Shared(_) => false,
         };
         groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
     };
@@ -91,6 +59,50 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     ]));
     parts.push(format!("{} precision", if L::EPSILON > 1e-10 { "single" } else { "double" }));
     parts.join(", ")
+}
+
+/// Returns the features of the materials of `world`.
+fn material_features<L: SimdFloat>(
+    scene: &Scene,
+    world: &World<L>,
+) -> impl Iterator<Item = String> {
+    let bsdfs = &world.bsdfs;
+    let any_specular =
+        |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
+    let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
+        bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
+    };
+    let any_transmission = |dielectric: bool| {
+        let is_kind = |t: &Transmission<L::Scalar>| t.dielectric == dielectric;
+        bsdfs.iter().any(|bsdf| bsdf.transmission.as_ref().is_some_and(is_kind))
+    };
+    let any_facets = |test: fn(&FacetNormals) -> bool| {
+        let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
+        bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
+            ReflectionLobe::MicrofacetDistribution(facets) => test(&facets.normals),
+            ReflectionLobe::Mirror
+            | ReflectionLobe::Cone { .. }
+            | ReflectionLobe::Square { .. } => false,
+        })
+    };
+    let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
+    present([
+        (any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong"),
+        (
+            any_specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
+            "Cook-Torrance",
+        ),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
+        (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Beckmann)), "Beckmann lobe"),
+        (any_facets(|normals| matches!(normals, FacetNormals::Ggx)), "GGX lobe"),
+        (any_transmission(false), "transmission"),
+        (any_transmission(true), "dielectric"),
+        (bsdfs.iter().any(|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
+        (bsdfs.iter().any(Bsdf::absorbs), "absorption"),
+        (absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)), "absorbing horizon"),
+    ])
 }
 
 /// Returns the names in `features` whose flag is `true`: the features that are present.

@@ -1,12 +1,10 @@
-//! Choice between single and double precision. Single precision is chosen if its errors are too
-//! small to be visible.
+//! Choice between single and double precision: single if its errors are too small to be visible.
 //!
 //! In single precision a coordinate is exact to about 2^-23 of the scene's extent, and rays that
-//! leave a surface start 2^-20 of the extent above it (the ray offset). Details smaller than a few
-//! ray offsets are lost: thin objects, gaps between objects, the surroundings of a light, and the
-//! part of a close object that one pixel shows. For each kind of detail, a constant below is the
-//! largest permitted ratio of the scene extent to the size of the detail.
-//! `tests/extremes/precision.rs` measures the errors of single precision at each ratio.
+//! leave a surface start 2^-20 of the extent above it (the *ray offset*). Details smaller than a
+//! few ray offsets are lost. For each kind of detail, a constant below is the largest permitted
+//! ratio of the scene extent to its size. `tests/extremes/precision.rs` measures the errors at each
+//! ratio.
 
 use crate::analysis::clearance::clearance;
 use glam::DVec3;
@@ -17,31 +15,27 @@ use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::EmissiveSurface;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
-/// Limit of single precision: the largest permitted ratio of scene extent to the thickness of an
-/// object. At this ratio the ray offset is 1/128 of the thickness.
+/// Largest ratio to the thickness of an object: the ray offset is 1/128 of the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// Limit of single precision: the largest permitted ratio of scene extent to the width of a gap
-/// between objects. At this ratio the gap is eight ray offsets wide.
+/// Largest ratio to the width of a gap between objects: the gap is eight ray offsets wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// Limit of single precision: the largest permitted ratio of scene extent to the side of a pixel's
-/// footprint on the object closest to the eye. At this ratio the side is 32 ray offsets.
+/// Largest ratio to the side of a pixel's footprint on the object closest to the eye: the side is
+/// 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which flat objects may be closer to the eye than curved ones, for single precision.
-/// Flat objects have smaller errors: a hit point is moved back to the plane almost exactly, and the
-/// normal is constant.
+/// Factor by which flat objects may be closer to the eye than curved ones: a hit point is moved
+/// back to the plane almost exactly, and the normal is constant.
 const FLAT: f64 = 8.0;
 
-/// Limit of single precision: the largest permitted ratio of scene extent to the distance of a
-/// light from objects. At this ratio the ray offset is 1/512 of the distance, and the direction to
-/// the light is wrong by 1/512 radians.
+/// Largest ratio to the distance of a light from objects: the direction to the light is wrong by
+/// 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
-/// Limit of single precision: the smallest permitted angle between the rays of neighbouring pixels
-/// \[radians\], which is 64 times the rounding error of a direction. A lens with the radius r,
-/// focused at the distance d, raises this limit by the factor 1 + r / d.
+/// Smallest angle between the rays of neighbouring pixels \[radians\], 64 times the rounding error
+/// of a direction. A lens with the radius r, focused at the distance d, raises it by the factor 1 +
+/// r / d.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
 /// Smallest width of a gap, as a fraction of the scene extent, at which two surfaces are separate:
@@ -49,13 +43,13 @@ const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 /// coordinates, are treated as coincident.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// Largest number of pairs of objects that are searched for gaps, to limit the time of the search.
-/// Further pairs count as pairs without a gap.
+/// Largest number of pairs of objects that are searched for gaps. Further pairs count as pairs
+/// without a gap.
 const MOST_PAIRS: usize = 1 << 20;
 
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
-/// `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude
-/// of a coordinate of the objects and the lens, relative to `origin`.
+/// `forms` are all objects, relative to `origin`. `extent` is the largest magnitude of a coordinate
+/// of the objects and the lens.
 pub(crate) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
@@ -105,16 +99,15 @@ fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// Two values for a gap that widens around its closest point: this point, and the radius of a
-    /// sphere whose gap to a plane widens in the same way. `None` if the faces are parallel planes.
+    /// Closest point of a gap that widens around it, and the radius of a sphere whose gap to a
+    /// plane widens in the same way. `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 
 impl Clearance {
     /// Returns `true` if the smallest width of the gap is in the range `narrow`, and the region in
     /// which the gap is narrower than the end of this range is wider than a pixel. `pixel` returns
-    /// the side of a pixel's footprint at a point. A sphere on a floor, for example, is close to
-    /// the floor only in a spot that is too small to see.
+    /// the side of a pixel's footprint at a point.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);
@@ -122,9 +115,8 @@ impl Clearance {
     }
 }
 
-/// Returns up to two gaps between two faces of different objects, at the points where the faces are
-/// closest. Two spheres have two gaps: side by side, and one inside of the other. A plane and a
-/// sphere have one. Two planes have one if they are parallel, otherwise none.
+/// Returns the gaps between two faces of different objects, at the points where the faces are
+/// closest. Two spheres have two gaps: side by side, and one inside the other.
 fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     match (a, b) {
         (ProxyFace::Flat(a), ProxyFace::Flat(b)) => {
@@ -158,8 +150,7 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     }
 }
 
-/// Returns `true` if two objects have a gap whose width is within `narrow` and that is large enough
-/// to see. `pixel` returns the side of a pixel's footprint at a point.
+/// Returns `true` if two objects have a gap that [`Clearance::is_seen`].
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
     let seen = |a: &ProxyFace, b: &ProxyFace| {
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))

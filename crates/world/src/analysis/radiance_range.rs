@@ -2,25 +2,23 @@
 //! number of integer steps per unit of radiance in the film.
 //!
 //! A pixel's sum has 63 bits, a sample at most 49 bits (`SimdFloat::fixed_sum`). Each sample is
-//! rounded to whole steps. If all samples of a pixel are equal, as on a diffuse surface, their mean
-//! has an error of up to half a step, which more samples do not reduce. The size of a step
-//! therefore has two bounds:
+//! rounded to whole steps. If all samples of a pixel are equal, their mean has an error of up to
+//! half a step, which more samples do not reduce. The size of a step therefore has two bounds:
 //!
 //! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
-//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
-//!   levels.
+//! brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
+//! levels.
+//!
 //! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
-//!   holds 2^19 samples in each replicate before its sum saturates. A replicate is one half of the
-//!   samples, so a pixel holds a million samples. Five bits remain for single samples that are
-//!   brighter.
+//! holds 2^19 samples in each replicate before its sum saturates. Five bits remain for single
+//! samples that are brighter.
 //!
 //! The two bounds are 28 bits apart. By default the typical radiance has 2^28 steps. The brightest
 //! spot may then be up to 2^16 times as bright as the typical radiance. The brightest spot of the
-//! dimmest surface may be down to 2^-12 times as bright as the typical radiance. If a scene exceeds
-//! both bounds, the bright end has precedence: a saturated sample changes the picture visibly, a
-//! sample smaller than a step does not. The dim end has precedence over two kinds of bright light:
-//! spots narrower than a quarter of a pixel, and light amplified by mirrors. Such samples may
-//! saturate; the film counts saturated samples.
+//! dimmest surface may be down to 2^-12 times as bright. If a scene exceeds both bounds, the bright
+//! end has precedence: a saturated sample changes the picture visibly, a sample smaller than a step
+//! does not. The dim end has precedence over spots narrower than a quarter of a pixel and light
+//! amplified by mirrors. Such samples may saturate; the film counts them.
 
 use crate::analysis::clearance::clearance;
 use crate::compile::RecenteredGeometry;
@@ -34,45 +32,42 @@ use zerkalo_scene::light::{CompiledLight, DeltaLight, Emitter};
 use zerkalo_scene::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use zerkalo_scene::{RayTypes, Scene};
 
-/// Number of bits of an integer sample whose radiance is typical of the scene.
+/// Bits of a sample whose radiance is typical of the scene.
 const TYPICAL_BITS: f64 = 28.0;
 
-/// Smallest number of bits of an integer sample at the brightest spot of the dimmest surface.
+/// Smallest number of bits of a sample at the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Largest number of bits of an integer sample at the brightest of all spots that are at least a
-/// quarter of a pixel wide.
+/// Largest number of bits of a sample at the brightest of all spots that are at least a quarter of
+/// a pixel wide.
 const BRIGHT_BITS: f64 = 44.0;
 
-/// Largest number of bits of any integer sample.
+/// Largest number of bits of any sample.
 const SAMPLE_BITS: f64 = 49.0;
 
-/// Largest number of bits by which the integer scale of samples is lowered for bright spots
-/// narrower than a quarter of a pixel.
+/// Largest number of bits by which the scale is lowered for bright spots narrower than a quarter of
+/// a pixel.
 const SPOT_BITS: f64 = 12.0;
 
-/// Estimates of the radiance of a light group's samples at several places of the scene. The integer
-/// scale of the film is chosen for this range.
+/// Estimates of the radiance of a light group's samples at several places of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RadianceRange {
     /// Radiance of a white surface in the middle of the scene, lit by the light group.
     pub typical: f64,
-    /// Radiance of the brightest spot of the dimmest surface: the minimum, over all surfaces, of
-    /// the radiance of their brightest spots.
+    /// Minimum, over all surfaces, of the radiance of their brightest spots.
     pub dimmest: f64,
-    /// Radiance of the brightest spot of the brightest surface: the maximum, over all surfaces, of
-    /// the radiance of their brightest spots. Spots smaller than a quarter of a pixel are ignored.
+    /// Maximum, over all surfaces, of the radiance of their brightest spots that are at least a
+    /// quarter of a pixel wide.
     pub brightest: f64,
-    /// Radiance of the brightest spot of the picture outside of highlights, however small the spot
-    /// is.
+    /// Largest radiance outside highlights, however small the spot is.
     pub spots: f64,
     /// Largest radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Returns this range of radiance for the same light with another emission. `least` and `most`
-    /// are the factors of the emission in the darkest and in the brightest channel.
+    /// Returns this range for the same light with another emission, whose factors in the darkest
+    /// and in the brightest channel are `least` and `most`.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -83,8 +78,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range of radiance that covers `self` and `other`, the ranges of two sources in
-    /// one light group.
+    /// Returns the range that covers those of two sources in one light group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -112,8 +106,8 @@ impl RadianceRange {
     }
 }
 
-/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. If `x` is
-/// multiplied by 2^k, the result is larger by exactly k.
+/// Returns the smallest integer `n` with 2^n >= `x`. If `x` is multiplied by 2^k, the result is
+/// larger by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -123,22 +117,19 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// Factors by which the materials of an object reflect direct light, relative to a white diffuse
-/// surface.
+/// Factors by which materials reflect direct light, relative to a white diffuse surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// Smallest factor by which the material reflects light, over all channels that are not black.
+    /// Smallest factor over all channels that are not black.
     least: f64,
-    /// Largest factor by which the material reflects light outside of highlights, over all
-    /// channels.
+    /// Largest factor outside highlights.
     most: f64,
-    /// Largest factor by which the highlights of a material reflect light.
+    /// Largest factor of highlights.
     peak: f64,
 }
 
 impl Response {
-    /// Computes the factors by which a material reflects direct light. Returns `None` if it
-    /// reflects none.
+    /// Returns `None` if the material reflects no direct light.
     fn new(material: &Material) -> Option<Self> {
         let diffuse = material.color.0.map(|c| c * material.diffuse);
         let specular = material.specular;
@@ -161,13 +152,12 @@ impl Response {
     }
 }
 
-/// Returns the smallest number above 0. Returns `None` if there is none.
 fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
 
-/// Returns the distance of a light at `point` from the bounding box `bounds` of an object. For a
-/// light inside of the box, it is half of the box's diagonal.
+/// Returns the distance of a light at `point` from a bounding box; inside the box, half of its
+/// diagonal.
 fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
     match box_distance(bounds, point) {
         away if away > 0.0 => away,
@@ -175,22 +165,19 @@ fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
     }
 }
 
-/// Distances and reflection factors of a scene without its lights, from which the
-/// [`RadianceRange`] of each light group is computed.
+/// Properties of a scene without its lights, from which the [`RadianceRange`] of each light group
+/// is computed.
 pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// Factors by which each object reflects direct light, over all its parts. `None` if it
-    /// reflects none.
+    /// Factors of each object over all its parts; `None` if it reflects no direct light.
     responses: Vec<Option<Response>>,
-    /// Factors by which the materials reflect ambient light: one for each material and channel.
+    /// Factors of ambient light, one for each material and channel.
     ambient: Vec<f64>,
-    /// Smallest factor by which a mirror or glass surface multiplies light, at most 1. Materials
-    /// that reflect direct light are not included.
+    /// Smallest factor, at most 1, of mirrors and glass without direct light.
     faintest: f64,
-    /// Largest factor by which all mirrors of a path together multiply light; at least 1.
+    /// Largest factor, at least 1, by which all mirrors of a path together multiply light.
     gain: f64,
-    /// Lower limit of the distance between a light and the scene's centre in the computation of the
-    /// typical radiance: a nearer light counts as if it were at this distance.
+    /// Distance from the scene's centre at which nearer lights count in the typical radiance.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -200,9 +187,8 @@ pub(crate) struct SceneDistances<'a> {
 }
 
 impl<'a> SceneDistances<'a> {
-    /// Computes the properties of `scene` that determine the ranges of radiance of its light
-    /// groups. `materials_of` returns the materials of the parts of an object. `epsilon` is the
-    /// rounding error of the world's precision.
+    /// `materials_of` returns the materials of the parts of an object. `epsilon` is the rounding
+    /// error of the world's precision.
     pub fn new(
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
@@ -247,27 +233,26 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the smallest and the largest factors by which objects of the scene reflect direct
-    /// light; all factors are 1 if no object reflects direct light.
+    /// Returns the factors over all objects; 1 if no object reflects direct light.
     fn response(&self) -> Response {
         let all = self.responses.iter().flatten().copied().reduce(Response::or);
         all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 })
     }
 
-    /// Returns the range of the radiance that ambient light of intensity 1 causes.
+    /// Returns the range for ambient light of intensity 1.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
         self.range_of(1.0, (least, most, most))
     }
 
-    /// Returns the range of the radiance of a background with intensity 1.
+    /// Returns the range for a background of intensity 1.
     pub fn background(&self) -> RadianceRange {
         self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Returns the range of the radiance that `light` causes at intensity 1. `visible` is `true` if
-    /// the camera and mirrors see it.
+    /// Returns the range for a light of intensity 1. `visible` is `true` if the camera and mirrors
+    /// see it.
     pub fn light<S: Float>(&self, light: &CompiledLight<S>, visible: bool) -> RadianceRange {
         match light {
             CompiledLight::Delta(delta) => self.delta(delta),
@@ -276,8 +261,6 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that surfaces reflect in the light of `light` alone, at
-    /// intensity 1.
     fn delta<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
@@ -286,8 +269,8 @@ impl<'a> SceneDistances<'a> {
         };
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
-        // The bright spot on a surface below a light is about as wide as the distance between light
-        // and surface. Spots smaller than a quarter of a pixel are ignored.
+        // The bright spot on a surface below a light is about as wide as the distance between them.
+        // Spots smaller than a quarter of a pixel are ignored.
         let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
         let spots = radiance_at(clearance(self.forms, position));
         let mut out =
@@ -318,8 +301,6 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that a light with a size causes at intensity 1. `visible`
-    /// is `true` if the camera and mirrors see it.
     fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
         if emitter.is_distant() {
             return self.distant_disk(emitter.radiance.to_f64(), visible);
@@ -347,8 +328,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that object `index` causes if it emits radiance 1. The
-    /// estimate uses the area of the bounding sphere in place of the object's area.
+    /// Returns the range for object `index` of radiance 1. The area of the object's bounding sphere
+    /// stands for its own.
     pub fn object(&self, index: usize) -> RadianceRange {
         match self.forms[index].bounds() {
             Some((low, high)) => {
@@ -363,11 +344,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that an emissive surface causes: the radiance that the
-    /// surfaces of the scene reflect towards the camera, from the dimmest to the brightest place.
-    /// The emissive surface is inside of the sphere with `center` and `radius`. `area` is the area
-    /// of the surface, and `emitted` is its radiance. If the camera and mirrors see the surface
-    /// itself (`visible`), the range also includes `emitted`.
+    /// Returns the range for a surface inside the sphere with `center` and `radius`, with the given
+    /// area and the radiance `emitted`, which counts itself if the surface is visible.
     fn emitting_surface(
         &self,
         (center, radius): (DVec3, f64),
@@ -412,8 +390,6 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that an environment causes at intensity 1. `visible` is
-    /// `true` if the camera and mirrors see it.
     fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
         let mean = map.mean().into_iter().fold(0.0, f64::max);
         let typical = if mean > 0.0 { mean } else { 1.0 };
@@ -422,9 +398,8 @@ impl<'a> SceneDistances<'a> {
         if !visible {
             return range;
         }
-        // Bright pixels of the environment's image may be smaller than a pixel of the picture.
-        // Their radiance therefore counts as `spots` but not as `brightest`, which is at least the
-        // mean of the image.
+        // Bright pixels of the image may be smaller than a pixel of the picture. They count as
+        // `spots` but not as `brightest`, which is at least the mean of the image.
         let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
         RadianceRange {
             dimmest: range.dimmest.min(dimmest * self.faintest),
@@ -435,9 +410,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of the radiance that surfaces reflect. `light` is the radiance of a white
-    /// surface. Surfaces multiply it by factors from `least` to `most`, and by `peak` in
-    /// highlights.
+    /// Returns the range for surfaces that multiply `light`, the radiance of a white surface, by
+    /// factors from `least` to `most`, and by `peak` in highlights.
     fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,

@@ -1,9 +1,4 @@
-//! Reuse of film samples after an edit: decides if the samples traced for one scene are valid for
-//! the edited scene.
-//!
-//! Descriptions of scenes are compared as a whole, by `==`. The few fields that may differ are set
-//! to equal values before the comparison, or are named in a pattern without `..`. A field that is
-//! added to a description later is therefore compared by default, or causes a compile error here.
+//! Reuse of film samples after an edit.
 
 use crate::lights::groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
@@ -47,9 +42,8 @@ impl LightGroups {
             && self.can_relight(compiled, scene)
     }
 
-    /// Returns `true` if the lights of `scene` allow the samples of `compiled` to be reused: they
-    /// differ at most in names, and in the emission of lights that have a group of their own.
-    /// Lights that do not emit are not compared.
+    /// Returns `true` if the lights of `scene` that emit differ at most in names, and in the
+    /// emission of lights that have a group of their own.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
             let contains = |source: &LightGroupSource| match source {
@@ -106,23 +100,20 @@ impl LightGroups {
     }
 }
 
-/// Returns a copy of `material` without its emission.
 fn without_emission(material: &Material) -> Material {
     Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
 }
 
-/// Returns a copy of the film settings without a limit on the samples per pixel of glossy tiles.
 fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// Returns a copy of the light without its name, switched on, white, and of intensity 1. The
-/// samples of a light in a group of its own are computed with this emission.
+/// Returns the light without its name and with the emission 1, with which samples of a group of its
+/// own are computed.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Returns the shape with the names of its parts' materials removed.
 fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     if shape.named_materials().is_empty() {
         return Cow::Borrowed(shape);
@@ -132,7 +123,6 @@ fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     Cow::Owned(shape)
 }
 
-/// Returns the material `name` of a scene; the default material if the scene does not define it.
 fn material<'a>(scene: &'a Scene, name: &str) -> Cow<'a, Material> {
     match scene.materials.get(name) {
         Some(material) => Cow::Borrowed(material),

@@ -6,8 +6,7 @@ use glam::DVec3;
 use zerkalo_scene::material::{Fresnel, Material, Texture};
 use zerkalo_scene::{Object, RayTypes, Scene};
 
-/// Returns the largest fraction of light that a material reflects and transmits together, over all
-/// channels and angles. `flat` is `true` for flat objects.
+/// Returns the largest fraction of light that a material reflects and transmits together.
 fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
     let f = match material.fresnel_mode() {
@@ -24,8 +23,8 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     }
 }
 
-/// Returns the largest fraction of light that a material reflects diffusely, over all channels. It
-/// is infinite for meshes, because vertex colours have no bound.
+/// Returns the largest diffuse albedo. It is infinite for meshes, because vertex colours have no
+/// bound.
 fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     let mut factor = 1.0f64;
     if let Some(Texture::Checker(checker)) = &material.texture {
@@ -38,7 +37,6 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
-/// Geometric properties of an object that determine how much light truncated paths lose.
 struct ObjectTraits {
     flat: bool,
     /// `true` if a ray that leaves the object outwards may hit it again.
@@ -70,32 +68,29 @@ impl ObjectTraits {
     }
 
     /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
-    /// convex object outwards cannot hit it again. A ray inside of the object can, but a path is
-    /// inside only if it starts there or was transmitted. Bump maps make no difference: a reflected
-    /// direction that would point into the surface is mirrored out of it, and a transmitted
-    /// direction that would point out of the surface is mirrored into it.
+    /// convex object outwards cannot hit it again. A ray inside can, but a path is inside only if
+    /// it starts there or was transmitted. Bump maps make no difference: directions on the wrong
+    /// side of the surface are mirrored to the right side.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
         self.concave || let_in || self.contains_eye && material.two_sided
     }
 }
 
-/// Largest factors by which surfaces of the scene multiply the throughput of a path. They bound the
-/// radiance that truncation loses.
+/// Largest factors by which surfaces multiply the throughput of a path. They bound the radiance
+/// that truncation loses.
 #[derive(Clone, Copy)]
 struct Reach {
-    /// Largest factor by which a single surface multiplies the throughput of a path.
+    /// Largest factor of a single surface.
     first: f64,
-    /// Largest product of the throughput factors of two surfaces that a path can hit one after the
-    /// other.
+    /// Largest product of the factors of two surfaces that a path can hit one after the other.
     round_trip_albedo: f64,
     /// `true` if some surface transmits light. Paths may then split at surfaces.
     through: bool,
 }
 
 impl Reach {
-    /// Computes the throughput factors of mirrors and glass. If `diffuse` is `true`, they include
-    /// the diffuse albedo of diffuse surfaces.
+    /// `diffuse` is `true` if the factors include the diffuse albedo.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
@@ -126,8 +121,7 @@ impl Reach {
         Self { first, round_trip_albedo, through }
     }
 
-    /// Returns w(n) of [`truncation_bounds`]: the largest possible sum of the throughputs of all
-    /// branches of a path after `n` surfaces.
+    /// Returns w(n) of [`truncation_bounds`].
     fn weight(&self, n: u32) -> f64 {
         let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
@@ -144,9 +138,9 @@ impl Reach {
         }
     }
 
-    /// Returns the largest possible sum of the throughputs of paths that end because their
-    /// throughput is below `least`. A path has up to `bounces` diffuse bounces, and up to `depth`
-    /// surfaces in each generation. A generation is the part of a path between two diffuse bounces.
+    /// Returns the largest possible sum of the throughputs of paths that end below `least`, with up
+    /// to `bounces` diffuse bounces and `depth` surfaces in each generation, the part of a path
+    /// between two diffuse bounces.
     fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
         let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
         (least + rest) * (f64::from(bounces) + 1.0)
@@ -166,29 +160,28 @@ impl Reach {
 }
 
 /// Returns one sentence for each limit of `scene` that truncates paths, with a bound of the lost
-/// radiance. Returns no sentence if the limits truncate nothing.
+/// radiance.
 ///
 /// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. f is the
-/// largest factor of one surface. The throughputs of the paths that have hit n surfaces therefore
-/// sum up to at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The sum over n
-/// and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at most this
-/// sum times the radiance of the brightest surface, light with a size, or background. Nothing is
-/// truncated in two cases: no surface reflects or transmits, or the only object that does is flat
-/// or convex, so that a path hits it once.
+/// largest factor of one surface. The throughputs of all branches of a path that have hit n
+/// surfaces therefore sum up to at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd
+/// n. The sum over n and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost
+/// radiance is at most this sum times the radiance of the brightest surface, light with a size, or
+/// background. Nothing is truncated if no surface reflects or transmits, or if the only object that
+/// does is flat or convex, so that a path hits it once.
 ///
 /// The emission of some objects is found only by rays that hit them. Without diffuse bounces,
 /// diffuse surfaces lack the light of these objects.
 ///
 /// With diffuse bounces the factor of a surface includes its diffuse albedo. The paths that
-/// `max_depth` truncates have hit at least `max_depth + 1` surfaces. Those that `max_diffuse_depth`
-/// truncates have hit at least `max_diffuse_depth + 1` surfaces. Those that are lost because
-/// `caustics` is `false` have hit at least two surfaces. Without diffuse bounces, ambient light
-/// stands for all indirect light; that is no truncation.
+/// `max_depth` truncates have hit at least `max_depth + 1` surfaces, those that `max_diffuse_depth`
+/// truncates at least `max_diffuse_depth + 1`, those that are lost because `caustics` is `false` at
+/// least two. Without diffuse bounces, ambient light stands for all indirect light; that is no
+/// truncation.
 ///
-/// Total internal reflection in a transparent ball is included in the bound, although light that
-/// can enter a ball can also leave it, because the angle of incidence is the same at every hit. At
-/// the rim, rounding decides on which side of the critical angle a ray is, and bump maps change the
-/// angle.
+/// Total internal reflection in a transparent ball is included, although light that can enter a
+/// ball can also leave it: at the rim, rounding decides on which side of the critical angle a ray
+/// is, and bump maps change the angle.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     if scene.trace.ray_types < RayTypes::Full {
         return Vec::new();
@@ -221,26 +214,15 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
     }
     if bounces == 0 {
-        let default = Material::default();
-        let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
-        let is_found_by_rays_alone = |object: &Object| {
-            object.materials().into_iter().any(|name| material(name).emits())
-                && !is_sampled(&object.form())
-        };
-        let albedo = |object: &Object| {
-            let albedo = |name| max_diffuse_albedo(material(name), object);
-            object.materials().into_iter().map(albedo).fold(0.0, f64::max)
-        };
-        let matt = scene.objects.iter().map(albedo).fold(0.0, f64::max);
-        if matt > 0.0 && scene.objects.iter().any(is_found_by_rays_alone) {
-            out.push(format!(
+        let albedo = albedo_under_unsampled_emission(scene);
+        out.extend(albedo.map(|albedo| {
+            format!(
                 "max_diffuse_depth 0 leaves out the light of emissive objects without sampled \
                  points on matt surfaces ({})",
-                bound(matt * specular.from(0))
-            ));
-        }
-    }
-    if bounces > 0 {
+                bound(albedo * specular.from(0))
+            )
+        }));
+    } else {
         let cut = reach.from(bounces + 1);
         if cut > 0.0 && reach.first > specular.first {
             out.push(format!(
@@ -256,6 +238,23 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         }
     }
     out
+}
+
+/// Returns the largest diffuse albedo of a scene in which the emission of some object is found only
+/// by rays that hit it; `None` in other scenes, and if the albedo is 0.
+fn albedo_under_unsampled_emission(scene: &Scene) -> Option<f64> {
+    let default = Material::default();
+    let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
+    let is_found_by_rays_alone = |object: &Object| {
+        object.materials().into_iter().any(|name| material(name).emits())
+            && !is_sampled(&object.form())
+    };
+    let albedo = |object: &Object| {
+        let albedo = |name| max_diffuse_albedo(material(name), object);
+        object.materials().into_iter().map(albedo).fold(0.0, f64::max)
+    };
+    let largest = scene.objects.iter().map(albedo).fold(0.0, f64::max);
+    (largest > 0.0 && scene.objects.iter().any(is_found_by_rays_alone)).then_some(largest)
 }
 
 /// Formats `x` with three significant digits, rounded up.

@@ -3,6 +3,7 @@
 //! Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
 
 use crate::culling::light_projection::{LightProjection, ProjectedBounds};
+use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, next_distinct};
 use zerkalo_kernel::primitive::{
@@ -10,50 +11,42 @@ use zerkalo_kernel::primitive::{
 };
 use zerkalo_scene::value::{ascending, total_order};
 
-/// Largest number of possible occluders in the list of a cell, which is a range of directions from
-/// the light. If more primitives overlap the cell, those closest to the light are kept.
+/// Largest number of occluders in the list of a cell. If more primitives overlap the cell, those
+/// closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested,
-/// because it can occlude even shadow rays that start on the outside of the primitive itself.
+/// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested.
 const NO_PRIMITIVE: u32 = u32::MAX;
 
-/// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a
-/// square of a grid over the projection from the light, that is, a range of directions from the
-/// light.
+/// Lists of the primitives that can occlude one light. Each list belongs to a *cell*: a square of a
+/// grid over the projection from the light, that is, a range of directions from it.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
-    /// Number of rows of cells on each face of the light's projection, equal to the number of
-    /// columns.
+    /// Number of rows and of columns of cells on each face of the projection.
     side: usize,
     /// Largest absolute coordinate of the occluders and the light. Rays whose origin has a larger
     /// coordinate traverse the BVH, because their rounding errors exceed the margin of the
     /// occluders' bounds.
     max_coordinate: S,
-    /// Cells (ranges of directions from the light) of all faces of the light's projection, face by
-    /// face and row by row.
+    /// Cells of all faces, face by face and row by row.
     cells: Vec<Cell<S>>,
-    /// Possible occluders of all cells, cell after cell. The entries of a cell are sorted by depth
-    /// (see [`Entry::near`]), nearest to the light first.
+    /// Occluders of all cells, cell after cell, sorted by [`Entry::near`].
     entries: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
 struct Cell<S> {
-    /// Index of the cell's first possible occluder in [`LightBuffer::entries`].
+    /// Range of the cell's occluders in [`LightBuffer::entries`].
     first: u32,
-    /// Index after the cell's last possible occluder in [`LightBuffer::entries`].
     end: u32,
-    /// Depth (see [`Entry::near`]) up to which the cell's list of possible occluders is complete.
-    /// Shadow rays that start at greater depths traverse the BVH.
+    /// Depth (see [`Entry::near`]) up to which the cell's list is complete. Shadow rays that start
+    /// at greater depths traverse the BVH.
     complete_to: S,
 }
 
-/// Possible occluder of a light: a primitive of the BVH. A light buffer is built from a list of
-/// possible occluders.
+/// Possible occluder of a light: a primitive of the BVH.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occluder {
-    /// Bounding sphere of the primitive.
     pub ball: BoundingSphere,
     /// Id of the primitive if shadow rays that start on its outside cannot hit it again. `None` if
     /// they can.
@@ -62,36 +55,39 @@ pub(crate) struct Occluder {
 
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Index of the occluding primitive among those in the scene's BVH.
+    /// Index of the primitive among those in the BVH.
     number: u32,
-    /// Id of the primitive if it cannot occlude shadow rays that start on its own outside;
-    /// [`NO_PRIMITIVE`] if it can.
+    /// See [`Occluder::exempt_primitive`]; otherwise [`NO_PRIMITIVE`].
     exempt_primitive: u32,
     /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
-    /// a point light. For a directional light it is the coordinate of the point along the direction
-    /// in which the light travels, with 0 at the origin.
+    /// a point light. For a directional light it is the coordinate along the direction in which the
+    /// light travels.
     near: S,
 }
 
+/// Primitives on which rays start.
+pub(crate) struct RayStart<L: SimdFloat> {
+    /// Id of the primitive in each lane.
+    pub primitive: L,
+    /// Lanes that start on the outside of their primitive.
+    pub outside: L::Mask,
+}
+
 impl<S: Float> LightBuffer<S> {
-    /// Creates the light buffer of a light. A cell holds the [`MAX_PER_CELL`] occluders closest to
-    /// the light among those that overlap it, and leaves out the others. Returns `None` if at least
-    /// half of `occluders` are left out of most cells that they overlap. Too many shadow rays would
-    /// then traverse the BVH.
+    /// Creates the light buffer of a light. Returns `None` if at least half of `occluders` are left
+    /// out of most cells that they overlap, so that too many shadow rays would traverse the BVH.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
-            LightTarget::Point(light) => light.abs().max_element(),
-            LightTarget::Direction(_) => 0.0,
+            LightTarget::Point(light) => *light,
+            LightTarget::Direction(_) => DVec3::ZERO,
         };
-        let max_coordinate = occluders.iter().map(|s| farthest(&s.ball)).fold(light, f64::max);
+        let coordinates = occluders.iter().map(|s| farthest(&s.ball));
+        let max_coordinate = coordinates.fold(light.abs().max_element(), f64::max);
         // Bounding spheres relative to the light, with a margin for rounding errors of rays.
-        let relative_to_light = |s: &Occluder| {
-            let center = match target {
-                LightTarget::Point(light) => s.ball.center - light,
-                LightTarget::Direction(_) => s.ball.center,
-            };
-            BoundingSphere { center, radius: s.ball.radius + F32_RAY_ERROR * max_coordinate }
+        let relative_to_light = |s: &Occluder| BoundingSphere {
+            center: s.ball.center - light,
+            radius: s.ball.radius + F32_RAY_ERROR * max_coordinate,
         };
         let balls: Vec<BoundingSphere> = occluders.iter().map(relative_to_light).collect();
         let near_depth = |ball: &BoundingSphere| match target {
@@ -129,28 +125,32 @@ impl<S: Float> LightBuffer<S> {
                 return None;
             }
         }
+        let max_coordinate = S::from_f64(max_coordinate);
         let mut end = 0;
         let cell = |(count, complete_to): (&usize, &S)| {
-            // The field `end` equals `first` until the entries are distributed below. Each new
-            // entry of the cell increases it by one.
             let cell = Cell { first: end, end, complete_to: *complete_to };
             end += *count as u32;
             cell
         };
-        let mut cells: Vec<Cell<S>> = counts.iter().zip(&complete_to).map(cell).collect();
-        let empty = Entry { number: 0, exempt_primitive: NO_PRIMITIVE, near: S::default() };
-        let mut entries = vec![empty; placed.len()];
-        for (cell, entry) in placed {
-            entries[cells[cell].end as usize] = entry;
-            cells[cell].end += 1;
-        }
-        Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
+        let cells = counts.iter().zip(&complete_to).map(cell).collect();
+        let mut buffer = Self { projection, side, max_coordinate, cells, entries: Vec::new() };
+        buffer.distribute(placed);
+        Some(buffer)
     }
 
-    /// Returns the lanes of `active` whose ray is occluded: it hits a primitive nearer than
-    /// `t_max`. The result equals that of [`Aggregate::occluded`] for `candidates`, the possible
-    /// occluders. The rays start on the primitives with the ids `start_primitive`. In the lanes
-    /// `starts_outside` they start on the outside of these primitives.
+    /// Stores entries, each with its cell, in the order of the cells. Before, `end` of each cell
+    /// equals `first`, and the cells are as far apart as their entries need.
+    fn distribute(&mut self, placed: Vec<(usize, Entry<S>)>) {
+        let empty = Entry { number: 0, exempt_primitive: NO_PRIMITIVE, near: S::default() };
+        self.entries = vec![empty; placed.len()];
+        for (cell, entry) in placed {
+            self.entries[self.cells[cell].end as usize] = entry;
+            self.cells[cell].end += 1;
+        }
+    }
+
+    /// Returns the lanes of `active` whose ray is occluded, as [`Aggregate::occluded`] does.
+    /// `candidates` are the possible occluders.
     ///
     /// The rays are passed by reference, because with a copy of them the render of the scene
     /// `reflecting-tracks` takes 7 % longer.
@@ -159,7 +159,7 @@ impl<S: Float> LightBuffer<S> {
         &self,
         geometry: &Aggregate<L>,
         ray: &Ray<L>,
-        (start_primitive, starts_outside): (L, L::Mask),
+        start: RayStart<L>,
         t_max: L,
         active: L::Mask,
         candidates: &PrimitiveSet,
@@ -171,8 +171,8 @@ impl<S: Float> LightBuffer<S> {
         let mut remaining = active.and_not(occluded | use_bvh);
         let (cell, depth) = self.projection.lookup(ray, t_max, self.side);
         // Primitive on whose outside all rays start, if there is a single one.
-        let common_start = match next_distinct(start_primitive, active) {
-            Some((primitive, lanes)) if active.and_not(lanes & starts_outside).none() => {
+        let common_start = match next_distinct(start.primitive, active) {
+            Some((primitive, lanes)) if active.and_not(lanes & start.outside).none() => {
                 Some(primitive)
             }
             _ => None,
@@ -218,7 +218,6 @@ impl<S: Float> LightBuffer<S> {
 mod tests {
     use super::*;
     use crate::culling::light_projection::tests::Random;
-    use glam::DVec3;
     use zerkalo_kernel::lanes::{Double, Single, Vec3};
     use zerkalo_kernel::primitive::{Form, SphereForm};
 
@@ -286,7 +285,7 @@ mod tests {
                 (L::select(odd, second_primitive, first_primitive), L::mask(round % 6 >= 4));
             let all = geometry.all();
             let expected = geometry.occluded(&ray, t_max, active, all) & active;
-            let start = (start_primitive, starts_outside);
+            let start = RayStart { primitive: start_primitive, outside: starts_outside };
             let found = buffer.occluded(&geometry, &ray, start, t_max, active, all) & active;
             assert_eq!(found.bits(), expected.bits(), "{target:?}, round {round}");
             count += found.bits().count_ones() as usize;
@@ -348,7 +347,7 @@ mod tests {
         let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");
         let ray = Ray { origin: Vec3::<Single>::zero(), direction: Vec3::of([0.0, 1.0, 0.0]) };
         let occluded = |outside| {
-            let start = (Single::from_id(0), Single::mask(outside));
+            let start = RayStart { primitive: Single::from_id(0), outside: Single::mask(outside) };
             let (t_max, active) = (Single::from_f64(9.0), Single::mask(true));
             buffer.occluded(&geometry, &ray, start, t_max, active, geometry.all())
         };

@@ -8,35 +8,30 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::{BoundingSphere, LightTarget};
 
-/// Largest magnitude of the coordinates of projected spheres in a light's perspective projection,
-/// on the plane at unit distance from the light. If a projected sphere reaches farther out, the
-/// light has a cube map instead.
+/// Largest magnitude of the coordinates of spheres in a perspective projection, on the plane at
+/// unit distance from the light. Beyond it, the light has a cube map.
 const MAX_TANGENT: f64 = 3.0;
 
-/// Projection of points, as seen from a light, onto one or more faces. A projected point has two
-/// coordinates on its face, each from 0 to 1.
+/// Projection of points, as seen from a light, onto one or more faces with coordinates from 0 to 1.
 pub(crate) enum LightProjection<S> {
-    /// Projection onto the six faces of a cube around a point light, for a light that has
-    /// primitives on several sides.
+    /// For a point light that has primitives on several sides.
     CubeMap,
-    /// Projection from a point light that has all primitives on one side. The third axis is the
-    /// view direction. `low` and `scale` map coordinates on the face to 0..=1.
+    /// For a point light that has all primitives on one side. The third axis is the view direction.
+    /// `low` and `scale` map coordinates on the face to 0..=1.
     Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
-    /// Projection along the direction of a directional light. The two axes are perpendicular to the
-    /// direction. `low` and `scale` map coordinates along them to 0..=1.
+    /// For a directional light, to which the two axes are perpendicular.
     Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
 impl<S: Float> LightProjection<S> {
-    /// Returns the number of faces of the projection: 6 for a cube map, otherwise 1.
     pub fn faces(&self) -> usize {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns two values for each ray: the index of the light buffer's cell onto which the ray's
-    /// origin is projected, and the depth of the origin (see the field `near` of the buffer's
-    /// entries). Origins outside of the projection get an arbitrary cell. `limit` is the distance
-    /// between origin and light. `side` is the number of cells along a side of a face.
+    /// Returns the index of the cell onto which each ray's origin is projected, and the depth of
+    /// the origin (see the field `near` of the light buffer's entries). Origins outside the
+    /// projection get an arbitrary cell. `limit` is the distance between origin and light. `side`
+    /// is the number of cells along a side of a face.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
@@ -84,8 +79,7 @@ impl<S: Float> LightProjection<S> {
     }
 }
 
-/// Bounding rectangle of a projected sphere on a face of a light's projection. Its two corners have
-/// coordinates from 0 to 1.
+/// Bounding rectangle of a projected sphere on a face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceRect {
     face: usize,
@@ -94,8 +88,8 @@ pub(crate) struct FaceRect {
 }
 
 impl FaceRect {
-    /// Returns the indices of the grid cells that the rectangle overlaps, on a face of `side` x
-    /// `side` cells.
+    /// Returns the indices of the cells that the rectangle overlaps, on faces of `side` x `side`
+    /// cells.
     pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
         // The conversion to an integer saturates, so negative coordinates become cell 0.
         let cell = |x: f64| ((x * side as f64) as usize).min(side - 1);
@@ -108,17 +102,16 @@ impl FaceRect {
 
 /// Projection from a light, and the bounding rectangles of all projected spheres.
 pub(crate) struct ProjectedBounds<S> {
-    /// Projection of points from the light onto faces, which are divided into cells.
     pub projection: LightProjection<S>,
-    /// Bounding rectangles of each sphere, one for each face that the projected sphere overlaps.
+    /// Rectangles of each sphere, one for each face that it overlaps.
     pub rects: Vec<Vec<FaceRect>>,
-    /// Recommended number of cells along a side of a face of the projection.
+    /// Recommended number of cells along a side of a face.
     pub side: usize,
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Chooses a projection for a light and projects the spheres `balls`. If the light is a point
-    /// light, the centres of the spheres are relative to it.
+    /// Chooses a projection for a light and projects the spheres `balls`, which are relative to a
+    /// point light.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -146,8 +139,7 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
 }
 
-/// Projects spheres to a cube map around the light. Returns two values: the projection, and the
-/// bounding rectangles of each sphere on the faces of the cube.
+/// Projects spheres to a cube map.
 fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
@@ -163,9 +155,8 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
     (LightProjection::CubeMap, balls.iter().map(rects).collect())
 }
 
-/// Projects spheres by a perspective projection from the light. Returns two values: the projection,
-/// and the bounding rectangle of each sphere. Returns `None` if the spheres are not on one side of
-/// the light, or if a coordinate of a projected sphere would exceed [`MAX_TANGENT`].
+/// Projects spheres by a perspective projection. Returns `None` if they are not on one side of the
+/// light, or if a coordinate would exceed [`MAX_TANGENT`].
 fn perspective<S: Float>(
     balls: &[BoundingSphere],
 ) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
@@ -185,8 +176,7 @@ fn perspective<S: Float>(
     Some((LightProjection::Perspective { axes, low, scale }, rects))
 }
 
-/// Projects spheres along `direction`, which points to the light. Returns two values: the
-/// projection, and the bounding rectangle of each sphere.
+/// Projects spheres along `direction`, which points to the light.
 fn orthographic<S: Float>(
     direction: DVec3,
     balls: &[BoundingSphere],
@@ -202,10 +192,9 @@ fn orthographic<S: Float>(
     (LightProjection::Orthographic { axes, low, scale }, rects)
 }
 
-/// Maps all rectangles into the unit square by one linear map, so that together they fill it. Each
-/// of `corners` holds the lowest and the highest corner of a rectangle. Returns three values: the
-/// lowest corner of all rectangles, which becomes the origin; the scale factor along each axis; and
-/// the mapped rectangles.
+/// Maps rectangles, each given by its lowest and highest corner, into the unit square by one linear
+/// map, so that together they fill it. Returns the origin and the scale of the map, and the mapped
+/// rectangles.
 fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);

@@ -5,8 +5,7 @@ use glam::DVec3;
 use zerkalo_kernel::primitive::{F32_RAY_ERROR, Form};
 use zerkalo_scene::camera::PerspectiveCamera;
 
-/// Bounding rectangle of a projected primitive in the picture \[pixels\]: smallest and largest
-/// coordinates.
+/// Bounding rectangle of a projected primitive \[pixels\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenBounds {
     low: [f64; 2],
@@ -23,10 +22,9 @@ const MARGIN_PX: f64 = 0.25;
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
-    /// Returns the bounds, in the picture \[pixels\], of the projected corners of an object's
-    /// bounding box. The bounds are infinite if the object has no bounding box, or if a corner is
-    /// not in front of the eye. If the camera has a lens, the bounds are wider by the largest blur
-    /// of a point in the box.
+    /// Returns the bounds of the projected corners of an object's bounding box, wider by the
+    /// largest blur of the lens. They are infinite if the object has no bounding box, or if a
+    /// corner is not in front of the eye.
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -70,8 +68,8 @@ impl ScreenBounds {
         out
     }
 
-    /// Returns `true` if the projected bounds overlap a rectangle of the raster \[pixels\].
-    /// `origin` is its upper left corner, `extent` its size.
+    /// Returns `true` if the bounds overlap a rectangle \[pixels\] with the upper left corner
+    /// `origin` and the size `extent`.
     pub fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
         (0..2).all(|axis| {
             let begin = origin[axis] as f64;
@@ -80,27 +78,26 @@ impl ScreenBounds {
     }
 }
 
-/// Side of a cell of the screen grid \[pixels\]. A cell is a square of pixels that share one list
-/// of candidate primitives.
+/// Side of a cell of the screen grid \[pixels\].
 const CELL_PX: usize = 16;
 
-/// Largest number of candidate primitives in a cell (a square of pixels) of the screen grid. Camera
-/// rays through cells with more candidates traverse the BVH.
+/// Largest number of candidate primitives in a cell. Camera rays through cells with more candidates
+/// traverse the BVH.
 const MAX_PER_CELL: usize = 16;
 
-/// Screen grid: for each cell of the picture (a square of 16 x 16 pixels), the list of the
-/// primitives that camera rays through the cell can hit.
+/// Screen grid: for each cell, a square of pixels, the list of the primitives that camera rays
+/// through it can hit.
 pub(crate) struct ScreenGrid {
     columns: usize,
     rows: usize,
-    /// Ids of the candidate primitives of each cell (a square of pixels), in ascending order. The
-    /// cells are listed row by row. `None` for cells with more than [`MAX_PER_CELL`] candidates.
+    /// Ids of the candidates of each cell, in ascending order, row by row. `None` for cells with
+    /// more than [`MAX_PER_CELL`] candidates.
     candidates: Vec<Option<Vec<u32>>>,
 }
 
 impl ScreenGrid {
     /// Creates the screen grid of a raster of `size` pixels. `primitives` holds the id and the
-    /// projected bounds of each primitive, in ascending order of ids.
+    /// bounds of each primitive, in ascending order of ids.
     pub fn new(
         size: [usize; 2],
         primitives: impl IntoIterator<Item = (u32, ScreenBounds)>,
@@ -128,10 +125,9 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the ids of the primitives that camera rays through a rectangle of the picture can
-    /// hit, in ascending order. `origin` is its upper left corner and `extent` its size \[pixels\].
-    /// Returns `None` if there are more than [`MAX_PER_CELL`] such primitives, or if a cell that
-    /// the rectangle overlaps has more than that.
+    /// Returns the ids of the primitives that camera rays through a rectangle \[pixels\] can hit,
+    /// in ascending order. Returns `None` if there are more than [`MAX_PER_CELL`] in it, or in a
+    /// cell that it overlaps.
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

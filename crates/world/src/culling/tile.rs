@@ -1,6 +1,4 @@
-//! Candidate lists per tile: the primitives that camera rays through the tile can hit, and the
-//! primitives that can occlude each light from the hit points of these rays. Most tiles have one or
-//! two visible primitives and no occluder.
+//! Candidate lists per tile. Most tiles have one or two visible primitives and no occluder.
 
 use crate::culling::light_buffer::{LightBuffer, Occluder};
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
@@ -11,46 +9,40 @@ use zerkalo_kernel::primitive::{
 use zerkalo_scene::camera::PerspectiveCamera;
 
 /// Candidates of a group of camera rays, such as those through a tile, and of the shadow rays from
-/// their hit points. Candidates are the primitives that rays must be tested against.
+/// their hit points: the primitives that these rays must be tested against.
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
     pub(crate) primary: PrimitiveSet,
-    /// Possible occluders of the light sources: first of each light without a size, then of each
-    /// light with a size, each emissive object from which light is sampled, and each stratum
-    /// (spatial group) of the lights among which paths choose.
+    /// Possible occluders of the light sources: of each light without a size, each emitter, and
+    /// each stratum of the lights among which paths choose.
     pub(crate) occluders: Vec<PrimitiveSet>,
 }
 
 impl TileCandidates {
-    /// Returns all primitives as candidates, without culling: for camera rays, and for each of
-    /// `lights` light sources (see the field `occluders`).
+    /// Returns all primitives as candidates, without culling, for `lights` light sources.
     pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
         Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
 }
 
-/// Method that finds the candidate primitives of a tile: those that rays of the tile are tested
-/// against.
+/// Method that finds the candidates of a tile.
 pub(crate) enum CullingMode {
     /// Tests bounding volumes against the tile's view frustum, and against the space between the
     /// frustum and the lights.
     Frusta(FrustumCuller),
-    /// Tests the bounding rectangles of the projected primitives against the tile.
+    /// Tests projected bounds against the tile.
     ScreenBounds(Vec<ScreenBounds>),
-    /// Looks up the candidate lists of the screen cells that the tile overlaps. The primitives are
-    /// in a BVH.
+    /// Looks up the screen cells that the tile overlaps. The primitives are in a BVH.
     ScreenGrid(ScreenGrid),
-    /// No culling: all primitives are candidates. Those in a BVH are still found by traversal of
-    /// the BVH.
+    /// All primitives are candidates. Those in a BVH are found by its traversal.
     Off,
 }
 
 impl CullingMode {
-    /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
-    /// those that can occlude shadow rays from the hit points of these camera rays. `lights` is the
-    /// number of light sources. `origin` is the upper left corner of the rectangle, and `extent`
-    /// its size \[pixels\]. Returns `None` if rays must be tested against all primitives.
+    /// Returns the candidates of a rectangle of the picture \[pixels\] with the upper left corner
+    /// `origin` and the size `extent`. `lights` is the number of light sources. Returns `None` if
+    /// rays must be tested against all primitives.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -86,11 +78,9 @@ impl CullingMode {
     }
 }
 
-/// Returns one value for each of the objects `forms`: `true` for a convex solid that rays hit only
-/// from outside. Paths are inside of a solid only if they start there or are transmitted. `start`
-/// is a sphere that contains the origins of all camera rays. If `start` is `None`, camera rays may
-/// start anywhere, and all values are `false`. `entered` is `true` for each object whose surface
-/// transmits.
+/// Returns for each of `forms` whether it is a convex solid that rays hit only from outside. Paths
+/// are inside a solid only if they start there or are transmitted, which `entered` tells for each.
+/// `start` is a sphere around the origins of all camera rays; `None` if they may start anywhere.
 pub(crate) fn outside_only<'a>(
     forms: impl Iterator<Item = &'a Form>,
     start: Option<BoundingSphere>,
@@ -106,26 +96,21 @@ pub(crate) fn outside_only<'a>(
     forms.zip(entered).map(is_outside).collect()
 }
 
-/// Culling of primitives by view frusta and by the space between visible surfaces and the lights.
+/// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
-    /// Bounding volume of each primitive.
     bounds: Vec<BoundingVolume>,
     /// `true` for each primitive that may occlude lights from points on its own surface: it is
     /// concave, or paths can be inside of it.
     self_shadowing: Vec<bool>,
-    /// Position or direction of each light without a size.
     lights: Vec<LightTarget>,
-    /// Bounding sphere of each light with a size, each emissive object from which light is sampled,
-    /// and each stratum (spatial group) of the lights among which paths choose.
+    /// Bounding sphere of each emitter and each stratum of the lights among which paths choose.
     emitters: Vec<BoundingSphere>,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of the primitives `forms`. `outside_only` is `true` for each convex solid
-    /// that rays hit only from outside. `lights` are the positions or directions of the lights
-    /// without a size. `max_end_offset` is the largest distance between such a light and the end
-    /// point of its shadow rays. `emitters` are the bounding spheres of the other light sources
-    /// (see [`FrustumCuller::emitters`]).
+    /// Creates the culler of the primitives `forms`; see [`outside_only`]. `max_end_offset` is the
+    /// largest distance between a light without a size and the end point of its shadow rays.
+    /// `emitters` are bounding spheres of the other light sources.
     pub fn new(
         forms: Vec<&Form>,
         outside_only: &[bool],
@@ -142,9 +127,8 @@ impl FrustumCuller {
         Self { lights, emitters, self_shadowing, bounds }
     }
 
-    /// Creates the light buffer of each light without a size. Its occluders are the primitives in
-    /// the BVH of `geometry`. An entry is `None` if the cells of the buffer would leave out too
-    /// many occluders; see [`LightBuffer::new`].
+    /// Creates the light buffer of each light without a size, of the primitives in the BVH of
+    /// `geometry`; see [`LightBuffer::new`].
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -157,9 +141,7 @@ impl FrustumCuller {
         self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 
-    /// Returns the candidate primitives of the camera rays inside `frustum`, and of the shadow rays
-    /// from their hit points. If `frustum` is `None`, all primitives are candidates of the camera
-    /// rays.
+    /// Returns the candidates of the camera rays inside `frustum`, or of all camera rays.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -171,8 +153,8 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
-        // Selects the primitives that can occlude one light from the visible part of at least one
-        // primitive. `occludes` tests one possible occluder and one visible part.
+        // Primitives that can occlude one light from a visible part of some primitive. `occludes`
+        // tests one primitive and one visible part.
         let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
             geometry.select(|primitive| {
                 let primitive = primitive as usize;

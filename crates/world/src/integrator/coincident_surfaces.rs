@@ -18,7 +18,7 @@
 use crate::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use zerkalo_scene::value::{ascending, total_order};
 
@@ -208,12 +208,11 @@ impl<S: Float> Contacts<S> {
         lanes: L::Mask,
     ) -> L::Mask {
         let rounding = rounding(point);
-        let (mut near, mut remaining) = (L::mask(false), lanes);
-        while let Some((primitive, primitive_lanes)) = next_distinct(primitives, remaining) {
+        let mut near = L::mask(false);
+        for (primitive, lanes) in distinct(primitives, lanes) {
             for contact in &self.contacts[primitive as usize] {
-                near = near | (primitive_lanes & contact.is_near(point, rounding));
+                near = near | (lanes & contact.is_near(point, rounding));
             }
-            remaining = remaining.and_not(primitive_lanes);
         }
         near
     }
@@ -238,16 +237,7 @@ impl<S: Float> Contacts<S> {
         coincident: &CoincidentState<L>,
         media: &MediumStack<L>,
     ) -> CoincidentQuery<L> {
-        let mut out = CoincidentQuery {
-            lanes: L::mask(false),
-            touching: L::mask(false),
-            primitive: coincident.primitive,
-            triangle: L::from_id(0),
-            layer: L::from_f64(L::MAX),
-            offset: L::zero(),
-        };
-        self.search(geometry, coincident, media, &mut out);
-        out
+        self.search(geometry, coincident, media, L::from_f64(L::MAX))
     }
 
     /// Finds the surface that the rays cross first: the start surface in `coincident`, whose layer is
@@ -262,13 +252,23 @@ impl<S: Float> Contacts<S> {
     ) -> CoincidentQuery<L> {
         let before = L::from_f64(-L::MAX);
         let mut layer = L::zero();
-        let mut remaining = coincident.lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(coincident.primitive, remaining)
-        {
-            layer = L::select(primitive_lanes, self.layer(primitive, leaves, before), layer);
-            remaining = remaining.and_not(primitive_lanes);
+        for (primitive, lanes) in distinct(coincident.primitive, coincident.lanes) {
+            layer = L::select(lanes, self.layer(primitive, leaves, before), layer);
         }
+        let coincident = CoincidentState { layer: before, ..*coincident };
+        self.search(geometry, &coincident, media, layer)
+    }
+
+    /// Searches the surfaces that coincide with the start points for the one with the lowest layer
+    /// between that of `coincident` and `layer`.
+    #[inline(never)]
+    fn search<L: SimdFloat<Scalar = S>>(
+        &self,
+        geometry: &Aggregate<L>,
+        coincident: &CoincidentState<L>,
+        media: &MediumStack<L>,
+        layer: L,
+    ) -> CoincidentQuery<L> {
         let mut out = CoincidentQuery {
             lanes: L::mask(false),
             touching: L::mask(false),
@@ -277,27 +277,8 @@ impl<S: Float> Contacts<S> {
             layer,
             offset: L::zero(),
         };
-        self.search(geometry, &CoincidentState { layer: before, ..*coincident }, media, &mut out);
-        out
-    }
-
-    /// Searches the surfaces that coincide with the start points. In each lane `out` holds the best
-    /// candidate so far; a surface whose layer is above that of `coincident` and below that of the
-    /// candidate replaces it.
-    #[inline(never)]
-    fn search<L: SimdFloat<Scalar = S>>(
-        &self,
-        geometry: &Aggregate<L>,
-        coincident: &CoincidentState<L>,
-        media: &MediumStack<L>,
-        out: &mut CoincidentQuery<L>,
-    ) {
         let rounding = rounding(coincident.point);
-        let mut remaining = coincident.lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(coincident.primitive, remaining)
-        {
-            remaining = remaining.and_not(primitive_lanes);
+        for (primitive, primitive_lanes) in distinct(coincident.primitive, coincident.lanes) {
             for contact in &self.contacts[primitive as usize] {
                 let near = primitive_lanes & contact.is_near(coincident.point, rounding);
                 if near.none() {
@@ -310,9 +291,7 @@ impl<S: Float> Contacts<S> {
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
                 let ray = Ray { origin, direction: coincident.axis };
                 let hit = geometry.closest_to(contact.primitive, &ray, limit);
-                let mut found = near & hit.t.lt(limit);
-                while let Some((other, other_lanes)) = next_distinct(hit.primitive, found) {
-                    found = found.and_not(other_lanes);
+                for (other, other_lanes) in distinct(hit.primitive, near & hit.t.lt(limit)) {
                     let normal = geometry.surface(other, hit.triangle, coincident.point).normal;
                     let cosine = normal.dot(coincident.axis);
                     let leaves = cosine.gt(L::zero());
@@ -338,6 +317,7 @@ impl<S: Float> Contacts<S> {
                 }
             }
         }
+        out
     }
 }
 

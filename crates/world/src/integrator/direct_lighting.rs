@@ -1,6 +1,7 @@
 //! Direct lighting: the estimator that all kinds of lights share, ambient light, and lights without
 //! a size.
 
+use crate::culling::light_buffer::RayStart;
 use crate::integrator::vertex::Vertex;
 use crate::lights::choice::LightChoice;
 use std::f64::consts::FRAC_1_PI;
@@ -127,7 +128,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 if SIMPLE {
                     world.geometry.occluded_linear(&ray, t_max, lit, occluders)
                 } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                    let start = (interaction.primitive, interaction.front);
+                    let (primitive, outside) = (interaction.primitive, interaction.front);
+                    let start = RayStart { primitive, outside };
                     buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
                 } else {
                     world.geometry.occluded(&ray, t_max, lit, occluders)

@@ -95,9 +95,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let interaction = self.interaction;
         let salt = ENVIRONMENT_SALT + 2 * index as u32 + 1;
         let (u, v) = self.sampler.light_2d(self.bounce, salt);
-        let (x, y, r2) = warp::disk(u, v);
-        let cos = (L::one() - r2).max(L::zero()).sqrt();
-        let wi = Frame::around(interaction.normal).to_world(Vec3::new(x, y, cos)).renormalize();
+        let local = warp::cosine_hemisphere(u, v);
+        let cos = local.z;
+        let wi = Frame::around(interaction.normal).to_world(local).renormalize();
         let arrives = lanes & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
         let (radiance, density) = environment.light.radiance(wi, arrives);
         let weight = power_heuristic(cosine_density(cos), density).masked(arrives);

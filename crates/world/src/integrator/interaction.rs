@@ -3,7 +3,7 @@
 use crate::integrator::surface_textures::{ShadingPoints, albedo_factor, shading_normal};
 use crate::world::World;
 use zerkalo_kernel::bvh::{Hit, Ray};
-use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3, distinct};
 
 /// Surface properties at the hit points of a packet.
 pub(crate) struct SurfaceInteraction<L: SimdFloat> {
@@ -41,12 +41,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     /// Iterates over the BSDFs in `lanes`: the index of each, and the lanes that have it.
     #[inline(always)]
     pub fn bsdfs(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
-        let (bsdf, mut remaining) = (self.bsdf, lanes);
-        std::iter::from_fn(move || {
-            let (index, lanes) = next_distinct(bsdf, remaining)?;
-            remaining = remaining.and_not(lanes);
-            Some((index as usize, lanes))
-        })
+        distinct(self.bsdf, lanes).map(|(index, lanes)| (index as usize, lanes))
     }
 
     /// Returns the origins of rays that leave on the side of the incoming rays.
@@ -111,7 +106,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
 }
 
 /// Computes the surface properties at the hits of the active rays. `first` is the first result of
-/// [`next_distinct`] for the primitives that are hit.
+/// [`distinct`] for the primitives that are hit.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -137,12 +132,11 @@ fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     ray: &Ray<L>,
     hit: &Hit<L>,
     (first, first_lanes): (u32, L::Mask),
-    mut remaining: L::Mask,
+    remaining: L::Mask,
 ) -> SurfaceInteraction<L> {
     let mut interaction = interact_one::<_, SIMPLE>(world, ray, hit, first, first_lanes);
-    while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+    for (primitive, lanes) in distinct(hit.primitive, remaining) {
         interaction.blend(lanes, &interact_one::<_, SIMPLE>(world, ray, hit, primitive, lanes));
-        remaining = remaining.and_not(lanes);
     }
     interaction
 }

@@ -55,7 +55,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
             }
         }
         let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
-        let transmitting = reflecting & (hit.thin | !hit.outer);
+        let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
         Self { hit, query: hit.query(vertex), reflecting, transmitting }
     }
 
@@ -147,13 +147,10 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let occluded = |lit| {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
             let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
-            match emitter {
-                Some(index) => {
-                    let lanes = lit.and_not(occluded);
-                    occluded | world.emitter_covered(index, &ray, t_max, lanes)
-                }
-                None => occluded,
-            }
+            emitter.map_or(occluded, |index| {
+                let (ray, lanes) = ((&ray, t_max), lit.and_not(occluded));
+                occluded | world.emitters.covered(index, &world.geometry, ray, lanes)
+            })
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);

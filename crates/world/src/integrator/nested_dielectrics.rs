@@ -12,9 +12,9 @@ use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::vertex::Vertex;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinct};
 use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId};
-use zerkalo_scene::material::{Bsdf, InterfaceQuery};
+use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
 /// Largest number of solids that a medium stack holds: those listed last in the scene file.
 const MAX_NESTING: usize = 4;
@@ -74,12 +74,10 @@ impl<L: SimdFloat> MediumStack<L> {
     #[inline(never)]
     fn add_if_inside(&mut self, ray: &Ray<L>, priority: u32, solid: &Aggregate<L>) {
         let hit = solid.closest(ray, solid.all());
-        let mut remaining = hit.t.lt(L::from_f64(L::MAX));
         let mut inside = L::mask(false);
-        while let Some((primitive, lanes)) = next_distinct(hit.primitive, remaining) {
+        for (primitive, lanes) in distinct(hit.primitive, hit.t.lt(L::from_f64(L::MAX))) {
             let normal = solid.surface(primitive, hit.triangle, ray.at(hit.t)).normal;
             inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
-            remaining = remaining.and_not(lanes);
         }
         *self = Self::select(inside, &self.with(L::from_f64(f64::from(priority))), self);
     }
@@ -146,17 +144,10 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
 pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes whose ray hits a transmissive surface.
     pub lanes: L::Mask,
-    /// See [`InterfaceQuery`].
-    pub outer: L::Mask,
-    /// See [`InterfaceQuery`].
-    pub thin: L::Mask,
     /// Lanes whose ray hits a boundary inside of a solid with a higher priority. The ray passes it
     /// unchanged.
     pub suppressed: L::Mask,
-    /// See [`InterfaceQuery`].
-    pub n_i: L,
-    /// See [`InterfaceQuery`].
-    pub n_t: L,
+    pub media: InterfaceMedia<L>,
     pub medium_reflected: MediumStack<L>,
     pub medium_transmitted: MediumStack<L>,
 }
@@ -174,10 +165,7 @@ impl<L: SimdFloat> InterfaceHit<L> {
     pub fn query(&self, vertex: &Vertex<'_, L>) -> InterfaceQuery<L> {
         InterfaceQuery {
             rays: vertex.query(),
-            n_i: self.n_i,
-            n_t: self.n_t,
-            outer: self.outer,
-            thin: self.thin,
+            media: self.media,
             reflecting: vertex.interaction.reflecting,
         }
     }
@@ -272,13 +260,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         }
         let outer = lanes & interaction.front;
         let mut priority = L::zero();
-        let mut remaining = lanes;
-        while let Some((primitive, primitive_lanes)) =
-            next_distinct(interaction.primitive, remaining)
-        {
+        for (primitive, lanes) in distinct(interaction.primitive, lanes) {
             let of_primitive = L::from_f64(f64::from(self.priority_of[primitive as usize]));
-            priority = L::select(primitive_lanes, of_primitive, priority);
-            remaining = remaining.and_not(primitive_lanes);
+            priority = L::select(lanes, of_primitive, priority);
         }
         let solid = priority.gt(L::zero());
         let (outside, within) = (media.without(priority), media.with(priority));
@@ -288,14 +272,15 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         };
         let medium_reflected = select(&outside, &within);
         let medium_transmitted = select(&within, &outside);
-        let n_i = self.index(medium_reflected.top());
         Some(InterfaceHit {
             lanes,
-            outer,
-            thin: lanes.and_not(solid),
             suppressed: lanes & solid & equal(medium_reflected.top(), medium_transmitted.top()),
-            n_i,
-            n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+            media: InterfaceMedia {
+                n_i: self.index(medium_reflected.top()),
+                n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
+                outer,
+                thin: lanes.and_not(solid),
+            },
             medium_reflected,
             medium_transmitted,
         })

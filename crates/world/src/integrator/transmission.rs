@@ -4,7 +4,7 @@
 use crate::culling::tile::TileCandidates;
 use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState};
-use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density, visible_emitters};
+use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe, visible_emitters};
 use crate::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::integrator::interaction::{SurfaceInteraction, interact};
 use crate::integrator::interface_lighting::RoughInterface;
@@ -386,7 +386,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             throughput: Vec3::zero(),
             lobe_density: L::from_f64(L::MAX),
         };
-        let straight = hit.thin | hit.suppressed;
+        let straight = hit.media.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
         let mut split = Self {
             rough,
@@ -459,7 +459,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             if world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
-            let density = reflected_density(world, interaction, &query.rays, index, direction);
+            let density = eval_lobe(world, interaction, &query.rays, index, direction).density;
             self.reflected.lobe_density = L::select(lanes, density, self.reflected.lobe_density);
         }
         let throughput = throughput.component_mul(sample.weight) * share;

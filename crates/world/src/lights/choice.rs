@@ -1,19 +1,18 @@
 //! Choice of lights at a surface point, in scenes with many point or spot lights.
 //!
-//! The lights are divided into sets of four to eight lights. Sets of spot lights are larger,
-//! because most surfaces are outside of most cones. At each surface a path chooses one set, all
-//! with the same probability, and traces shadow rays to its lights. A stratum is a group of lights
-//! that are close to each other: consecutive lights in the order of a Morton curve. A set holds at
-//! most one light of each stratum, so that its lights are spread over the scene.
+//! A *set* has four to eight lights; sets of spot lights are larger, because most surfaces are
+//! outside most cones. At each surface a path chooses one set, all with the same probability, and
+//! traces shadow rays to its lights. A *stratum* is a group of lights that are close to each other:
+//! consecutive lights in the order of a Morton curve. A set holds at most one light of each
+//! stratum, so that its lights are spread over the scene.
 //!
 //! The number of sets is a power of two, because successive samples of a pixel are stratified over
 //! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
-//! every light once. If n were no power of two, the noise would be several times as large.
+//! every light once. With another number the noise would be several times as large.
 //!
 //! The probabilities depend neither on the intensities of the lights nor on the surface point.
 //! Lights that are much brighter than the others are left out of the choice: shadow rays go to them
-//! from every surface. All lights are in one light group, see
-//! [`LightGroups`](crate::LightGroups).
+//! from every surface. All lights are in one light group, see [`LightGroups`](crate::LightGroups).
 
 use crate::world::DeltaSource;
 use glam::DVec3;
@@ -24,13 +23,11 @@ use zerkalo_kernel::primitive::BoundingSphere;
 use zerkalo_scene::light::{DeltaLight, Light, LightForm, SpotCone, spot_factor};
 use zerkalo_scene::value::sort_by_number;
 
-/// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
-/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the time of both
-/// methods. A spot light counts as a part of a light; see [`ManyLights`].
+/// Smallest number of point lights in a scene for which paths choose. `benches/many-lights.sh`
+/// measures the time of both methods. A spot light counts as a part of a light; see [`ManyLights`].
 pub(crate) const MIN_LIGHTS: usize = 16;
 
-/// Smallest number of lights in a set, if all are point lights. A set holds the lights to which a
-/// path traces shadow rays at one surface.
+/// Smallest number of lights in a set of point lights.
 const MIN_SET: usize = 4;
 
 /// Weight of the part of the variance that all lights have in common, relative to the other parts;
@@ -38,49 +35,37 @@ const MIN_SET: usize = 4;
 /// needs 2.3 times as many rays as with this weight.
 const COMMON_VARIANCE: f64 = 0.25;
 
-/// Largest number of bright lights; see [`bright_lights`]. Paths trace shadow rays to all bright
-/// lights at each surface, although they choose among the other lights.
+/// Largest number of bright lights; see [`bright_lights`].
 const MAX_BRIGHT: usize = 16;
 
 /// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
 /// lookup in 16 elements is one instruction.
 const MIN_TABLE: usize = 16;
 
-/// Values of one property of the lights of a stratum (a spatial group). The lights of a scene are
-/// divided into sets, which have at most one light of each stratum. A path chooses one set at a
-/// surface and traces shadow rays to its lights.
+/// Values of one property of the lights of a stratum.
 enum Table<S> {
-    /// Value that all lights of the stratum (spatial group of lights) have.
+    /// Value that all sets share.
     Common(S),
-    /// Value for each set of lights (those to which one path traces shadow rays). Elements beyond
-    /// the number of sets are never read.
+    /// Value for each set. Elements beyond the number of sets are never read.
     BySet(Vec<S>),
 }
 
-/// Stratum: a spatial group of lights. A path traces shadow rays to at most one of them at each
-/// surface.
+/// Group of lights of which each set has at most one.
 struct Stratum<S> {
-    /// Sphere around the lights of the stratum (spatial group of lights).
+    /// Sphere around the lights.
     ball: BoundingSphere,
-    /// Coordinates x, y and z of the stratum's lights, one light for each set (the lights to which
-    /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
-    /// coordinates are NaN; the test whether the surface faces the light then fails.
+    /// Coordinates; NaN in sets without a light of the stratum, so that no surface faces it.
     positions: [Table<S>; 3],
-    /// Irradiance, at normal incidence, of the stratum's light in each set. It is 0 for lights
-    /// whose irradiance decreases with the square of the distance. The irradiance of other lights
-    /// is the same at every distance.
+    /// Irradiance at normal incidence, the same at every distance; 0 for lights whose irradiance
+    /// decreases with the square of the distance.
     constant: Table<S>,
-    /// Emission (colour times intensity) of the stratum's light in each set: red, green and blue.
-    /// The tracer multiplies the samples of the light by its emission. A set without a light of the
-    /// stratum has the emission 1.
+    /// Red, green and blue emission; 1 in sets without a light of the stratum.
     emission: [Table<S>; 3],
-    /// Cones of the stratum's lights. `None` if all of them emit equally in all directions.
+    /// `None` if all lights emit equally in all directions.
     cones: Option<Cones<S>>,
 }
 
-/// Cones of the lights of a stratum (spatial group of lights). The cone of a point light contains
-/// all directions. The fields are those of [`SpotCone`], for the stratum's light in each set (the
-/// lights to which one path traces shadow rays).
+/// Fields of the [`SpotCone`] of each light. The cone of a point light contains all directions.
 struct Cones<S> {
     axis: [Table<S>; 3],
     outer: Table<S>,
@@ -89,27 +74,25 @@ struct Cones<S> {
 
 /// Point and spot lights of a scene, of which each path chooses a few at each surface.
 pub(crate) struct LightChoice<S> {
-    /// Index of the light group that all lights of this choice share.
+    /// Light group of all lights of this choice.
     pub group: usize,
-    /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
+    /// Number of sets, a power of two.
     sets: usize,
     strata: Vec<Stratum<S>>,
 }
 
-/// For each lane of a packet, the set of lights to which it traces shadow rays.
+/// Set of lights that each lane of a packet has chosen.
 pub(crate) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
-    /// Index of the chosen set of lights in each lane.
     sets: [u32; MAX_WIDTH],
 }
 
 impl<S: Float> LightChoice<S> {
     /// Removes from `sources` the lights among which paths choose: point and spot lights that are
-    /// not on a surface, except for those that are much brighter than the others. Lights of a kind
-    /// (point or spot) remain if the scene does not have `many` of this kind, or if fewer than
-    /// `MIN_LIGHTS` of them are not on a surface. Returns `None`, and removes nothing, if no lights
-    /// are left to choose from. `extent` is the largest absolute coordinate of the scene's shapes
-    /// and camera.
+    /// not on a surface, except for bright ones. Lights of a kind remain if the scene does not have
+    /// `many` of it, or if fewer than `MIN_LIGHTS` of them are not on a surface. Returns `None`,
+    /// and removes nothing, if no lights are left to choose from. `extent` is the largest absolute
+    /// coordinate of the scene's shapes and camera.
     pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
         let of_kind = |is_spot: bool, is_many: bool| {
             let is_kind = |source: &DeltaSource<S>| match &source.light.light {
@@ -128,7 +111,7 @@ impl<S: Float> LightChoice<S> {
         candidates.sort_unstable();
         let shares = candidates.iter().map(|i| match &sources[*i].light.light {
             DeltaLight::Point { cone: Some(cone), .. } => share(cone.outer.to_f64()),
-            _ => 1.0,
+            DeltaLight::Point { cone: None, .. } | DeltaLight::Directional { .. } => 1.0,
         });
         let sets = 1 << (shares.sum::<f64>() as usize / MIN_SET).max(1).ilog2();
         let powers = powers(candidates.iter().map(|i| &sources[*i]), extent);
@@ -153,19 +136,17 @@ impl<S: Float> LightChoice<S> {
         Some(Self { group, sets, strata })
     }
 
-    /// Returns the number of strata (spatial groups of lights).
     pub fn strata(&self) -> usize {
         self.strata.len()
     }
 
     /// Returns the light period: the number of successive samples of a pixel that together trace a
-    /// shadow ray to each light once. It is the number of sets of lights, because each of these
-    /// samples uses a different set.
+    /// shadow ray to each light once.
     pub fn period(&self) -> u32 {
         self.sets as u32
     }
 
-    /// Returns a sphere around the lights of each stratum (spatial group of lights).
+    /// Returns a sphere around the lights of each stratum.
     pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
         self.strata.iter().map(|stratum| stratum.ball)
     }
@@ -181,9 +162,8 @@ impl<S: Float> LightChoice<S> {
 }
 
 impl<S: Float> Table<S> {
-    /// Creates a table of one property of lights, with a value for each of `sets` sets. `values`
-    /// are the values of the lights, and `absent` is the value for sets without a light of the
-    /// stratum.
+    /// Creates a table for `sets` sets from the values of the lights. `absent` is the value of sets
+    /// without a light of the stratum.
     fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
         let absent = S::from_f64(absent);
         let is_full = values.clone().count() == sets;
@@ -206,40 +186,33 @@ impl<S: Float> Table<S> {
 }
 
 impl<S: Float> Stratum<S> {
-    /// Creates a stratum (spatial group of lights) from its `lights`. Each of the `sets` sets holds
-    /// at most one light of the stratum. A path chooses one set at a surface and traces shadow rays
-    /// to its lights.
     fn new(lights: &[DeltaSource<S>], sets: usize) -> Self {
-        let coordinate = |axis: usize| {
-            let coordinate = move |light: &DeltaSource<S>| match light.light.light {
-                DeltaLight::Point { position, .. } => position[axis],
-                DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
-            };
-            Table::new(lights.iter().map(coordinate), f64::NAN, sets)
+        let table = |absent: f64, value: &dyn Fn(&DeltaSource<S>) -> S| {
+            Table::new(lights.iter().map(value), absent, sets)
         };
-        let constant = |light: &DeltaSource<S>| match light.light.light {
-            DeltaLight::Point { inverse_square: false, .. } => S::from_f64(PI),
-            _ => S::default(),
+        let coordinate = |light: &DeltaSource<S>, axis: usize| match light.light.light {
+            DeltaLight::Point { position, .. } => position[axis],
+            DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
         };
-        let emission = |channel: usize| {
-            let emission = move |light: &DeltaSource<S>| {
-                light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
-            };
-            Table::new(lights.iter().map(emission), 1.0, sets)
+        let constant = |light: &DeltaSource<S>| match light.light.light.is_inverse_square() {
+            true => S::default(),
+            false => S::from_f64(PI),
+        };
+        let emission = |light: &DeltaSource<S>, channel: usize| {
+            light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
         };
         Self {
             ball: ball(lights.iter().map(place)),
-            positions: [0, 1, 2].map(coordinate),
-            constant: Table::new(lights.iter().map(constant), 0.0, sets),
-            emission: [0, 1, 2].map(emission),
+            positions: [0, 1, 2].map(|axis| table(f64::NAN, &|light| coordinate(light, axis))),
+            constant: table(0.0, &constant),
+            emission: [0, 1, 2].map(|channel| table(1.0, &|light| emission(light, channel))),
             cones: Cones::new(lights, sets),
         }
     }
 }
 
 impl<S: Float> Cones<S> {
-    /// Creates the cones of the `lights` of a stratum (spatial group of lights), at most one for
-    /// each of `sets` sets. Returns `None` if all lights emit equally in all directions.
+    /// Returns `None` if all `lights` emit equally in all directions.
     fn new(lights: &[DeltaSource<S>], sets: usize) -> Option<Self> {
         let cone = |light: &DeltaSource<S>| match light.light.light {
             DeltaLight::Point { cone, .. } => cone,
@@ -267,17 +240,14 @@ impl<S: Float> ChosenSets<'_, S> {
         Vec3::new(x.gather(&self.sets), y.gather(&self.sets), z.gather(&self.sets))
     }
 
-    /// Returns the position of each lane's chosen light in the stratum number `stratum` (a spatial
-    /// group of lights).
+    /// Returns the position of each lane's light in the stratum number `stratum`.
     #[inline(always)]
     pub fn positions<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].positions)
     }
 
-    /// Returns the irradiance of each lane's chosen light in the stratum number `stratum` (a
-    /// spatial group of lights), divided by the probability of the choice. The irradiance is that
-    /// of a light with unit emission at normal incidence. `inverse` is the reciprocal of the
-    /// distance to the light.
+    /// Returns the irradiance by each lane's light of unit emission at normal incidence, divided by
+    /// the probability of the choice. `inverse` is the reciprocal of the distance to the light.
     #[inline(always)]
     pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
         let count = L::from_f64(self.choice.sets as f64);
@@ -287,9 +257,8 @@ impl<S: Float> ChosenSets<'_, S> {
         L::select(constant.gt(L::zero()), constant, falling) * count
     }
 
-    /// Returns the factor, 0..=1, of the intensity of each lane's chosen light in the stratum
-    /// number `stratum` (a spatial group of lights): that of its cone in the direction `wi`, a unit
-    /// vector from the surface point to the light. Returns `None` if no light of the stratum has a
+    /// Returns the factor, 0..=1, of the intensity of each lane's light towards a surface point.
+    /// `wi` is the unit vector from the point to the light. `None` if no light of the stratum has a
     /// cone.
     #[inline(always)]
     pub fn cone<L: SimdFloat<Scalar = S>>(&self, stratum: usize, wi: Vec3<L>) -> Option<L> {
@@ -298,17 +267,14 @@ impl<S: Float> ChosenSets<'_, S> {
         Some(spot_factor(wi, self.gather(axis), outer, scale))
     }
 
-    /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
-    /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
-    /// multiply the lights' samples by an emission.
+    /// Returns the emission of each lane's light; 1 if the tracer does not multiply samples by it.
     #[inline(always)]
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].emission)
     }
 }
 
-/// Kinds of lights of which a scene has so many that paths choose a few at each surface. The lights
-/// of such a kind share one light group.
+/// Kinds of lights of which a scene has so many that paths choose a few of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.
@@ -320,7 +286,6 @@ pub(crate) struct ManyLights {
 }
 
 impl ManyLights {
-    /// Counts `lights`, which are those that change the picture.
     pub fn new<'a>(lights: impl Iterator<Item = &'a Light>) -> Self {
         let (mut points, mut spots) = (0, 0.0);
         for light in lights {
@@ -335,7 +300,6 @@ impl ManyLights {
         Self { points: points >= MIN_LIGHTS, spots: spots >= MIN_LIGHTS as f64 }
     }
 
-    /// Returns `true` if the scene has many lights of the kind of `light`.
     pub fn includes(&self, light: &Light) -> bool {
         match light.form() {
             LightForm::Point { cone: None, .. } => self.points,
@@ -345,8 +309,8 @@ impl ManyLights {
     }
 }
 
-/// Returns the solid angle of a cone in hemispheres, at most 1. It is approximately the share of
-/// the surfaces that a spot light with this cone illuminates. `outer` is [`SpotCone::outer`].
+/// Returns the solid angle of a cone in hemispheres, at most 1: roughly the share of the surfaces
+/// that it contains. `outer` is [`SpotCone::outer`].
 fn share(outer: f64) -> f64 {
     outer.min(1.0)
 }
@@ -356,9 +320,9 @@ fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
     source.light.light.position().unwrap_or_default()
 }
 
-/// Returns the power of each light in arbitrary units: red, green and blue. Lights whose irradiance
-/// does not depend on the distance are compared with the others at the mean distance of the lights
-/// from the scene's centre, which is the origin. This distance is at least `extent`.
+/// Returns the power of each light in arbitrary units: red, green and blue. Lights without falloff
+/// are compared with the others at the mean distance of the lights from the scene's centre, or at
+/// `extent` if it is larger.
 fn powers<'a, S: Float>(
     lights: impl Iterator<Item = &'a DeltaSource<S>> + Clone,
     extent: f64,
@@ -375,9 +339,8 @@ fn powers<'a, S: Float>(
     lights.map(power).collect()
 }
 
-/// Returns the indices of the bright lights: those to which every path traces shadow rays at each
-/// surface. The other lights are divided into `sets`, of which a path chooses one per surface.
-/// `powers` are the powers of all lights: red, green and blue.
+/// Returns the indices of the bright lights, to which every path traces shadow rays at each
+/// surface. The others are divided into `sets`.
 ///
 /// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
 /// smallest product of variance and cost. The cost is the number of rays per surface: one that
@@ -388,7 +351,6 @@ fn powers<'a, S: Float>(
 /// sets, because a path reaches only one of the sets.
 ///
 /// If all lights have similar powers, none is bright, because the squared sum outweighs the rest.
-/// Among one strong light and many weak ones, the strong light is bright.
 fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
     let largest = powers.iter().map(|power| power.max_element()).fold(0.0, f64::max);
     if !(largest > 0.0 && largest.is_finite()) {
@@ -412,13 +374,12 @@ fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
     order
 }
 
-/// Returns the value that all `items` have. Returns `None` if they differ or if there are none.
 fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
     let first = items.next()?;
     items.all(|item| item == first).then_some(first)
 }
 
-/// Returns a sphere that contains `points`, centred on their bounding box.
+/// Returns a sphere around `points`, centred on their bounding box.
 fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     let low = points.clone().reduce(DVec3::min).unwrap_or_default();
     let high = points.clone().reduce(DVec3::max).unwrap_or_default();
@@ -428,7 +389,7 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
 }
 
-/// Returns the position of `point` on a Morton curve through the box from `low` to `high`.
+/// Returns the position of `point` on a Morton curve through the box.
 fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
     let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
     morton_code(((point - low) / extent).to_array())

@@ -21,23 +21,19 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{SimdFloat, Vec3};
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, HalfSpace, ParallelogramForm};
 
-/// Distance between an emissive sheet and the surface off which it is moved. The unit is the height
-/// of sampled points above the sheet. At this distance the surface does not count as covering the
-/// points that are sampled on either side of the sheet (see [`CONTACT_LIFTS`]).
+/// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
+/// points. At this distance the surface does not count as covering them (see [`CONTACT_LIFTS`]).
 const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
 
 /// Number of test points for contact along each side of a triangle.
 const POINTS_PER_SIDE: u32 = 12;
 
-/// Largest number of triangles of a form for which contact is tested at several points of each
-/// triangle. In forms with more triangles, it is tested at one point of each.
+/// Largest number of triangles of a form that are tested at several points each; others at one
+/// point.
 const MAX_DETAILED: usize = 12;
 
-/// Largest number of triangles of a mesh that are tested for contact.
 const MAX_POINTS: usize = 1024;
 
-/// Smallest cosine of the angle between the normals of a sheet and of a surface on which it can
-/// lie.
 const MIN_COSINE: f64 = 0.999_999;
 
 /// Sides on which an object emits light.
@@ -48,9 +44,8 @@ pub(crate) enum Emits {
     BothSides,
 }
 
-/// Moves emissive sheets off the opaque surfaces on which they lie. For each object, `emits` holds
-/// the sides that emit light, and `transmits` is `true` if it transmits light. `eye` is the
-/// position of the camera. `lift` is the height of sampled points above emissive surfaces. Returns
+/// Moves emissive sheets off the opaque surfaces on which they lie. `emits` and `transmits`
+/// describe each object. `lift` is the height of sampled points above emissive surfaces. Returns
 /// `None` if no sheet is moved.
 pub(crate) fn move_off_surfaces(
     geometry: &RecenteredGeometry,
@@ -123,8 +118,8 @@ struct Sheet {
 }
 
 impl Sheet {
-    /// Returns the sheet with the geometry `form`; `None` if the geometry is not flat. Corners of a
-    /// mesh may be up to `lift` away from a common plane.
+    /// Returns `None` if `form` is not flat. Corners of a mesh may be up to `lift` away from a
+    /// common plane.
     fn new(form: &Form, lift: f64) -> Option<Self> {
         let ball = form.bounding_sphere();
         if let Some(plane) = form.plane() {
@@ -157,20 +152,18 @@ impl Sheet {
 struct Contact {
     /// Side on which the sheet is visible: 1 for the front, -1 for the back.
     side: f64,
-    /// Height of the sheet above the surface, along the normal of the sheet; negative if the sheet
-    /// is below the surface.
+    /// Height of the sheet above the surface along the sheet's normal; negative below.
     height: f64,
 }
 
-/// Objects of a scene. Each is compiled by itself, at its first use.
+/// Objects of a scene, each compiled by itself at its first use.
 struct CompiledObjects<'a> {
     forms: &'a [Form],
     aggregates: HashMap<usize, Aggregate<f64>>,
 }
 
 impl CompiledObjects<'_> {
-    /// Returns the closest hit of a ray with an object: its distance, and the outward normal of the
-    /// object there.
+    /// Returns the distance of a ray's closest hit with an object, and the outward normal there.
     fn hit(&mut self, object: usize, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         let form = slice::from_ref(&self.forms[object]);
         let compile = || Aggregate::with_tree(form, false);
@@ -185,10 +178,8 @@ impl CompiledObjects<'_> {
         Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
     }
 
-    /// Tests if the flat emissive object number `object` lies on the object `carrier`. Returns the
-    /// height of the surface of `carrier` above the plane of the object, and the side on which the
-    /// object is visible. `sheet` describes the plane of the object. Returns `None` if no tested
-    /// point of the object is on `carrier`.
+    /// Returns the contact of the sheet `object` with the object `carrier`; `None` if no tested
+    /// point of the sheet is on it.
     fn contact(
         &mut self,
         (object, sheet): (usize, &Sheet),
@@ -228,8 +219,8 @@ impl CompiledObjects<'_> {
     }
 }
 
-/// Returns `true` if `sheet` may lie on the form `carrier`: if the form may have a flat face in the
-/// plane of the sheet. The two planes may be up to `reach` apart.
+/// Returns `true` if the form `carrier` may have a flat face in the plane of `sheet`. The two
+/// planes may be up to `reach` apart.
 fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
     let is_parallel = |normal: DVec3| normal.dot(sheet.plane.normal).abs() >= MIN_COSINE;
     // Angles below that of `MIN_COSINE` displace the edge of the sheet by 0.2 % of its radius.

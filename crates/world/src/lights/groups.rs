@@ -1,7 +1,7 @@
-//! Light groups. A light group is the part of the picture that comes from one source: a light, an
-//! emissive material, ambient light or the background. It is proportional to the colour and
-//! intensity of the source. The film stores each group separately, so that colour and intensity can
-//! change without new samples.
+//! Light groups. A *light group* is the part of the picture that comes from one source: a light, an
+//! emissive material, ambient light or the background. It is proportional to the *emission* of the
+//! source, its colour times its intensity. The film stores each group separately, so that emissions
+//! can change without new samples.
 
 use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
 use crate::lights::choice::ManyLights;
@@ -12,40 +12,37 @@ use zerkalo_scene::material::Material;
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{Object, Scene};
 
-/// Largest number of light groups for lights and emissive materials. If a scene has more lights and
-/// emissive materials than that, several of them share the last of these groups.
+/// Largest number of light groups for lights and emissive materials. Further ones share the last of
+/// these groups.
 const MAX_LIGHT_GROUPS: usize = 8;
 
-/// Largest number of light groups: those of lights and emissive materials, one for ambient light,
-/// and one for the background.
+/// Largest number of light groups, with ambient light and background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Largest size \[bytes\] of the film's integer sums. Lights get groups of their own until the sums
-/// reach this size; further lights share the last group.
+/// Largest size of the film's integer sums \[bytes\]. Lights get groups of their own until the sums
+/// reach it.
 const FILM_BYTES: u64 = 1 << 30;
 
-/// Bytes that the film stores per pixel for one light group. Each of the two replicates, which are
-/// halves of the samples, has one sum of eight bytes for each of three channels.
+/// Bytes of the film per pixel and light group: two replicates, three channels, eight bytes.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
-/// Source of the light in one light group.
+/// Source of a light group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
-    /// Ambient light of the scene.
+    /// Ambient light.
     Ambient,
-    /// Background: the radiance of rays that miss all primitives.
+    /// Radiance of rays that miss all primitives.
     Background,
-    /// One light; the value is its index in the scene.
+    /// Light by its index in the scene.
     Light(usize),
-    /// Emission of all objects with one material; the value is the name of the material.
+    /// Emission of all objects with the material of this name.
     Material(String),
-    /// Several lights and materials. The tracer multiplies the samples of each by its colour and
-    /// intensity.
+    /// Several lights and materials. The tracer multiplies the samples of each by its emission.
     Shared(Vec<LightGroupSource>),
 }
 
 impl LightGroupSource {
-    /// Returns the lights and materials in the light group; empty for ambient light and background.
+    /// Returns the lights and materials in the group; empty for ambient light and background.
     pub fn emitting(&self) -> &[Self] {
         match self {
             Self::Ambient | Self::Background => &[],
@@ -54,8 +51,7 @@ impl LightGroupSource {
         }
     }
 
-    /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
-    /// black.
+    /// Returns the emission of a light or material; black for other sources.
     pub(crate) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
@@ -68,21 +64,20 @@ impl LightGroupSource {
 /// Light groups of a scene, except for groups that would be black in every sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
-    /// Sources of the light groups, in the order of the film's sums: one source for each group.
+    /// Source of each group, in the order of the film's sums.
     pub members: Vec<LightGroupSource>,
     /// `true` if some surface reflects light that arrives directly from lights.
     pub(crate) lit: bool,
     /// `true` if some surface reflects ambient light.
     pub(crate) ambient: bool,
-    /// Kinds of lights of which the scene has so many that paths choose a few at each surface.
     pub(crate) many: ManyLights,
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
-    /// materials share one group. Otherwise each has a group of its own, with two exceptions that
-    /// share the last group: the lights of a kind (point or spot) of which the scene has many (see
-    /// `ManyLights`), and the lights and materials beyond the largest number of groups.
+    /// Creates the light groups of `scene`. Lights and emissive materials have groups of their own,
+    /// with three exceptions that share the last group: all of them if `merge_lights` is `true`,
+    /// the lights of a kind of which the scene has many (see `ManyLights`), and those beyond the
+    /// largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -125,22 +120,20 @@ impl LightGroups {
         Self { members, lit, ambient, many }
     }
 
-    /// Returns the number of light groups that would remain if all lights and emissive materials
-    /// shared one.
+    /// Returns the number of groups that would remain if all lights and emissive materials shared
+    /// one.
     pub fn merged_count(&self) -> usize {
         let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
         self.members.len() - lights.saturating_sub(1)
     }
 
-    /// Returns the index of the light group whose source is `wanted`. Returns `None` if there is no
-    /// such group.
+    /// Returns the index of the group whose source is `wanted`.
     pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Returns three values for each light in a light group: its index in the scene, the index of
-    /// the group, and its emission. The tracer multiplies the light's samples by the emission,
-    /// which is 1 for a light with a group of its own.
+    /// Returns each light in a group: its index in the scene, the index of the group, and the
+    /// emission by which the tracer multiplies its samples, which is 1 in a group of its own.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let light = |source: &LightGroupSource| match source {
             LightGroupSource::Light(i) => Some(*i),
@@ -149,9 +142,7 @@ impl LightGroups {
         self.emitting(scene, light)
     }
 
-    /// Returns three values for each emissive material: its name, the index of its light group, and
-    /// its emission. The tracer multiplies the material's samples by the emission, which is 1 for a
-    /// material with a group of its own.
+    /// Returns each emissive material as [`LightGroups::lights`] returns lights, by its name.
     pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
         let material = |source: &LightGroupSource| match source {
             LightGroupSource::Material(name) => Some(name.clone()),
@@ -160,9 +151,8 @@ impl LightGroups {
         self.emitting(scene, material)
     }
 
-    /// Returns three values for each source (light or emissive material) that `select` accepts: the
-    /// result of `select`, the index of the light group, and the emission. The tracer multiplies
-    /// the source's samples by the emission, which is 1 for a source with a group of its own.
+    /// Returns the sources that `select` accepts, each with its group and the emission by which the
+    /// tracer multiplies its samples.
     fn emitting<T>(
         &self,
         scene: &Scene,
@@ -179,10 +169,9 @@ impl LightGroups {
         out
     }
 
-    /// Returns the red, green and blue factor by which the film's sums of each light group are
-    /// multiplied in the picture of `scene`. `scene` may differ from the compiled scene in colours,
-    /// intensities and on/off switches of lights, emission of materials, ambient light and
-    /// background.
+    /// Returns the factors by which the film's sums of each group are multiplied in the picture of
+    /// `scene`, which may differ from the compiled scene in emissions and on/off switches, ambient
+    /// light and background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -193,7 +182,7 @@ impl LightGroups {
         self.members.iter().map(weight).collect()
     }
 
-    /// Returns the name of each light group, for layers of image files.
+    /// Returns the name of each group, for layers of image files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         let name = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => "ambient".to_string(),
@@ -208,9 +197,9 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two. The scale is derived from the group's [`RadianceRange`].
-    /// `ranges` has that of each light, by its index in the scene, for intensity 1.
+    /// Returns the scale of each group: the number of integer steps per unit of radiance in the
+    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `ranges` has that of
+    /// each light, by its index in the scene, for intensity 1.
     pub(crate) fn scales<S: Float>(
         &self,
         scene: &Scene,
@@ -263,7 +252,7 @@ pub(crate) fn emissive_materials(scene: &Scene) -> Vec<String> {
     names
 }
 
-/// Returns the emission of a light: colour times intensity, black if it is off.
+/// Returns the emission of a light; black if it is off.
 pub(crate) fn emission(light: &Light) -> [f64; 3] {
     if light.on { light.color.scaled(light.intensity).0 } else { [0.0; 3] }
 }
@@ -273,8 +262,8 @@ pub(crate) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
 
-/// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
-/// or the camera sees it. `lit` is `true` if some surface reflects direct light.
+/// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light
+/// (`lit`) or the camera sees it.
 pub(crate) fn contributes(light: &Light, lit: bool) -> bool {
     emits(light) && (lit || light.visible && light.has_radiance())
 }

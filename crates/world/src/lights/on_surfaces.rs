@@ -11,12 +11,11 @@ use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::Form;
 
-/// Largest distance from a surface at which a point light counts as located on the surface. The
-/// unit is the rounding error of the largest coordinate.
+/// Largest distance at which a point light counts as on a surface, in rounding errors of the
+/// largest coordinate.
 const ON: f64 = 8.0;
 
-/// Height above a light's surface at which shadow rays to the light end, in rounding errors of the
-/// largest coordinate.
+/// Height above a light's surface at which shadow rays to the light end, in the same unit.
 const LIFT: f64 = 16.0;
 
 /// Largest distance by which one solid moves the end point of shadow rays away from a light on its
@@ -27,16 +26,15 @@ const SHARPEST: f64 = 4.0;
 /// Surfaces on which a point light is located.
 pub(crate) struct OnSurface<S> {
     position: [S; 3],
-    /// Unit normals of the surfaces at the light, one list for each convex solid, flat shape or
-    /// mesh.
+    /// Unit normals at the light, one list for each convex solid, flat shape or mesh.
     solids: Vec<Vec<[S; 3]>>,
     lift: S,
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Finds the surfaces that contain the position of a light. `forms` are the shapes of all
-    /// objects. All coordinates are relative to `origin`; `epsilon` is their relative rounding
-    /// error. Returns `None` if the light is on no surface.
+    /// Finds the surfaces that contain the position of a light. `forms` and `position` are relative
+    /// to `origin`; `epsilon` is the relative rounding error of coordinates. Returns `None` if the
+    /// light is on no surface.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
         let mut largest = 0.0f64;
@@ -58,14 +56,13 @@ impl<S: Float> OnSurface<S> {
     }
 
     /// Returns an upper bound of the distance between the light and an end point of its shadow
-    /// rays. The end points are a little above the surfaces on which the light is located.
+    /// rays.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }
 
-    /// Returns two values for each lane: the unit direction from `start` to the end point of the
-    /// light's shadow ray, and the distance from `start` to this point. The end points are a little
-    /// above the light's surface.
+    /// Returns the unit direction and the distance from `start` to the end point of the light's
+    /// shadow ray, a little above the light's surface.
     #[inline(never)]
     pub fn end<L: SimdFloat<Scalar = S>>(&self, start: Vec3<L>) -> (Vec3<L>, L) {
         let to = Vec3::splat(self.position) - start;

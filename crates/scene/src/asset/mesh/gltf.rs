@@ -20,7 +20,7 @@ use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Parses a glTF or GLB file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
-    let (document, blob) = description(source)?;
+    let Gltf { document, blob } = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
     let mut builder = Builder::new(source);
     let mut visited = vec![false; document.nodes().count()];
@@ -47,9 +47,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Parses and validates the JSON document of the file. Returns two values: the document, and the
-/// binary chunk of a GLB file (`None` if there is none).
-fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
+/// Parses and validates the JSON document of the file.
+fn description(source: &FileContents) -> Result<Gltf, AssetError> {
     // Bytes 8 to 11 of a GLB file are its length. The library subtracts the size of the header from
     // this length without a check for underflow.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -76,7 +75,7 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
         }
     }
     let document = Document::from_json(json).map_err(|error| library_error(source, &error))?;
-    Ok((document, gltf.blob))
+    Ok(Gltf { document, blob: gltf.blob })
 }
 
 /// Returns the root nodes of the default scene. Without a default scene, returns those of the first
@@ -162,6 +161,21 @@ fn buffers<'a>(
     Ok(all)
 }
 
+/// Returns the corners of each triangle of a list, strip or fan with `corners` corners, in the other
+/// sense of rotation if the part is `mirrored`.
+fn faces(mode: Mode, corners: usize, mirrored: bool) -> impl ExactSizeIterator<Item = [usize; 3]> {
+    let count = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
+    (0..count).map(move |i| {
+        let [a, b, c] = match mode {
+            Mode::TriangleStrip if i % 2 == 1 => [i + 1, i, i + 2],
+            Mode::TriangleStrip => [i, i + 1, i + 2],
+            Mode::TriangleFan => [0, i + 1, i + 2],
+            _ => [3 * i, 3 * i + 1, 3 * i + 2],
+        };
+        if mirrored { [a, c, b] } else { [a, b, c] }
+    })
+}
+
 /// Part of a glTF scene: a primitive (a piece of a mesh) with the transform of its node.
 struct Part<'a> {
     source: &'a FileContents,
@@ -184,36 +198,27 @@ impl<'a> Part<'a> {
         let vertices = positions.count();
         let positions = self.floats::<3>(positions)?;
         let normals = self.primitive.get(&Semantic::Normals);
-        let mut normals = normals.map(|a| self.floats::<3>(a)).transpose()?;
+        let normals = normals.map(|a| self.floats::<3>(a)).transpose()?;
         let uvs = self.primitive.get(&Semantic::TexCoords(0));
         let mut uvs = uvs.map(|a| self.pairs(a)).transpose()?;
-        let [r, g, b, _] = self.primitive.material().pbr_metallic_roughness().base_color_factor();
-        let color = [r, g, b];
-        if !color.iter().all(|x| (0.0..=1e6).contains(x)) {
-            let found = "a base colour is not a colour";
-            return Err(self.source.fault(found, "numbers of at least 0"));
-        }
-        // Triangles without a stored colour are white. White therefore needs to be stored only if
-        // the mesh has a stored colour already.
-        if color != [1.0; 3] || builder.has_colors() {
-            builder.color(color)?;
-        }
+        self.add_color(builder)?;
         let indices = self.primitive.indices();
         let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar, a.data_type()));
         let indices = indices.transpose()?;
         let corners = indices.as_ref().map_or(vertices, |s| s.count);
-        let faces = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
-        builder.reserve(vertices, faces)?;
-        let base = builder.vertices();
         let linear = self.map.matrix3;
-        let mirrored = linear.determinant() < 0.0;
-        let turn = linear.inverse().transpose();
+        let faces = faces(mode, corners, linear.determinant() < 0.0);
+        builder.reserve(vertices, faces.len())?;
+        let base = builder.vertices();
+        let normal_map = linear.inverse().transpose();
+        let mut normals = normals.map(|normals| {
+            normals.map(|n| (normal_map * DVec3::from_array(n.map(f64::from))).normalize_or_zero())
+        });
         for position in positions {
             let p = self.map.transform_point3(DVec3::from_array(position.map(f64::from)));
             builder.vertex(p.to_array());
             if let Some(normal) = normals.as_mut().and_then(Iterator::next) {
-                let n = turn * DVec3::from_array(normal.map(f64::from));
-                builder.normal(n.normalize_or_zero().as_vec3().to_array());
+                builder.normal(normal.as_vec3().to_array());
             }
             if let Some([u, v]) = uvs.as_mut().and_then(Iterator::next) {
                 // The texture coordinate v points downwards in glTF, and upwards in
@@ -227,23 +232,27 @@ impl<'a> Part<'a> {
             Some(slice) => slice.index(i),
             None => i as u32,
         };
-        for face in 0..faces {
-            let [a, b, c] = match mode {
-                Mode::TriangleStrip if face % 2 == 1 => [face + 1, face, face + 2],
-                Mode::TriangleStrip => [face, face + 1, face + 2],
-                Mode::TriangleFan => [0, face + 1, face + 2],
-                _ => [3 * face, 3 * face + 1, 3 * face + 2],
-            };
-            let mut triangle = [corner(a), corner(b), corner(c)];
+        for face in faces {
+            let triangle = face.map(corner);
             if let Some(beyond) = triangle.iter().find(|i| **i as usize >= vertices) {
                 let found = format!("a triangle names vertex {beyond}, counted from 0");
                 let expected = format!("a vertex below {vertices}, their number");
                 return Err(self.source.error(place(), found, &expected));
             }
-            if mirrored {
-                triangle.swap(1, 2);
-            }
             builder.triangle(triangle.map(|i| i + base as u32), place)?;
+        }
+        Ok(())
+    }
+
+    fn add_color(&self, builder: &mut Builder) -> Result<(), AssetError> {
+        let [r, g, b, _] = self.primitive.material().pbr_metallic_roughness().base_color_factor();
+        if ![r, g, b].iter().all(|x| (0.0..=1e6).contains(x)) {
+            let found = "a base colour is not a colour";
+            return Err(self.source.fault(found, "numbers of at least 0"));
+        }
+        // Triangles without a stored colour are white.
+        if [r, g, b] != [1.0; 3] || builder.has_colors() {
+            builder.color([r, g, b])?;
         }
         Ok(())
     }

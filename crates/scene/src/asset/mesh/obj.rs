@@ -26,8 +26,7 @@ const UNCOLORED: [f32; 3] = [1.0; 3];
 /// Parses an OBJ file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
-    let counts = check_faces(source)?;
-    builder.check_limits(counts[0], 0)?;
+    builder.check_limits(check_faces(source)?, 0)?;
     let libraries = RefCell::new(Libraries::default());
     let options = LoadOptions {
         single_index: true,
@@ -110,8 +109,8 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Checks that every index of a face in an OBJ file is valid, and that the number of triangles is
-/// within the limit. Returns three counts of the file: vertices, texture coordinates and normals.
-fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
+/// within the limit. Returns the number of vertices.
+fn check_faces(source: &FileContents) -> Result<usize, AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
         Some(b"vt") => Some(1),
@@ -160,7 +159,7 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
         triangles += corners.saturating_sub(2);
         builder.check_limits(0, triangles)?;
     }
-    Ok(totals)
+    Ok(totals[0])
 }
 
 /// Adds the line number to an error about the coordinates of a vertex in an OBJ file.

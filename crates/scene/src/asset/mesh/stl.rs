@@ -15,36 +15,9 @@ const TRIANGLE: usize = 50;
 
 /// Parses an STL file.
 pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
-    let bytes = &mut source.bytes;
-    let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let fits = announced
-        .is_some_and(|n| bytes.len() as u64 >= HEADER as u64 + TRIANGLE as u64 * u64::from(n));
-    let exact = fits && announced.is_some_and(|n| bytes.len() == HEADER + TRIANGLE * n as usize);
-    let zeros = bytes.iter().take(HEADER).any(|b| *b == 0);
-    let text = bytes.starts_with(b"solid") && !exact && !zeros;
-    if text {
-        // The library requires a space after `solid`; the format does not.
-        if bytes.get(5) != Some(&b' ') {
-            bytes.insert(5, b' ');
-        }
-    } else {
-        let Some(announced) = announced else {
-            let found =
-                format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
-            return Err(source.fault(found, "an STL file"));
-        };
-        if !fits {
-            let found =
-                format!("the header declares {announced} triangles, more than the file holds");
-            let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
-            return Err(source.error(FileLocation::Byte(80), found, &expected));
-        }
-        // Some binary files start with `solid` like a text file. The first byte is overwritten, so
-        // that the library does not read such a file as text.
-        bytes[0] = b' ';
-    }
+    let (text, announced) = normalise(&mut source)?;
     let mut builder = Builder::new(&source);
-    builder.check_limits(0, if text { 0 } else { announced.unwrap_or(0) as usize })?;
+    builder.check_limits(0, announced)?;
     let mut welder = Welder::default();
     let mut reader = ByLine { cursor: Cursor::new(&source.bytes), line: 0, text };
     let wrong = |error: std::io::Error, place| {
@@ -79,6 +52,38 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     }
     drop(welder);
     builder.finish()
+}
+
+/// Changes the beginning of the file so that the library reads it in its format. Returns whether it
+/// is a text file, and the number of triangles in the header of a binary one.
+fn normalise(source: &mut FileContents) -> Result<(bool, usize), AssetError> {
+    let bytes = &mut source.bytes;
+    let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let fits = announced
+        .is_some_and(|n| bytes.len() as u64 >= HEADER as u64 + TRIANGLE as u64 * u64::from(n));
+    let exact = fits && announced.is_some_and(|n| bytes.len() == HEADER + TRIANGLE * n as usize);
+    let zeros = bytes.iter().take(HEADER).any(|b| *b == 0);
+    let text = bytes.starts_with(b"solid") && !exact && !zeros;
+    if text {
+        // The library requires a space after `solid`; the format does not.
+        if bytes.get(5) != Some(&b' ') {
+            bytes.insert(5, b' ');
+        }
+        return Ok((true, 0));
+    }
+    let Some(announced) = announced else {
+        let found = format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
+        return Err(source.fault(found, "an STL file"));
+    };
+    if !fits {
+        let found = format!("the header declares {announced} triangles, more than the file holds");
+        let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
+        return Err(source.error(FileLocation::Byte(80), found, &expected));
+    }
+    // Some binary files start with `solid` like a text file. The first byte is overwritten, so that
+    // the library does not read such a file as text.
+    bytes[0] = b' ';
+    Ok((false, announced as usize))
 }
 
 /// Reader of an STL file that counts lines. Each read of a text file returns at most one line.
