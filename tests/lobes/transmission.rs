@@ -245,7 +245,7 @@ fn camera_inside_glass_starts_in_its_medium() {
             [materials.m]
             ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n{fresnel}
             [materials.air]
-            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nindex = 1.0
+            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nior = 1.0
             [[object]]
             material = \"m\"
             shape.box = {{ center = [0.0, 0.0, 0.0], size = [1e4, 1e4, 2.0] }}

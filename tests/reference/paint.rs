@@ -16,7 +16,7 @@ const ASIDE: f64 = 1e-6;
 
 /// Limit of the cylindrical mapping: its coordinate v, as a share of the height, is clamped to this
 /// distance from both ends. The ends of a cylinder thus show the texture next to their rims.
-const RIM: f64 = 1e-6;
+const RIM: f64 = 1.0 / 16384.0;
 
 /// Image file of the folder `scenes`. The lowest row is the first.
 pub struct Pixels {
