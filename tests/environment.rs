@@ -19,17 +19,9 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
         "film.size = [24, 16]
-         [trace]
-         {trace}
-         [camera]
-         eye = [0.0, 0.0, 4.0]
-         target = [0.0, 0.0, 0.0]
-         view_angle.vertical = 36.0
-         {light}
-         [materials.tested]
-         color = [1.0, 1.0, 1.0]
-         ambient = 0.0
-         {material}
+         camera = {{ eye = [0, 0, 4], target = [0, 0, 0], view_angle.vertical = 36 }}
+         [trace]\n{trace}\n{light}
+         [materials.tested]\ncolor = [1, 1, 1]\nambient = 0\n{material}
          [[object]]
          material = \"tested\"
          shape.sphere = {{ center = [0.0, 0.0, 0.0], radius = 1.0 }}"
