@@ -22,7 +22,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         let name = path.file_name().unwrap().to_str().unwrap();
         if path.is_dir() {
             // Results of measurements stay as they were.
-            if !name.starts_with('.') && !["target", "runs", "shared", "work"].contains(&name) {
+            if !name.starts_with('.') && !["target", "runs", "bad-scenes"].contains(&name) {
                 found.extend(files(&path));
             }
         } else if ["rs", "md", "toml", "sh"].iter().any(|e| path.extension() == Some(e.as_ref())) {
