@@ -100,7 +100,8 @@ impl Reach {
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
-                let diffuse_albedo = if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
+                let diffuse_albedo =
+                    if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
                 let rho = max_albedo(material, traits.flat) + diffuse_albedo;
                 if rho > 0.0 && traits.sees_itself(material) {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
