@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Measures the blocks of docs/accuracy.md and replaces its tables and plots. Needs a quiet machine.
+# Measures the blocks of the newest benches/runs/*-accuracy.md and replaces its tables and plots. Needs a quiet machine.
 #
 #     cargo build --release
 #     benches/accuracy.sh [KEY...]      only the blocks with these keys
 #
-# A block of docs/accuracy.md between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by the output
-# of `zerkalo measure scenes/SCENE.toml OPTIONS`; the plot goes to docs/images/accuracy-KEY.svg, the numbers go to
-# benches/runs/DATE-accuracy-KEY.csv. The block `<!-- extremes -->` (its key is `extremes`) is replaced by the results
-# that the tests of extremes print; it does not need a quiet machine.
+# A block between `<!-- measured: KEY SCENE OPTIONS -->` and `<!-- end -->` is replaced by the output of
+# `zerkalo measure scenes/SCENE.toml OPTIONS`; the plot goes to docs/images/accuracy-KEY.svg. The block
+# `<!-- extremes -->` of docs/accuracy.md (its key is `extremes`) is replaced by the results that the tests of extremes
+# print; it does not need a quiet machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-page=docs/accuracy.md
-day="$(date +%F)"
+runs=(benches/runs/*-accuracy.md)
+page="${runs[-1]}"
 zerkalo="${ZERKALO:-target/release/zerkalo}"
 scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
@@ -44,12 +44,11 @@ while read -r key scene options; do
     echo "$key: $scene $options" >&2
     # shellcheck disable=SC2086 # Options are words.
     "$zerkalo" measure "scenes/$scene.toml" $options \
-        --plot "docs/images/accuracy-$key.svg" --csv "benches/runs/$day-accuracy-$key.csv" \
-        > "$scratch/$key.txt" < /dev/null
+        --plot "docs/images/accuracy-$key.svg" > "$scratch/$key.txt" < /dev/null
     {
         printf '\n    $ zerkalo measure scenes/%s.toml%s\n\n' "$scene" "${options:+ $options}"
         sed 's/^\(.\)/    \1/' "$scratch/$key.txt"
-        printf '\n![Error against time](images/accuracy-%s.svg)\n\n' "$key"
+        printf '\n![Error against time](../../docs/images/accuracy-%s.svg)\n\n' "$key"
     } > "$scratch/$key.md"
     echo "<!-- measured: $key $scene${options:+ $options} -->" > "$scratch/begin"
     replace "$scratch/begin" "$scratch/$key.md"
@@ -78,5 +77,6 @@ if wanted extremes "$@"; then
         }
     ' "$scratch/cells.txt" > "$scratch/extremes.md"
     echo "<!-- extremes -->" > "$scratch/begin"
+    page=docs/accuracy.md
     replace "$scratch/begin" "$scratch/extremes.md"
 fi

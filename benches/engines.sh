@@ -123,10 +123,10 @@ slurm() {
     done
     say "Slurm $(slurmctld -V | cut -d' ' -f2): $(sinfo -h -o '%D nodes %t')"
     plan slurm > /dev/null
-    local jobs array merge victim shard
+    local jobs array victim shard
     jobs="$(examples/many-machines/slurm.sh scenes/gallery-glass.toml "$work/slurm.plan" "$work/slurm.png")"
     say "$jobs"
-    array="${jobs#shards: }" array="${array%%,*}" merge="${jobs##*merge: }"
+    array="${jobs#shards: }" array="${array%%,*}"
 
     victim="$(shard_process 1 slurm)"
     say "kill -9 of shard 1 after its first checkpoint"

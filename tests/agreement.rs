@@ -174,16 +174,10 @@ fn deliberate_errors_are_detected() {
 /// environment with a gradient lights the box.
 const OPEN_BOX: &str = "
     camera = { eye = [0.2, 1.2, 5.0], target = [0.0, 0.9, 0.0] }
+    materials.wall = { color = [0.9, 0.8, 0.7], ambient = 0.0, diffuse = 1.0 }
+    materials.rough = { diffuse = 0.5, reflection = 0.4, roughness = 0.3 }
     [[light]]
     environment = { zenith = [0.3, 0.6, 1.5], horizon = [1.0, 0.8, 0.6], nadir = [0.3, 0.1, 0.1] }
-    [materials.wall]
-    color = [0.9, 0.8, 0.7]
-    ambient = 0.0
-    diffuse = 1.0
-    [materials.rough]
-    diffuse = 0.5
-    reflection = 0.4
-    roughness = 0.3
     [materials.glass]
     diffuse = 0.1
     reflection = 0.9
@@ -277,13 +271,11 @@ fn lenses_agree_with_reference_tracer() {
 /// that stands on a floor. `keys` are further keys of the glass material.
 fn rough_glass(keys: &str) -> Scene {
     let text = format!(
-        "[camera]
-        eye = [0.5, 0.75, 4.0]
-        target = [0.0, 0.0, 0.0]
-        [background]
-        color = [0.25, 0.5, 1.0]
-        [ambient]
-        color = [0.5, 0.5, 0.5]
+        "camera = {{ eye = [0.5, 0.75, 4.0], target = [0.0, 0.0, 0.0] }}
+        background.color = [0.25, 0.5, 1.0]
+        ambient.color = [0.5, 0.5, 0.5]
+        materials.air = {{ diffuse = 0.0, transmission = 1.0, ior = 1.0 }}
+        materials.tiles.texture.checker = {{ scale = [1.0, 1.0] }}
         [[light]]
         point = {{ position = [2.0, 4.0, 3.0] }}
         [materials.glass]
@@ -293,12 +285,6 @@ fn rough_glass(keys: &str) -> Scene {
         attenuation_color = [0.9, 0.5, 0.0]
         attenuation_distance = 1.5
         {keys}
-        [materials.air]
-        diffuse = 0.0
-        transmission = 1.0
-        ior = 1.0
-        [materials.tiles]
-        texture.checker = {{ scale = [1.0, 1.0] }}
         [[object]]
         material = \"glass\"
         shape.rectangle = {{ center = [-1.0, 0.0, 0.5], size = [1.0, 1.5], normal = [0.2, 0.0, 1.0] }}
@@ -372,16 +358,12 @@ fn variances_agree_under_independent_random_numbers() {
 
 #[test]
 fn one_sided_transparent_objects_reflect_on_their_front_only() {
-    for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {
+    for law in ["constant", "schlick\"\nf0 = \"#806040", "dielectric"] {
         for side in [1.0, -1.0] {
             let text = format!(
-                "[camera]
-                eye = [0.5, 0.75, {}]
-                target = [0.0, 0.0, 0.0]
-                [background]
-                color = [0.25, 0.5, 1.0]
-                [ambient]
-                color = [0.5, 0.5, 0.5]
+                "camera = {{ eye = [0.5, 0.75, {}], target = [0.0, 0.0, 0.0] }}
+                background.color = [0.25, 0.5, 1.0]
+                ambient.color = [0.5, 0.5, 0.5]
                 [[light]]
                 point = {{ position = [2.0, 4.0, {}] }}
                 [materials.glass]

@@ -1,4 +1,4 @@
-//! Environment lights: white furnaces, very bright pixels, scaled and turned images, hostile files.
+//! Environment lights: white furnaces, very bright pixels, scaled and rotated images, hostile files.
 
 use crate::harness::*;
 
@@ -18,19 +18,10 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
 
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
-        "[film]
-         size = [24, 16]
-         [trace]
-         {trace}
-         [camera]
-         eye = [0.0, 0.0, 4.0]
-         target = [0.0, 0.0, 0.0]
-         view_angle.vertical = 36.0
-         {light}
-         [materials.tested]
-         color = [1.0, 1.0, 1.0]
-         ambient = 0.0
-         {material}
+        "film.size = [24, 16]
+         camera = {{ eye = [0, 0, 4], target = [0, 0, 0], view_angle.vertical = 36 }}
+         [trace]\n{trace}\n{light}
+         [materials.tested]\ncolor = [1, 1, 1]\nambient = 0\n{material}
          [[object]]
          material = \"tested\"
          shape.sphere = {{ center = [0.0, 0.0, 0.0], radius = 1.0 }}"
@@ -132,17 +123,11 @@ fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usi
 fn floor(folder: &Path, environment: &str) -> Scene {
     let path = folder.join("scene.toml");
     let text = format!(
-        "[film]
-         size = [16, 16]
-         [camera]
-         eye = [0.0, 3.0, 0.0]
-         target = [0.0, 0.0, 0.0]
-         up = [0.0, 0.0, -1.0]
+        "film.size = [16, 16]
+         camera = {{ eye = [0.0, 3.0, 0.0], target = [0.0, 0.0, 0.0], up = [0.0, 0.0, -1.0] }}
+         materials.white = {{ ambient = 0.0, color = [1.0, 1.0, 1.0] }}
          [[light]]
          environment = {{ file = \"sky.hdr\", {environment} }}
-         [materials.white]
-         ambient = 0.0
-         color = [1.0, 1.0, 1.0]
          [[object]]
          material = \"white\"
          shape.platform = {{ center = [0.0, 0.0, 0.0], size = [9.0, 9.0] }}"

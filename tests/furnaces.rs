@@ -25,14 +25,19 @@ const GLASS: &str = "reflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectri
 fn furnace(surroundings: &str, material: &str, rest: &str) -> Scene {
     let is_wall = !surroundings.starts_with("[[light]]") && !surroundings.starts_with("background");
     let wall = format!("[[object]]\nmaterial = \"lamp\"\nshape.{surroundings}");
+    let unset = ["ambient", "diffuse"].map(|key| match material.contains(key) {
+        true => String::new(),
+        false => format!("{key} = 0\n"),
+    });
     parsed(&format!(
-        "film.size = [8, 6]\ntrace.max_depth = 10000\n{}\n\
-         camera = {{ eye = [0.4, 0.3, 0.5], target = [0, 0, 0], view_angle.vertical = 36 }}\n\
+        "film.size = [8, 6]\ntrace.max_depth = 10000\n\
+         camera = {{ eye = [0.4, 0.3, 0.5], target = [0, 0, 0], view_angle.vertical = 36 }}\n{}\n\
          [materials.lamp]\ncolor = [0, 0, 0]\nemission = 1\n\
-         [materials.tested]\ncolor = [1, 1, 1]\nambient = 0\ndiffuse = 0\n{material}\n\
+         [materials.tested]\ncolor = [1, 1, 1]\n{}{material}\n\
          [[object]]\nmaterial = \"tested\"\nshape.sphere = {{ center = [0, 0, 0], radius = 0.25 }}\n\
          {}\n{rest}",
         if is_wall { "" } else { surroundings },
+        unset.concat(),
         if is_wall { &wall } else { "" },
     ))
 }

@@ -202,7 +202,7 @@ fn single_glass_ball_has_unbounded_depth_bias() {
             axis.cross(across).to_array()
         );
         let rim =
-            parsed(&text(&format!("index = {index:?}"), &camera).replace("\"center\"", "\"box\""));
+            parsed(&text(&format!("ior = {index:?}"), &camera).replace("\"center\"", "\"box\""));
         assert!(reported_bias(&rim, "max_depth") == Bias::Unbounded);
         cut += u32::from(max_difference(&values(&rim), &values(&deeper(&rim))) > 0.0);
     }

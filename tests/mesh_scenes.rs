@@ -149,21 +149,14 @@ impl Desk {
 }
 
 const VIEW: &str = "
-    [film]
-    size = [96, 96]
-    [camera]
-    eye = [0.4, 1.1, 3.4]
-    target = [0.0, 0.0, 0.0]
-    view_angle.vertical = 40.0
-    [background]
-    color = [0.0, 0.0, 1.0]
+    film.size = [96, 96]
+    camera = { eye = [0.4, 1.1, 3.4], target = [0.0, 0.0, 0.0], view_angle.vertical = 40.0 }
+    background.color = [0.0, 0.0, 1.0]
+    materials.red = { color = [1.0, 0.0, 0.0], diffuse = 1.0 }
     [[light]]
     point = { position = [3.0, 4.0, 5.0] }
-    [materials.matt]
-    color = [1.0, 0.0, 0.0]
-    diffuse = 1.0
     [[object]]
-    material = \"matt\"
+    material = \"red\"
 ";
 
 /// Checks that a light inside a closed mesh lights no surface outside of it, neither with smooth
@@ -259,8 +252,8 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     // The loaded mesh remains after the file is removed and the scene is edited.
     fs::remove_file(ball_file).unwrap();
     let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
-    let turned = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
-    let lit = set(&turned, &Target::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
+    let rotated = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
+    let lit = set(&rotated, &Target::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
     assert_eq!(mesh(&lit), mesh(&named));
     assert!(typed(&lit, "other.obj").is_err());
     assert!(lit.faults().is_empty());

@@ -170,19 +170,3 @@ fn every_scene_renders_its_golden_picture() {
     assert_eq!(references.len(), scenes.len(), "a reference without a scene");
     assert!(wrong.is_empty(), "{} of {values}:\n{}", wrong.len(), wrong.join("\n"));
 }
-
-/// Checks that both replicates are equal in scenes without anti-aliasing and lobes, where no sample
-/// is random.
-#[test]
-fn deterministic_scenes_have_equal_replicates() {
-    for (name, mut scene) in all_shipped() {
-        scene = sized(scene, SIZE);
-        without_chance(&mut scene);
-        for precision in [Precision::Single, Precision::Double] {
-            let rendering = rendered(&scene, 5, precision, 9);
-            let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
-            assert!(a == b, "{name} in {precision:?}");
-            assert_eq!(rendering.film.bad_samples().count, 0, "{name}");
-        }
-    }
-}

@@ -17,17 +17,12 @@ fn base() -> Scene {
         cameras.left = { eye = [-3.0, 1.0, 9.0], direction = [0.3, 0.0, -1.0] }
         background.color = [0.1, 0.2, 0.3]
         ambient.color = [0.3, 0.25, 0.2]
-        [materials.matte]
-        color = [0.9, 0.4, 0.2]
-        specular = 0.3
-        [materials.mirror]
-        reflection = 0.6
-        roughness = 0.1
-        two_sided = false
-        [materials.glass]
-        transmission = 0.7
-        reflection = 0.4
-        fresnel = \"dielectric\"
+        materials.matte = { color = [0.9, 0.4, 0.2], specular = 0.3 }
+        materials.mirror = { reflection = 0.6, roughness = 0.1, two_sided = false }
+        materials.glass = { transmission = 0.7, reflection = 0.4, fresnel = \"dielectric\" }
+        materials.inner.color = [0.1, 0.9, 0.1]
+        materials.cut = { color = [0.9, 0.1, 0.9], reflection = 0.2 }
+        materials.spare.color = [0.5, 0.5, 0.5]
         [materials.gold]
         metal = \"gold\"
         reflection = 0.8
@@ -40,13 +35,6 @@ fn base() -> Scene {
         bump.image = { file = \"scenes/textures/brick-heights.png\", height = 0.2 }
         [materials.checked]
         texture.checker = { even = [0.9, 0.9, 0.1], odd = [0.1, 0.1, 0.9], scale = [3.0, 3.0] }
-        [materials.inner]
-        color = [0.1, 0.9, 0.1]
-        [materials.cut]
-        color = [0.9, 0.1, 0.9]
-        reflection = 0.2
-        [materials.spare]
-        color = [0.5, 0.5, 0.5]
         [[light]]
         name = \"lamp\"
         point = { position = [2.0, 6.0, 8.0] }

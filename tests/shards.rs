@@ -156,3 +156,15 @@ fn planned_noise_is_near_the_target() {
         assert!(result.imbalance < 0.25, "{name}: {}", result.imbalance);
     }
 }
+
+#[test]
+#[ignore = "takes minutes"]
+fn planned_runs_of_eight_shards_meet_their_target() {
+    for name in ["mirror-room", "reflecting-tracks", "gallery-glass"] {
+        for seed in 0..if name == "gallery-glass" { 1 } else { 3 } {
+            let result = planned(name, None, seed, 0.25);
+            assert!(result.noise <= 1.1, "{name}, seed {seed}: {}", result.noise);
+            assert!(result.rays <= 1.1, "{name}, seed {seed}: {}", result.rays);
+        }
+    }
+}

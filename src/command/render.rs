@@ -199,9 +199,10 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
         signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
     };
     let (scene, settings) = (Arc::new(scene), schedule_settings(args));
-    let (rows, observer) = ((rows, args.compute.threads()), &mut observe);
-    let mut render = RegionRender::new(&scene, &options, settings, rows, provenance, observer)?;
-    let results = render.write(args.bits, output).map(|(report, stopped_by)| {
+    let threads = args.compute.threads();
+    let mut render = RegionRender::new(&scene, &options, settings, rows, threads)?;
+    let results = render.write(&provenance, args.bits, output, &mut observe);
+    let results = results.map(|(report, stopped_by)| {
         let world = &render.state().world;
         (report, stopped_by, world.precision(), world.biases())
     });

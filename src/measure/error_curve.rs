@@ -52,19 +52,17 @@ fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) ->
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
-/// Renders with the settings of `variant` until one of the limits in `end` is reached, or until
-/// further samples cannot change the picture. Returns three values: the points of the error curve,
-/// the share of the processors' time that other programs used meanwhile (`None` if unknown), and
-/// the render.
-///
-/// # Errors
-///
-/// Returns the error of the system if a thread cannot be started.
-pub fn follow(
-    variant: &Variant,
-    reference: &Reference,
-    end: End,
-) -> io::Result<(Vec<Point>, Option<f64>, SyncRender)> {
+/// Render that has reached the end of its error curve.
+pub struct Followed {
+    pub points: Vec<Point>,
+    /// Share of the processors' time that other programs used meanwhile. `None` if unknown.
+    pub stolen: Option<f64>,
+    pub render: SyncRender,
+}
+
+/// Renders with the settings of `variant` until `end`, or until further samples cannot change the
+/// picture. Returns the error of the system if a thread cannot be started.
+pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<Followed> {
     let mut render = variant.start()?;
     let before = RunQueueDelay::now();
     let mut points: Vec<Point> = Vec::new();
@@ -97,16 +95,12 @@ pub fn follow(
         }
     }
     let stolen = stolen_share(before.as_ref(), variant.threads, render.seconds);
-    Ok((points, stolen, render))
+    Ok(Followed { points, stolen, render })
 }
 
-/// Renders with the settings of `variant` again, and adds the seconds of this repetition to each
-/// point of its error curve. Returns the share of the processors' time that other programs used
-/// meanwhile, or `None` if unknown.
-///
-/// # Errors
-///
-/// Returns the error of the system if a thread cannot be started.
+/// Renders with the settings of `variant` again, and adds the seconds to each point of its error
+/// curve. Returns the share of the processors' time that other programs used meanwhile, or `None`
+/// if unknown.
 pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
     let mut render = variant.start()?;
     let before = RunQueueDelay::now();

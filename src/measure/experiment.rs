@@ -70,10 +70,15 @@ impl Experiment {
         let name = match self {
             Self::Adaptivity => "adaptive".to_string(),
             Self::Precision => if single { "single" } else { "double" }.to_string(),
-            Self::Threads if threads == 1 => "1 thread".to_string(),
-            Self::Threads => format!("{threads} threads"),
+            Self::Threads => thread_count(threads),
             Self::Sampler => "Sobol".to_string(),
-            _ => return "default".to_string(),
+            Self::Default
+            | Self::Lobe
+            | Self::Level
+            | Self::Depth
+            | Self::MinWeight
+            | Self::RaysPerPixel
+            | Self::Acceleration => return "default".to_string(),
         };
         format!("{name}, default")
     }
@@ -169,18 +174,6 @@ impl Plan {
     fn of_topic(&self, experiment: Experiment, scene: &Arc<Scene>) -> Vec<Variant> {
         let base = self.default_of(scene);
         let named = |name: &str| Variant { experiment, name: name.to_string(), ..base.clone() };
-        let edited = |name: String, edit: &dyn Fn(&mut Scene)| {
-            let mut scene = Scene::clone(scene);
-            edit(&mut scene);
-            Variant { experiment, name, scene: Arc::new(scene), ..base.clone() }
-        };
-        let reflects = scene.trace.ray_types == RayTypes::Full
-            && scene.trace.max_depth > 0
-            && scene
-                .objects
-                .iter()
-                .flat_map(|object| object.materials())
-                .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
         match experiment {
             Experiment::Default => Vec::new(),
             Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
@@ -196,61 +189,98 @@ impl Plan {
             }
             Experiment::Threads => {
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
-                let variant = |n: usize| {
-                    let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
-                    Variant { threads: n, ..named(&name) }
-                };
-                counts.map(variant).collect()
+                counts.map(|n| Variant { threads: n, ..named(&thread_count(n)) }).collect()
             }
             Experiment::Sampler => {
                 let mut random = named("random");
                 random.options.sampling.kind = SamplerKind::Random;
                 vec![random]
             }
-            Experiment::Lobe => {
-                let has =
-                    |lobe| scene.materials.values().any(|m| m.lobe == lobe && m.roughness > 0.0);
-                let swap = |from: Lobe, to: Lobe, name: &str| {
-                    has(from).then(|| {
-                        edited(name.to_string(), &|scene| {
-                            let matching = scene.materials.values_mut().filter(|m| m.lobe == from);
-                            matching.for_each(|m| m.lobe = to);
-                        })
-                    })
-                };
-                let square = swap(Lobe::Cone, Lobe::Square, "square for cone");
-                let cone = swap(Lobe::Square, Lobe::Cone, "cone for square");
-                square.into_iter().chain(cone).filter(|_| reflects).collect()
-            }
-            Experiment::Level => [("primary", RayTypes::Primary), ("shadows", RayTypes::Shadows)]
+            Experiment::Lobe
+            | Experiment::Level
+            | Experiment::Depth
+            | Experiment::MinWeight
+            | Experiment::RaysPerPixel
+            | Experiment::Acceleration => edited(experiment, scene)
                 .into_iter()
-                .filter(|(_, level)| *level < scene.trace.ray_types)
-                .map(|(name, level)| edited(name.to_string(), &|s| s.trace.ray_types = level))
-                .collect(),
-            Experiment::Depth => [0, 1, 2, 4, 8]
-                .into_iter()
-                .filter(|depth| reflects && *depth < scene.trace.max_depth)
-                .map(|depth| edited(format!("depth {depth}"), &|s| s.trace.max_depth = depth))
-                .collect(),
-            Experiment::MinWeight => [0.001, 0.01, 0.1]
-                .into_iter()
-                .filter(|weight| reflects && *weight > scene.trace.min_throughput)
-                .map(|weight| {
-                    edited(format!("weight {weight}"), &|s| s.trace.min_throughput = weight)
-                })
-                .collect(),
-            Experiment::RaysPerPixel => [64, 256, 1024]
-                .into_iter()
-                .filter(|_| reflects)
-                .map(|cap| edited(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap))
-                .collect(),
-            Experiment::Acceleration => Acceleration::ALL
-                .into_iter()
-                .filter(|kind| *kind != scene.trace.acceleration)
-                .map(|kind| edited(kind.name().to_string(), &|s| s.trace.acceleration = kind))
+                .map(|(name, scene)| Variant { scene: Arc::new(scene), ..named(&name) })
                 .collect(),
         }
     }
+}
+
+fn thread_count(threads: usize) -> String {
+    if threads == 1 { "1 thread".to_string() } else { format!("{threads} threads") }
+}
+
+/// Returns the variants of an experiment that edits the scene, by name.
+fn edited(experiment: Experiment, scene: &Scene) -> Vec<(String, Scene)> {
+    let mut variants = Vec::new();
+    let mut edit = |name: String, edit: &dyn Fn(&mut Scene)| {
+        let mut scene = scene.clone();
+        edit(&mut scene);
+        variants.push((name, scene));
+    };
+    let trace = &scene.trace;
+    let reflects = trace.ray_types == RayTypes::Full
+        && trace.max_depth > 0
+        && scene
+            .objects
+            .iter()
+            .flat_map(|object| object.materials())
+            .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
+    match experiment {
+        Experiment::Level => {
+            for (name, level) in [("primary", RayTypes::Primary), ("shadows", RayTypes::Shadows)] {
+                if level < trace.ray_types {
+                    edit(name.to_string(), &|s| s.trace.ray_types = level);
+                }
+            }
+        }
+        Experiment::Acceleration => {
+            for kind in Acceleration::ALL.into_iter().filter(|kind| *kind != trace.acceleration) {
+                edit(kind.name().to_string(), &|s| s.trace.acceleration = kind);
+            }
+        }
+        Experiment::Lobe if reflects => {
+            for (from, to, name) in [
+                (Lobe::Cone, Lobe::Square, "square for cone"),
+                (Lobe::Square, Lobe::Cone, "cone for square"),
+            ] {
+                if scene.materials.values().any(|m| m.lobe == from && m.roughness > 0.0) {
+                    edit(name.to_string(), &|s| {
+                        let matching = s.materials.values_mut().filter(|m| m.lobe == from);
+                        matching.for_each(|m| m.lobe = to);
+                    });
+                }
+            }
+        }
+        Experiment::Depth if reflects => {
+            for depth in [0, 1, 2, 4, 8].into_iter().filter(|depth| *depth < trace.max_depth) {
+                edit(format!("depth {depth}"), &|s| s.trace.max_depth = depth);
+            }
+        }
+        Experiment::MinWeight if reflects => {
+            for weight in [0.001, 0.01, 0.1].into_iter().filter(|w| *w > trace.min_throughput) {
+                edit(format!("weight {weight}"), &|s| s.trace.min_throughput = weight);
+            }
+        }
+        Experiment::RaysPerPixel if reflects => {
+            for cap in [64, 256, 1024] {
+                edit(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap);
+            }
+        }
+        Experiment::Lobe
+        | Experiment::Depth
+        | Experiment::MinWeight
+        | Experiment::RaysPerPixel
+        | Experiment::Default
+        | Experiment::Adaptivity
+        | Experiment::Precision
+        | Experiment::Threads
+        | Experiment::Sampler => {}
+    }
+    variants
 }
 
 #[cfg(test)]

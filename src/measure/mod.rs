@@ -21,5 +21,7 @@ pub use convergence_order::Slope;
 pub use error_curve::Point;
 pub use experiment::{Experiment, Plan, Variant};
 pub use reference_image::{Bias, Errors, Reference};
-pub use result::{Expected, Measured, Measurement, Steadiness, TimeToTarget, median, spread};
+pub use result::{
+    Expected, Measured, Measurement, Median, Steadiness, TimeToTarget, median, spread,
+};
 pub use run::{Progress, measure};

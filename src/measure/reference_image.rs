@@ -15,17 +15,16 @@ pub struct Reference {
     /// reference counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
-    /// Variance of the mean over all pixels and channels.
-    mean_variance: f64,
     display: Display,
 }
 
-/// Mean squared errors over pixels and channels.
+/// Mean squared errors over pixels and channels, and the variance of their mean.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
     levels: f64,
     relative: f64,
+    mean: f64,
 }
 
 /// Errors of a picture against a reference, over pixels and channels.
@@ -56,20 +55,18 @@ pub struct Bias {
 }
 
 impl Bias {
-    /// Returns `true` if the pictures differ by more than noise can explain: in the mean brightness
+    /// Returns `true` if the pictures differ by more than noise can explain: by the mean brightness
     /// by more than four standard errors, or in the pixels by more than [`Self::least_levels`].
     pub fn is_seen(&self) -> bool {
         self.levels > self.least_levels || self.z.abs() > 4.0
     }
 }
 
-/// Returns two estimates for the picture that is the mean of two independent pictures `a` and `b`:
-/// its mean squared errors, and the variance of its mean brightness. The linear error of a pixel is
-/// half the difference of `a` and `b`. The squared error in 8-bit levels is the mean of the squared
-/// distances from the displayed mean to the displayed `a` and to the displayed `b`.
-fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64) {
+/// Returns the errors of the mean of two independent pictures. The linear error of a pixel is half
+/// their difference. Its squared error in levels is the mean of the squared distances from the
+/// displayed mean to the two displayed pictures.
+fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
     let mut squares = Squares::default();
-    let mut mean_variance = 0.0;
     for (a, b) in a.iter().zip(b) {
         let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
         let [level_a, level_b, level] = [*a, *b, mean].map(|x| display.levels(x));
@@ -82,15 +79,15 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
             squares.levels +=
                 0.5 * ((level_a[c] - level[c]).powi(2) + (level_b[c] - level[c]).powi(2));
         }
-        mean_variance += half_sum * half_sum;
+        squares.mean += half_sum * half_sum;
     }
     let values = (3 * a.len()) as f64;
-    let own = Squares {
+    Squares {
         linear: squares.linear / values,
         levels: squares.levels / values,
         relative: squares.relative / values,
-    };
-    (own, mean_variance / (values * values))
+        mean: squares.mean / (values * values),
+    }
 }
 
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
@@ -120,26 +117,20 @@ impl Reference {
         b: &[[f64; 3]],
         display: &Display,
     ) -> Self {
-        let (own, mean_variance) = own_error(a, b, display);
+        let own = own_error(a, b, display);
         let mean = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
         let pixels = a.iter().zip(b).map(mean).collect();
         let halves = a.iter().zip(b).map(|(a, b)| half(a, b, display)).collect();
-        Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
+        Self { halves, ..Self::new(size, pixels, own, *display) }
     }
 
     pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
-        Self::new(size, pixels, Squares::default(), 0.0, *display)
+        Self::new(size, pixels, Squares::default(), *display)
     }
 
-    fn new(
-        size: [usize; 2],
-        pixels: Vec<[f64; 3]>,
-        own: Squares,
-        mean_variance: f64,
-        display: Display,
-    ) -> Self {
+    fn new(size: [usize; 2], pixels: Vec<[f64; 3]>, own: Squares, display: Display) -> Self {
         let levels = pixels.iter().map(|x| display.levels(*x)).collect();
-        Self { size, pixels, levels, halves: Vec::new(), own, mean_variance, display }
+        Self { size, pixels, levels, halves: Vec::new(), own, display }
     }
 
     /// Returns the RMSE of the reference itself, estimated from its replicates, in 8-bit levels.
@@ -194,7 +185,7 @@ impl Reference {
 
     pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
         let [a, b] = replicates(film, mix);
-        let (own, mean_variance) = own_error(&a, &b, &self.display);
+        let own = own_error(&a, &b, &self.display);
         let (mut sum, mut squares, mut crossed) = (0.0, 0.0, 0.0);
         for (i, (a, b)) in a.iter().zip(&b).enumerate() {
             let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
@@ -207,7 +198,7 @@ impl Reference {
         }
         let values = (3 * self.pixels.len()) as f64;
         let mean = sum / values;
-        let deviation = (mean_variance + self.mean_variance).sqrt();
+        let deviation = (own.mean + self.own.mean).sqrt();
         Bias {
             // If both pictures are without noise, `z` is 0 or infinite.
             z: if mean == 0.0 { 0.0 } else { mean / deviation },

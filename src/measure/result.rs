@@ -32,6 +32,13 @@ pub struct Expected {
     pub seconds_high: f64,
 }
 
+/// Median over the repetitions of a render, with its relative [`spread`].
+#[derive(Clone, Copy, Debug)]
+pub struct Median {
+    pub value: f64,
+    pub spread: f64,
+}
+
 /// Results of one variant of the settings.
 #[derive(Clone, Debug)]
 pub struct Measured {
@@ -196,13 +203,12 @@ impl Measured {
         })
     }
 
-    /// Returns two values: the number of samples traced per second until the last point of the
-    /// error curve (the median over the repetitions of the render), and the relative [`spread`] of
-    /// this median. Returns `None` if the curve has no points.
-    pub fn samples_per_second(&self) -> Option<(f64, f64)> {
+    /// Returns the samples traced per second until the last point of the error curve. Returns `None`
+    /// without points.
+    pub fn samples_per_second(&self) -> Option<Median> {
         let last = self.points.last()?;
         let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
-        Some((median(&speeds), spread(&speeds)))
+        Some(Median { value: median(&speeds), spread: spread(&speeds) })
     }
 
     /// Returns the order of convergence of the linear RMSE. The first quarter of the points has too
@@ -298,7 +304,7 @@ mod tests {
         let biased = Measured { bias, ..curve.clone() };
         assert!((biased.true_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
         assert!((curve.slope().unwrap().value + 0.5).abs() < 1e-12);
-        assert!((curve.samples_per_second().unwrap().0 - 500.0).abs() < 1e-9);
+        assert!((curve.samples_per_second().unwrap().value - 500.0).abs() < 1e-9);
     }
 
     #[test]

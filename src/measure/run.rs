@@ -1,7 +1,7 @@
 //! Course of a measurement: renders the reference, follows the error curve of every variant, and
 //! repeats the renders for the medians of the times.
 
-use crate::measure::error_curve::{End, follow, repeat};
+use crate::measure::error_curve::{End, Followed, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
@@ -52,94 +52,134 @@ pub fn measure(
     reference: Option<Reference>,
     report: &mut dyn FnMut(Progress) -> bool,
 ) -> io::Result<Measurement> {
-    let started = Instant::now();
-    let variants = plan.variants(scene);
-    let default = &variants[0];
-    let idle = |experiment: &Experiment| !variants.iter().any(|v| v.experiment == *experiment);
-    let total = 1 + variants.len() * plan.repetitions.max(1);
-    let mut keep_going = report(Progress { step: "reference", done: 0, total });
-
+    let mut course = Course::new(scene, plan, report);
+    let default = course.variants[0].clone();
+    course.announce("reference", 0);
     let mut warm_up = default.start()?;
     while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
     drop(warm_up);
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
     let rendered = match reference {
         Some(given) => RenderedReference { reference: given, spp: 0.0, seconds: 0.0 },
-        None => render_reference(default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
+        None => render_reference(&default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
     };
     let reference = &rendered.reference;
-
-    let mut measured: Vec<Measured> = Vec::new();
-    let mut expected = Vec::new();
-    let mut compared_at = COMPARED_AT;
-    let mut longest = DEFAULT_TIME * plan.seconds;
-    for (i, variant) in variants.iter().enumerate() {
-        if i > 0 && !keep_going {
-            break;
-        }
-        keep_going &= report(Progress { step: &variant.name, done: 1 + i, total });
-        let levels = if i == 0 { least } else { compared_at };
-        let end = End { levels, seconds: longest, use_estimate: !variant.experiment.unbiased() };
-        let (points, stolen, render) = follow(variant, reference, end)?;
-        let bias = (!variant.experiment.unbiased())
-            .then(|| reference.bias(&render.state.film, &render.state.mix));
-        let result = Measured {
-            experiment: variant.experiment,
-            name: variant.name.clone(),
-            threads: variant.threads,
-            points,
-            stolen: vec![stolen],
-            bias,
-        };
-        if i == 0 {
-            let missed = plan.targets.iter().filter(|levels| result.time_to(**levels).is_none());
-            expected = missed.filter_map(|levels| extrapolate(&render, *levels)).collect();
-            let seconds_left = plan.seconds - started.elapsed().as_secs_f64();
-            let runs = plan.repetitions.max(1) * (variants.len() - 1);
-            let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds;
-            let seconds_per_run = (seconds_left - default_seconds) / (2 * runs.max(1)) as f64;
-            compared_at = comparison_noise(&result, &plan.targets, seconds_per_run);
-            longest = MAX_SLOWDOWN * result.time_to(compared_at).map_or(longest, |c| c.seconds);
-        }
-        measured.push(result);
-    }
-
-    // There are at least `plan.repetitions` rounds, and further ones until times are steady or time
-    // is up.
-    let mut round = 1;
-    let mut round_seconds = 0.0;
-    while keep_going {
-        let passed = started.elapsed().as_secs_f64();
-        let steady = measured.iter().all(|m| is_steady(m, compared_at));
-        let useful = round < MAX_ROUNDS && (round < MAX_STEADY_ROUNDS || !steady);
-        let fits = round == 1 || passed + round_seconds <= plan.seconds;
-        if round >= plan.repetitions && !(useful && fits) {
-            break;
-        }
-        for (i, (variant, result)) in variants.iter().zip(&mut measured).enumerate() {
-            let done = (1 + variants.len() * round + i).min(total);
-            keep_going &= report(Progress { step: &variant.name, done, total });
-            if !keep_going {
-                break;
-            }
-            let stolen = repeat(variant, &mut result.points)?;
-            result.stolen.push(stolen);
-        }
-        round_seconds = started.elapsed().as_secs_f64() - passed;
-        round += 1;
-    }
-    Ok(Measurement {
+    let idle = |experiment: &Experiment| {
+        !course.variants.iter().any(|variant| variant.experiment == *experiment)
+    };
+    let mut measurement = Measurement {
         size: scene.film.size,
         reference_spp: rendered.spp,
         reference_levels: reference.noise_levels(),
         reference_linear: reference.noise_linear(),
         reference_seconds: rendered.seconds,
-        compared_at,
+        compared_at: COMPARED_AT,
         targets: plan.targets.clone(),
-        expected,
+        expected: Vec::new(),
         idle: plan.experiments.iter().copied().filter(idle).collect(),
-        measured,
-    })
+        measured: Vec::new(),
+    };
+    course.follow_all(reference, least, &mut measurement)?;
+    course.repeat_all(&mut measurement)?;
+    Ok(measurement)
+}
+
+/// Measurement in progress.
+struct Course<'a> {
+    plan: &'a Plan,
+    variants: Vec<Variant>,
+    started: Instant,
+    report: &'a mut dyn FnMut(Progress) -> bool,
+    keep_going: bool,
+}
+
+impl<'a> Course<'a> {
+    fn new(
+        scene: &Arc<Scene>,
+        plan: &'a Plan,
+        report: &'a mut dyn FnMut(Progress) -> bool,
+    ) -> Self {
+        let (variants, started) = (plan.variants(scene), Instant::now());
+        Self { plan, variants, started, report, keep_going: true }
+    }
+
+    fn announce(&mut self, step: &str, done: usize) {
+        let total = 1 + self.variants.len() * self.plan.repetitions.max(1);
+        self.keep_going &= (self.report)(Progress { step, done: done.min(total), total });
+    }
+
+    /// Follows the error curves of all variants: that of the default settings to the noise `least`,
+    /// and the others to the noise at which settings are compared.
+    fn follow_all(
+        &mut self,
+        reference: &Reference,
+        least: f64,
+        measurement: &mut Measurement,
+    ) -> io::Result<()> {
+        let plan = self.plan;
+        let mut longest = DEFAULT_TIME * plan.seconds;
+        for (i, variant) in self.variants.clone().iter().enumerate() {
+            if i > 0 && !self.keep_going {
+                break;
+            }
+            self.announce(&variant.name, 1 + i);
+            let levels = if i == 0 { least } else { measurement.compared_at };
+            let use_estimate = !variant.experiment.unbiased();
+            let end = End { levels, seconds: longest, use_estimate };
+            let Followed { points, stolen, render } = follow(variant, reference, end)?;
+            let bias = use_estimate.then(|| reference.bias(&render.state.film, &render.state.mix));
+            let result = Measured {
+                experiment: variant.experiment,
+                name: variant.name.clone(),
+                threads: variant.threads,
+                points,
+                stolen: vec![stolen],
+                bias,
+            };
+            if i == 0 {
+                let missed =
+                    plan.targets.iter().filter(|levels| result.time_to(**levels).is_none());
+                measurement.expected =
+                    missed.filter_map(|levels| extrapolate(&render, *levels)).collect();
+                let seconds_left = plan.seconds - self.started.elapsed().as_secs_f64();
+                let runs = plan.repetitions.max(1) * (self.variants.len() - 1);
+                let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds;
+                let seconds_per_run = (seconds_left - default_seconds) / (2 * runs.max(1)) as f64;
+                let compared_at = comparison_noise(&result, &plan.targets, seconds_per_run);
+                longest = MAX_SLOWDOWN * result.time_to(compared_at).map_or(longest, |c| c.seconds);
+                measurement.compared_at = compared_at;
+            }
+            measurement.measured.push(result);
+        }
+        Ok(())
+    }
+
+    /// Repeats the renders of all variants in rounds: at least `plan.repetitions`, and further ones
+    /// until times are steady or time is up.
+    fn repeat_all(&mut self, measurement: &mut Measurement) -> io::Result<()> {
+        let (mut round, mut round_seconds) = (1, 0.0);
+        while self.keep_going {
+            let passed = self.started.elapsed().as_secs_f64();
+            let steady = measurement.measured.iter().all(|m| is_steady(m, measurement.compared_at));
+            let useful = round < MAX_ROUNDS && (round < MAX_STEADY_ROUNDS || !steady);
+            let fits = round == 1 || passed + round_seconds <= self.plan.seconds;
+            if round >= self.plan.repetitions && !(useful && fits) {
+                break;
+            }
+            let variants = self.variants.clone();
+            for (i, (variant, result)) in variants.iter().zip(&mut measurement.measured).enumerate()
+            {
+                self.announce(&variant.name, 1 + variants.len() * round + i);
+                if !self.keep_going {
+                    break;
+                }
+                result.stolen.push(repeat(variant, &mut result.points)?);
+            }
+            round_seconds = self.started.elapsed().as_secs_f64() - passed;
+            round += 1;
+        }
+        Ok(())
+    }
 }
 
 /// Returns the extrapolated time to `levels` 8-bit levels. Returns `None` if it cannot be

@@ -229,8 +229,8 @@ fn sizes_are_checked_before_allocation() {
 }
 
 /// Checks that a scene or mesh that does not fit into the address space is refused. The address
-/// space is limited to several sizes from 30 to 150 MB. The message states how much memory is
-/// needed in total. No allocation may fail.
+/// space is limited to several sizes: the allocator of glibc reserves 64 MB for each thread. The
+/// message states how much memory is needed in total. No allocation may fail.
 #[test]
 #[cfg(target_os = "linux")]
 fn scenes_and_meshes_that_do_not_fit_are_refused() {
@@ -269,7 +269,7 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
     }
     for scene in &scenes {
         let mut fits = false;
-        for megabytes in (30..=150).step_by(40) {
+        for megabytes in [30, 110, 300, 540, 600, 900, 1600] {
             let limit = format!("ulimit -v {}", 1000 * megabytes);
             let command =
                 format!("exec \"$0\" render {scene} -o a.png --spp 2 --size 64x48 --threads 2");
@@ -283,6 +283,6 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
                 status.code() == Some(1) && errors.contains("available (the limit on address");
             assert!(status.success() || refused, "{command}, {limit}: {status} {errors}");
         }
-        assert!(fits, "{scene} fits into 150 MB");
+        assert!(fits, "{scene} fits into 1.6 GB");
     }
 }

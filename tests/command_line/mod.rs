@@ -17,27 +17,20 @@ use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
 const SCENE: &str = r#"
-[camera]
-eye = [0.0, 1.0, 4.0]
-target = [0.0, 0.5, 0.0]
-
+camera = { eye = [0.0, 1.0, 4.0], target = [0.0, 0.5, 0.0] }
 [[light]]
 name = "lamp"
 point = { position = [2.0, 4.0, 3.0] }
-
 [materials.red]
 color = [0.8, 0.2, 0.1]
-
 [materials.mirror]
 diffuse = 0.0
 reflection = 0.9
 roughness = 0.3
-
 [[object]]
 name = "ball"
 material = "red"
 shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
-
 [[object]]
 name = "mirror"
 material = "mirror"

@@ -1,4 +1,4 @@
-//! Irradiance by spheres, rectangles and disks on matt surfaces, with and without an occluder.
+//! Irradiance by spheres, rectangles and disks on diffuse surfaces, with and without an occluder.
 
 use crate::emitters::forms;
 use crate::harness::*;

@@ -85,8 +85,8 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
         case(format!("mirrored mesh {i}"), DVec3::Y, mirrored, expected);
         // A rectangle that is rotated and then stretched becomes a parallelogram.
         let stretched = DVec3::new(2.0, 1.0, 1.0);
-        let turn = DMat3::from_rotation_y(30f64.to_radians());
-        let sheared: Vec<DVec3> = corners.iter().map(|p| stretched * (turn * *p)).collect();
+        let rotation = DMat3::from_rotation_y(30f64.to_radians());
+        let sheared: Vec<DVec3> = corners.iter().map(|p| stretched * (rotation * *p)).collect();
         let shape = object("front", &format!("shape.{text}"))
             + "transform = [{ rotate_y = 30.0 }, { scale = [2.0, 1.0, 1.0] }]\n";
         let irradiance = forms::polygon(&sheared, DVec3::Y);
@@ -133,7 +133,7 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
 
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
-    let turned = "transform = [{ rotate_y = 30.0 }]\n";
+    let rotated = "transform = [{ rotate_y = 30.0 }]\n";
     let lamp = object("lamp", "shape.box = { center = [0.1, 1.25, 0.0], size = [0.4, 0.5, 0.3] }");
     let floors = [
         "shape.platform = { center = [0.0, 1.0, 0.0], size = [3.0, 3.0] }",
@@ -143,7 +143,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
         "shape.cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.0, 0.0], radius = 2.0 }",
     ];
     let dark = floors.map(|floor| {
-        let rest = object("black", floor) + turned + &lamp + turned;
+        let rest = object("black", floor) + rotated + &lamp + rotated;
         (floor.to_string(), receiver(DVec3::Y, WHITE, &rest), 0.0)
     });
     check_means(&dark, 4096, ROUNDING);

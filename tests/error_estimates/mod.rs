@@ -39,15 +39,13 @@ film.size = [{width}, {height}]
 camera = {{ eye = [0.1, 0.05, 1.5], target = [0.0, 0.0, 0.0], view_angle.vertical = 40.0 }}
 background.color = {SKY:?}
 ambient.color = [1.0, 1.0, 1.0]
+materials.sheet = {{ color = {SHEET:?}, diffuse = 0.0 }}
 [materials.mirror]
 ambient = 0.0
 diffuse = 0.0
 reflection = 1.0
 roughness = {ROUGHNESS}
 lobe = "cone"
-[materials.sheet]
-color = {SHEET:?}
-diffuse = 0.0
 [[object]]
 material = "mirror"
 shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [20.0, 20.0], normal = [0.0, 0.0, 1.0] }}

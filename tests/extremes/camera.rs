@@ -77,25 +77,6 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
     report(17, "double", &format!("angles {worst:.0e} degrees off at most"));
 }
 
-#[test]
-fn extreme_17_impossible_views_are_located_errors() {
-    for (line, place) in [
-        ("target = [0.0, 1.0, 5.0]", "test:2:1"),
-        ("direction = [0.0, 0.0, 0.0]", "test:2:13"),
-        ("direction = [0.0, -3.0, 0.0]", "test:1:1"),
-        ("target = [0.0, 0.0, 0.0]\nview_angle.vertical = 0.0", "test:3:23"),
-        ("target = [0.0, 0.0, 0.0]\nview_angle.horizontal = 180.0", "test:3:25"),
-    ] {
-        let text = format!("[camera]\n{line}\n");
-        let message = match Scene::parse(&text, "test") {
-            Ok(_) => panic!("accepted: {text}"),
-            Err(errors) => errors.to_string(),
-        };
-        assert!(message.starts_with(place), "expected at {place}: {message}");
-    }
-    report(17, "both", "errors located");
-}
-
 fn check_frames<L: SimdFloat>(bound: f64) {
     let mut numbers = Numbers::new(18);
     let mut worst: f64 = 0.0;

@@ -48,8 +48,8 @@ fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
     };
     let up: Vec<Line> = up.into_iter().filter(leaves_opening).collect();
     assert!(up.len() > rays / 4, "{} of {rays}", up.len());
-    for (line, blocked) in up.iter().zip(blocked(&geometry, &up, 50.0)) {
-        assert!(!blocked, "a lid: {units} ulp, {}: {line:?}", L::NAME);
+    for (line, occluded) in up.iter().zip(occluded(&geometry, &up, 50.0)) {
+        assert!(!occluded, "a lid: {units} ulp, {}: {line:?}", L::NAME);
     }
 }
 

@@ -283,7 +283,7 @@ fn extreme_09_csg_algebra() {
         same_surfaces(&named("A and A = A"), &intersection(vec![a(), a()]), &a(), &lines);
         let nothing = geometry::<Double>(&difference(vec![a(), a()]));
         assert!(closest(&nothing, &lines).iter().all(Option::is_none), "A - A, pair {n}");
-        assert!(blocked(&nothing, &lines, 100.0).iter().all(|b| !b), "A - A, pair {n}");
+        assert!(occluded(&nothing, &lines, 100.0).iter().all(|b| !b), "A - A, pair {n}");
         // A - B = A and not B, where not B = everything - B.
         let all = block([0.0; 3], [20.0; 3]);
         let not_b = Tree::Difference(vec![Tree::Part(1), Tree::Part(2)]);

@@ -81,7 +81,7 @@ impl Setting<'_> {
              [materials.mirror]\ncolor = [0.9, 0.6, 0.3]\nambient = 0.2\nreflection = 0.7\n\
              [materials.glass]\ncolor = [0.3, 0.9, 0.6]\nambient = 0.1\ndiffuse = 0.1\nreflection = 1\n\
              transmission = 1\nfresnel = \"dielectric\"\n\
-             [materials.water]\ndiffuse = 0\nreflection = 1\ntransmission = 1\nindex = 1.33\n\
+             [materials.water]\ndiffuse = 0\nreflection = 1\ntransmission = 1\nior = 1.33\n\
              fresnel = \"dielectric\"\n\
              [materials.thin]\ncolor = [0.3, 0.9, 0.6]\nambient = 0.1\ndiffuse = 0.1\nreflection = 0.2\n\
              transmission = 0.7\n\

@@ -64,8 +64,8 @@ fn check_rays_from_inside<L: SimdFloat>(
     for (line, hit) in onward.iter().zip(closest(geometry, &onward)) {
         assert!(hit.is_none(), "{name}, {}: behind the exit {line:?} hits {hit:?}", L::NAME);
     }
-    assert!(blocked(geometry, &onward, L::MAX).iter().all(|b| !b), "{name}, {}", L::NAME);
-    assert!(blocked(geometry, lines, L::MAX).iter().all(|b| *b), "{name}, {}", L::NAME);
+    assert!(occluded(geometry, &onward, L::MAX).iter().all(|b| !b), "{name}, {}", L::NAME);
+    assert!(occluded(geometry, lines, L::MAX).iter().all(|b| *b), "{name}, {}", L::NAME);
     let back: Vec<Line> = onward.iter().map(|(o, d)| (*o, -*d)).collect();
     for ((line, first), exit) in back.iter().zip(closest(geometry, &back)).zip(&hits) {
         let (Some(first), Some(exit)) = (first, exit) else {
@@ -148,9 +148,9 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
             let length = real.length();
             let line = (DVec3::from(origin.map(|x| x as f64 / UNIT as f64)), real / length);
             let hit = closest(&geometry, &[line])[0];
-            let blocked = blocked(&geometry, &[line], 100.0)[0];
+            let occluded = occluded(&geometry, &[line], 100.0)[0];
             let context = || format!("{}: {line:?}: {hit:?}", L::NAME);
-            assert_eq!(hit.is_some(), blocked, "{}", context());
+            assert_eq!(hit.is_some(), occluded, "{}", context());
             let t = |f: (i64, i64)| f.0 as f64 / (f.1 * UNIT) as f64 * length;
             let truth = slabs(origin, d).map(|ends| ends.map(t));
             if let Some(hit) = hit {

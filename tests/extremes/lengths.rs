@@ -5,19 +5,12 @@ use crate::harness::*;
 /// Scene that sets every key whose value is a direction.
 const TEXT: &str = "
     film.size = [24, 18]
-    [camera]
-    eye = [0.5, 1.5, 5.0]
-    direction = [-0.125, -0.25, -1.0]
-    up = [0.125, 1.0, 0.0]
-    [ambient]
-    color = [0.25, 0.25, 0.25]
+    camera = { eye = [0.5, 1.5, 5.0], direction = [-0.125, -0.25, -1.0], up = [0.125, 1.0, 0.0] }
+    ambient.color = [0.25, 0.25, 0.25]
+    materials.mirror = { reflection = 0.75, roughness = 0.125 }
+    materials.checked.texture.checker = { scale = [2.0, 2.0] }
     [[light]]
     directional = { direction = [-0.5, -1.0, -0.75] }
-    [materials.mirror]
-    reflection = 0.75
-    roughness = 0.125
-    [materials.checked]
-    texture.checker = { scale = [2.0, 2.0] }
     [[object]]
     material = \"checked\"
     shape.plane = { point = [0.0, -0.5, 0.0], normal = [0.125, 1.0, 0.25] }

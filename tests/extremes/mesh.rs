@@ -100,9 +100,9 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
                     (0..count).map(|i| (hit.t.lane(i), hit.triangle.id_lane(i))).collect::<Vec<_>>()
                 });
                 assert!(together == alone, "{ray:?}: {together:?}, {alone:?}");
-                let blocked =
+                let occluded =
                     geometry.occluded(&ray, L::from_f64(L::MAX), L::mask(true), geometry.all());
-                (0..count).filter(|lane| !blocked.lane(*lane)).count()
+                (0..count).filter(|lane| !occluded.lane(*lane)).count()
             })
             .sum();
         lost + lit
@@ -115,7 +115,7 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
 /// resolves the inside a sliver to a tenth of its thickness and loses one ray in a million there;
 /// `auto` selects double.
 fn check(rays: usize) {
-    let turned = DAffine3::from_scale_rotation_translation(
+    let rotated = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),
         DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0),
         DVec3::new(12.3, -4.5, 6.7),
@@ -126,7 +126,7 @@ fn check(rays: usize) {
     for (name, times, axes, place) in [
         ("icosahedron", 0, round, DAffine3::IDENTITY),
         ("icosphere", 4, round, DAffine3::IDENTITY),
-        ("icosphere, turned", 3, round, turned),
+        ("icosphere, rotated", 3, round, rotated),
         ("needle", 2, needle, DAffine3::IDENTITY),
         ("sheet", 2, sheet, DAffine3::IDENTITY),
     ] {

@@ -75,7 +75,7 @@ fn check_self_shadow(place: DVec3, scales: &[f64], count: usize) -> usize {
     let mut checked = 0;
     for (name, text) in EXAMPLES {
         let form = parsed(&format!("[[object]]\n{text}")).objects[0].shape.form();
-        if !form.is_flat() && !(form.is_solid() && form.is_convex()) {
+        if !(form.is_flat() || form.is_solid() && form.is_convex()) {
             continue;
         }
         let points = surface_points(&form, &mut numbers, count);

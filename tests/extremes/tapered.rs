@@ -119,9 +119,9 @@ fn extreme_11_flat_and_tall_solids() {
 #[test]
 fn extreme_12_along_a_generator() {
     let mut worst = 0f64;
-    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0);
+    let rotation = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.0, -2.0);
     let mut numbers = Numbers::new(14);
-    for place in [DAffine3::IDENTITY, DAffine3::from_quat(turn)] {
+    for place in [DAffine3::IDENTITY, DAffine3::from_quat(rotation)] {
         for s in [0.0, 0.25, 0.5, 1.0, 2.0] {
             let form = Form::conical_frustum(place, s);
             let placed = |p: DVec3| place.transform_point3(p);
@@ -183,8 +183,8 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
                 // tangent.
                 let along = DVec3::new(k * cos, k * sin, 1.0).normalize();
                 let around = DVec3::new(-sin, cos, 0.0);
-                let turn = numbers.between(0.2, 1.4);
-                let d = along * turn.cos() + around * turn.sin();
+                let rotation = numbers.between(0.2, 1.4);
+                let d = along * rotation.cos() + around * rotation.sin();
                 (DVec3::new(r * cos, r * sin, z) - d * 3.0, d)
             })
             .collect();
@@ -198,7 +198,7 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
             }
             if let (Some(a), Some(b)) = (a, b) {
                 // A line whose depth below the surface is the share e of the radius has a chord of
-                // about sqrt(8 e) / sin(turn), where `turn` is its angle to the generator.
+                // about sqrt(8 e) / sin(rotation), where `turn` is its angle to the generator.
                 longest = longest.max(6.0 - a.t - b.t);
                 assert!(6.0 - a.t - b.t <= limit, "{}", context());
             }

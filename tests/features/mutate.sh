@@ -22,7 +22,8 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$scratch/target}"
 mutations=tests/features/mutations
 value() { sed -n "s/^$2 //p" "$mutations/$1"; }
 
-for name in $(ls "$mutations"); do
+for path in "$mutations"/*; do
+    name=${path##*/}
     file=$(value "$name" file)
     # `before «this» after` becomes `before (if mutant { by } else { this }) after`, literally.
     name=$name replace=$(value "$name" replace) by=$(value "$name" by) awk '
@@ -39,11 +40,11 @@ for name in $(ls "$mutations"); do
     cp mutated "$file"
 done
 for crate in crates/*/src src; do
-    { echo '#![allow(unused_parens)]'; cat $crate/lib.rs; } > mutated
-    cp mutated $crate/lib.rs
+    { echo '#![allow(unused_parens)]'; cat "$crate/lib.rs"; } > mutated
+    cp mutated "$crate/lib.rs"
 done
 for crate in crates/scene/src crates/world/src crates/render/src src; do
-    echo 'pub use zerkalo_kernel::mutant;' >> $crate/lib.rs
+    echo 'pub use zerkalo_kernel::mutant;' >> "$crate/lib.rs"
 done
 cat >> crates/kernel/src/lib.rs <<'RUST'
 
@@ -60,7 +61,9 @@ fi
 cargo test --quiet --test engine --no-run
 
 if [ $# -eq 0 ]; then
-    set -- $(ls "$mutations")
+    cd "$mutations"
+    set -- *
+    cd "$scratch"
 fi
 status=0
 for name in "$@"; do

@@ -3,7 +3,6 @@
 use crate::features::row::*;
 use crate::harness::*;
 use zerkalo_render::RegionRender;
-use zerkalo_render::image_file::Bands;
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
@@ -14,19 +13,13 @@ fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
     let scene = Arc::new(sized(scene.clone(), SIZE));
     let options = render_options(sobol(SEED));
     let stop = spp_stop(8);
-    let provenance = Provenance {
-        source: String::new(),
-        scene_hash: String::new(),
-        sampler: SamplerKind::Sobol,
-        adaptive: false,
-    };
     let mut observe = |_: &_| Ok(());
     let how = settings(false, 0, stop);
-    let mut render = RegionRender::new(&scene, &options, how, (rows, 2), provenance, &mut observe)?;
+    let mut render = RegionRender::new(&scene, &options, how, rows, 2)?;
     let mix = begin(&scene, SEED, Precision::Auto).mix;
     let mut films = 0;
     for y in 0..SIZE[1] as usize {
-        let film = render.film_with_row(y).map_err(|e| e.to_string())?;
+        let film = render.film_with_row(y, &mut observe).map_err(|e| e.to_string())?;
         films += u32::from(y == film.first_row());
         let [mut region, mut expected] = [Vec::new(), Vec::new()];
         for replicates in [Replicates::A, Replicates::B] {

@@ -36,7 +36,7 @@ fn a1_sphere() {
 fn a2_cube() {
     shapes(
         "shape-cube.toml",
-        "turned the other way | turned | cube = { corner = [0.2, 0, 0.5], edge = 1, rotation = -30 }\n\
+        "rotated the other way | turned | cube = { corner = [0.2, 0, 0.5], edge = 1, rotation = -30 }\n\
          unturned | turned | cube = { corner = [0.2, 0, 0.5], edge = 1 }\n\
          corner taken as the centre | unturned | box = { center = [-1.4, 0, 0.5], size = [1, 1, 1] }\n\
          near taken as -z | unturned | cube = { corner = [-1.4, 0, 1.5], edge = 1 }\n\
@@ -51,7 +51,7 @@ fn a3_truncated_pyramid() {
         "not truncated | truncated | pyramid = { corner = [-1.5, 0, 0.5], side = 1, apex_height = 1.6, height = 1.6 }\n\
          a box | truncated | box = { center = [-1, 0.4, 0], size = [1, 0.8, 1] }\n\
          the larger of the two heights | ordinary | pyramid = { corner = [0.3, 0, 0.5], side = 1, apex_height = 2, height = 2, rotation = 45 }\n\
-         turned about its corner | ordinary | pyramid = { corner = [0.05, 0, 0.5], side = 1, apex_height = 1.2, height = 1.2, rotation = 45 }",
+         rotated about its corner | ordinary | pyramid = { corner = [0.05, 0, 0.5], side = 1, apex_height = 1.2, height = 1.2, rotation = 45 }",
     );
 }
 

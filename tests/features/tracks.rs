@@ -11,7 +11,7 @@ fn generated_tracks() -> Scene {
          background.color = [0, 0, 0]\n\
          light = [{ point.position = [2, 2, 1] }, { point.position = [-3, 5, 3] }]\n\
          [materials.large]\ncolor = [0.6, 0.6, 0.4]\ndiffuse = 0.2\nspecular = 0.4\nexponent = 10\n\
-         reflection = 1\ntransmission = 0.2\nindex = 1.4286\n\
+         reflection = 1\ntransmission = 0.2\nior = 1.4286\n\
          [[object]]\nmaterial = \"large\"\nshape.sphere = { center = [20, 0, -40], radius = 15 }\n",
     );
     for i in 0..40 {

@@ -35,7 +35,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
         let hit_mask = hit.t.lt(L::from_f64(L::MAX));
         let packet_surface = surface(&wide, &packet, &hit);
         let limit = 2.0;
-        let blocked = wide.occluded(&packet, L::from_f64(limit), L::mask(true), wide.all());
+        let occluded = wide.occluded(&packet, L::from_f64(limit), L::mask(true), wide.all());
         for i in 0..count {
             let ray =
                 Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
@@ -53,7 +53,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
             assert!(same(hit.t.lane(i).to_f64(), ray_hit.t.lane(0).to_f64()), "{}", context());
             let limit = <S as SimdFloat>::from_f64(limit);
             let b = narrow.occluded(&ray, limit, S::mask(true), narrow.all()).any();
-            assert!(blocked.lane(i) == b, "blocked: {}", context());
+            assert!(occluded.lane(i) == b, "occluded: {}", context());
             if !hit_mask.lane(i) {
                 continue;
             }

@@ -143,7 +143,7 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Checks that a shadow ray from the inner side of the ring across the hole is blocked by the
+/// Checks that a shadow ray from the inner side of the ring across the hole is occluded by the
 /// opposite side.
 #[test]
 fn torus_casts_shadows_on_itself() {
@@ -152,8 +152,8 @@ fn torus_casts_shadows_on_itself() {
     let inner = DVec3::new(0.7 - 1e-6, 0.0, 0.0);
     let rays =
         [(inner, DVec3::NEG_X), (inner, DVec3::Y), (DVec3::new(1.3 + 1e-6, 0.0, 0.0), DVec3::X)];
-    assert_eq!(blocked(&geometry::<Single>(&form), &rays, 10.0), [true, false, false]);
-    assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
+    assert_eq!(occluded(&geometry::<Single>(&form), &rays, 10.0), [true, false, false]);
+    assert_eq!(occluded(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
 #[test]

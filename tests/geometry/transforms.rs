@@ -9,8 +9,8 @@ fn random_map(numbers: &mut Numbers) -> DAffine3 {
         if numbers.below(4) == 0 { -size } else { size }
     };
     let scale = DVec3::new(factor(), factor(), factor());
-    let turn = |n: &mut Numbers| DQuat::from_axis_angle(n.direction(), n.between(0.0, 6.0));
-    let (first, last) = (turn(numbers), turn(numbers));
+    let rotation = |n: &mut Numbers| DQuat::from_axis_angle(n.direction(), n.between(0.0, 6.0));
+    let (first, last) = (rotation(numbers), rotation(numbers));
     DAffine3::from_translation(numbers.in_cube(5.0))
         * DAffine3::from_quat(last)
         * DAffine3::from_scale(scale)

@@ -81,7 +81,7 @@ fn compare_with<L: SimdFloat>(
         assert_eq!(
             c.bits(),
             d.bits(),
-            "{} {structure:?}, seed {seed}, {count} primitives: blocked",
+            "{} {structure:?}, seed {seed}, {count} primitives: occluded",
             L::NAME
         );
     }

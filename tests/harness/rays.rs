@@ -75,11 +75,11 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
 }
 
 /// Returns one value for each ray: `true` if it hits a surface before the distance `limit`.
-pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
+pub fn occluded<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
-        let blocked = geometry.occluded(&ray, L::from_f64(limit), L::mask(true), geometry.all());
-        out.extend((0..count).map(|i| blocked.lane(i)));
+        let occluded = geometry.occluded(&ray, L::from_f64(limit), L::mask(true), geometry.all());
+        out.extend((0..count).map(|i| occluded.lane(i)));
     }
     out
 }
@@ -217,15 +217,19 @@ pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
 /// non-uniformly (spheres become ellipsoids).
 pub fn forms() -> Vec<(String, Form)> {
     let mut out = Vec::new();
-    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);
+    let rotation = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);
     let place = DVec3::new(0.3, -2.0, 1.0);
     for (name, form) in every_kind() {
         let maps = [
             ("", DAffine3::IDENTITY),
-            (" turned", DAffine3::from_rotation_translation(turn, place)),
+            (" rotated", DAffine3::from_rotation_translation(rotation, place)),
             (
                 " uneven",
-                DAffine3::from_scale_rotation_translation(DVec3::new(1.0, -0.2, 3.0), turn, place),
+                DAffine3::from_scale_rotation_translation(
+                    DVec3::new(1.0, -0.2, 3.0),
+                    rotation,
+                    place,
+                ),
             ),
         ];
         for (suffix, map) in maps {

@@ -10,8 +10,8 @@ pub fn array(v: DVec3) -> String {
 
 /// Returns the steps of a transform as TOML: uniform scaling, rotation, translation.
 pub fn steps(place: &DAffine3) -> String {
-    let (scale, turn, offset) = place.to_scale_rotation_translation();
-    let (axis, angle) = turn.to_axis_angle();
+    let (scale, rotation, offset) = place.to_scale_rotation_translation();
+    let (axis, angle) = rotation.to_axis_angle();
     format!(
         "{{ scale = {:?} }}, {{ rotate = {{ axis = {}, degrees = {:?} }} }}, {{ translate = {} }}",
         scale.x,

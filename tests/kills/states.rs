@@ -8,30 +8,23 @@ use zerkalo::dashboard::update::update;
 
 /// Text of a scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.
-[film]
-size = [24, 18]
-
+film.size = [24, 18]
 [camera]
 eye = [0.0, 1.0, 4.0]   # at the door
 target = [0.0, 0.5, 0.0]
-
 [[light]]
 name = "lamp"
 point = { position = [2.0, 4.0, 3.0] }
 intensity = 1.0 # changed by keys
-
 [materials.red]
 color = [0.8, 0.2, 0.1]
-
 [materials.mirror]
 reflection = 0.9
 roughness = 0.3
-
 [[object]]
 name = "ball"
 material = "red"
 shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.5 }
-
 [[object]]
 name = "mirror"
 material = "mirror"

@@ -7,25 +7,15 @@ use zerkalo_terminal::diff::TargetFrame;
 
 /// Scene seen in a rough mirror, whose picture is noisy everywhere.
 const NOISY: &str = r#"
-[camera]
-eye = [0.0, 1.0, 0.0]
-target = [0.0, 1.0, -1.0]
-view_angle.vertical = 60.0
-[ambient]
-color = [0.05, 0.05, 0.05]
+camera = { eye = [0.0, 1.0, 0.0], target = [0.0, 1.0, -1.0], view_angle.vertical = 60.0 }
+ambient.color = [0.05, 0.05, 0.05]
+materials.mirror = { diffuse = 0.0, reflection = 0.9, roughness = 0.4 }
+materials.red.color = [0.9, 0.2, 0.1]
+materials.white.color = [0.9, 0.9, 0.9]
+materials.blue.color = [0.1, 0.3, 0.9]
 [[light]]
 point = { position = [1.0, 3.0, 1.0] }
 intensity = 8.0
-[materials.mirror]
-diffuse = 0.0
-reflection = 0.9
-roughness = 0.4
-[materials.red]
-color = [0.9, 0.2, 0.1]
-[materials.white]
-color = [0.9, 0.9, 0.9]
-[materials.blue]
-color = [0.1, 0.3, 0.9]
 [[object]]
 material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -2.0], size = [40.0, 40.0], normal = [0.0, 0.0, 1.0] }

@@ -99,13 +99,13 @@ impl Chart {
     }
 
     fn coordinates(&self, d: Vector) -> [f64; 2] {
-        let turn = |x: f64, y: f64| (y.atan2(x) / TAU).rem_euclid(1.0);
+        let revolution = |x: f64, y: f64| (y.atan2(x) / TAU).rem_euclid(1.0);
         match self.spread {
             ReflectionLobe::Mirror => unreachable!(),
             ReflectionLobe::Cone { one_minus_cos } => {
                 let [t, b, m] = self.frame;
                 let off = combine(&[(1.0, d), (-1.0, m)]);
-                [0.5 * dot(off, off) / one_minus_cos, turn(dot(d, t), dot(d, b))]
+                [0.5 * dot(off, off) / one_minus_cos, revolution(dot(d, t), dot(d, b))]
             }
             ReflectionLobe::Square { side } => {
                 let [t, b, m] = self.frame;
@@ -120,7 +120,7 @@ impl Chart {
                     return [f64::NAN; 2];
                 }
                 let (x, y) = (dot(h, t) / (z * facets.alpha), dot(h, b) / (z * facets.alpha));
-                [1.0 - 1.0 / (1.0 + x * x + y * y).sqrt(), turn(x, y)]
+                [1.0 - 1.0 / (1.0 + x * x + y * y).sqrt(), revolution(x, y)]
             }
         }
     }

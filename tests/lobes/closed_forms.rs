@@ -179,7 +179,8 @@ fn extreme_20_square_in_a_half_space() {
 
 /// Checks the density 1 / (side^2 cos^3) of directions to a uniform point of the square at unit
 /// distance. Here cos is the cosine of the angle to the square's axis. The density must integrate
-/// to 1 and be larger towards the corners than in the middle.
+/// to 1 and be larger towards the corners than in the middle. The square has the area of a cone lobe
+/// of the same roughness at unit distance.
 #[test]
 fn closed_form_05_density_of_the_square() {
     for side in [0.01, 0.5, 3.0] {
@@ -200,42 +201,8 @@ fn closed_form_05_density_of_the_square() {
         let expected = (1.0 + 2.0 * (0.499 * side).powi(2)).powf(1.5);
         assert!((corner / middle / expected - 1.0).abs() < 1e-12);
     }
-}
-
-/// Compares two lobes by the fraction of each that is inside a straight edge. Returns the largest
-/// difference of the two fractions over many edges. The lobes are a square of the side `side` and a
-/// cone with tan theta = 0.2.
-fn largest_difference(side: f64) -> f64 {
-    let theta = 0.2f64.atan();
-    let mut largest: f64 = 0.0;
-    for i in 0..=90 {
-        for j in -400..=400 {
-            let (phi, d) = (f64::from(i).to_radians() * 0.5, f64::from(j) * 1e-3);
-            let difference = square_share(side, d, phi) - cone_share(theta, d.atan());
-            largest = largest.max(difference.abs());
-        }
-    }
-    largest
-}
-
-/// Compares square lobes of four sizes with the cone lobe of radius 0.2, by the largest difference
-/// between the fractions inside a straight edge. The square with the area of the cone differs
-/// least. The expected differences are computed for a flat disc instead of the cone, and rounded.
-/// With the cone, the differences change by at most 0.0025.
-#[test]
-fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
-    let r = 0.2;
-    for (name, side, known) in [
-        ("inscribed", 2f64.sqrt() * r, 0.090),
-        ("circumscribed", 2.0 * r, 0.058),
-        ("equal variance", 3f64.sqrt() * r, 0.028),
-        ("equal area", PI.sqrt() * r, 0.023),
-    ] {
-        let found = largest_difference(side);
-        assert!((found - known).abs() < 2.5e-3, "{name}: {found}");
-    }
-    let ReflectionLobe::Square { side } = spread_of(Lobe::Square, r) else { panic!() };
-    assert!((side - PI.sqrt() * r).abs() < 1e-15);
+    let ReflectionLobe::Square { side } = spread_of(Lobe::Square, 0.2) else { panic!() };
+    assert!((side - PI.sqrt() * 0.2).abs() < 1e-15);
 }
 
 /// Checks a lobe about half of which is below the surface, because it is seen at 89.999 degrees. If

@@ -61,11 +61,11 @@ fn check_slab<L: SimdFloat>() -> f64 {
             let roundings = 4.0 * (1.0 + 1.0 / cos + through) + 2.0 * 8.0 * HALF_WIDTH * sin;
             assert!(off <= L::EPSILON * roundings / t, "{}, {n} {i}: {shift} {expected}", L::NAME);
             worst = worst.max(off);
-            let turned = number((ray.direction - direction).max_abs());
+            let rotated = number((ray.direction - direction).max_abs());
             // Near grazing incidence, a rounding error of the sine causes a larger error of the
             // cosine.
             let allowed = L::EPSILON * (4.0 * n / cos).min(4.5e5);
-            assert!(turned <= allowed, "{}, {n} {i}: turned by {turned}", L::NAME);
+            assert!(rotated <= allowed, "{}, {n} {i}: rotated by {rotated}", L::NAME);
         }
     }
     worst
@@ -245,7 +245,7 @@ fn camera_inside_glass_starts_in_its_medium() {
             [materials.m]
             ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n{fresnel}
             [materials.air]
-            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nindex = 1.0
+            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nior = 1.0
             [[object]]
             material = \"m\"
             shape.box = {{ center = [0.0, 0.0, 0.0], size = [1e4, 1e4, 2.0] }}

@@ -2,7 +2,7 @@
 //! identical byte for byte.
 
 use crate::harness::*;
-use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, many};
 
 /// Number of samples per pixel in each replicate. It is not a multiple of the packet width.
 const SAMPLES: u32 = 3;
@@ -33,13 +33,4 @@ fn same_bytes(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-#[test]
-fn accelerations() {
-    compare("accelerations", 0..80, same_bytes);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_accelerations() {
-    compare_many("accelerations", same_bytes);
-}
+scene_tests!(accelerations, 0..80, many_accelerations, many(), same_bytes);

@@ -84,11 +84,6 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     assert!(wrong.is_empty(), "{} of {count} scenes differ:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Applies [`compare`] to the seeds that [`many`] returns.
-pub fn compare_many(name: &str, check: Check) {
-    compare(name, many(), check);
-}
-
 #[test]
 #[ignore = "writes the scenes of the requested seeds to target/tmp/random_scenes"]
 fn write_scenes() {

@@ -178,13 +178,10 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
     touching
 }
 
-#[test]
-fn gaps() {
-    compare("gaps", seeds_of(Layout::Contact, 0..24), same_with_gaps);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_gaps() {
-    compare("gaps", seeds_of(Layout::Contact, many()), same_with_gaps);
-}
+scene_tests!(
+    gaps,
+    seeds_of(Layout::Contact, 0..24),
+    many_gaps,
+    seeds_of(Layout::Contact, many()),
+    same_with_gaps
+);

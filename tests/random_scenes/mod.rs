@@ -9,6 +9,22 @@
 //! reduced to a smaller scene that still fails. The reduction takes at most `ZERKALO_SHRINK`
 //! seconds (default 10).
 
+/// Defines a test that compares random scenes, and an ignored one of more scenes.
+macro_rules! scene_tests {
+    ($name:ident, $seeds:expr, $many:ident, $many_seeds:expr, $check:ident) => {
+        #[test]
+        fn $name() {
+            compare(stringify!($name), $seeds, $check);
+        }
+
+        #[test]
+        #[ignore = "long: ZERKALO_SCENES scenes"]
+        fn $many() {
+            compare(stringify!($name), $many_seeds, $check);
+        }
+    };
+}
+
 mod accelerations;
 mod driver;
 mod gaps;

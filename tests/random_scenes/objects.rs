@@ -241,7 +241,7 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
 /// Returns random transform steps that rotate, stretch, shear or mirror an object. They leave the
 /// point `base` fixed. In most cases the list is empty.
 fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
-    let turn = |numbers: &mut Numbers| {
+    let rotation = |numbers: &mut Numbers| {
         let any = 180.0 * numbers.unit();
         let degrees = pick(numbers, &[90.0, 45.0, any]);
         TransformOp::Rotate(Rotate { axis: direction(numbers).to_array(), degrees })
@@ -255,13 +255,15 @@ fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     };
     let inner = match numbers.below(12) {
         0 => vec![TransformOp::RotateY(numbers.between(-180.0, 180.0))],
-        1 => vec![turn(numbers)],
+        1 => vec![rotation(numbers)],
         2 => vec![stretch(numbers)],
         // Shear.
-        3 => vec![turn(numbers), stretch(numbers), turn(numbers)],
+        3 => vec![rotation(numbers), stretch(numbers), rotation(numbers)],
         // Reflection.
-        4 => vec![TransformOp::Scale(Scale([-1.0, 1.0, 1.0])), turn(numbers)],
-        5 => vec![turn(numbers), TransformOp::Scale(Scale([0.7, 1.3, -0.6])), turn(numbers)],
+        4 => vec![TransformOp::Scale(Scale([-1.0, 1.0, 1.0])), rotation(numbers)],
+        5 => {
+            vec![rotation(numbers), TransformOp::Scale(Scale([0.7, 1.3, -0.6])), rotation(numbers)]
+        }
         _ => return Vec::new(),
     };
     let to_origin = TransformOp::Translate((-base).to_array());

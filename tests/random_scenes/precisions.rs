@@ -1,7 +1,7 @@
 //! Single against double precision, in random scenes for which the precision `auto` selects single.
 
 use crate::harness::*;
-use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, many};
 use crate::random_scenes::gaps::shows_coincident_opaque;
 use crate::random_scenes::statistics::{Worst, blocks, mean_and_error, mean_of};
 
@@ -80,13 +80,4 @@ fn single_is_double(scene: &Scene) -> Verdict {
     verdict
 }
 
-#[test]
-fn precisions() {
-    compare("precisions", 0..48, single_is_double);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_precisions() {
-    compare_many("precisions", single_is_double);
-}
+scene_tests!(precisions, 0..48, many_precisions, many(), single_is_double);

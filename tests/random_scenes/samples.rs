@@ -3,7 +3,7 @@
 //! error, adaptive pictures must take at most 1.5 times the rays of uniform ones.
 
 use crate::harness::*;
-use crate::random_scenes::driver::{Verdict, compare, compare_many, many};
+use crate::random_scenes::driver::{Verdict, compare, many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::scene::seeds_of;
 use crate::random_scenes::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
@@ -394,27 +394,15 @@ fn matches_reference(scene: &Scene) -> Verdict {
     }
 }
 
-/// Compares one scene of each layout. None of them needs a second comparison, which takes 64 times as
-/// long as the first.
-#[test]
-fn samples() {
-    compare("samples", 16..24, matches_reference);
-}
+// Compares one scene of each layout. None of them needs a second comparison, which takes 64 times as
+// long as the first.
+scene_tests!(samples, 16..24, many_samples, many(), matches_reference);
 
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_samples() {
-    compare_many("samples", matches_reference);
-}
-
-/// Compares scenes whose pictures are mostly empty. None of them needs a second comparison.
-#[test]
-fn sparse_samples() {
-    compare("samples", seeds_of(Layout::Sparse, 5..9), matches_reference);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_sparse_samples() {
-    compare("samples", seeds_of(Layout::Sparse, many()), matches_reference);
-}
+// Compares scenes whose pictures are mostly empty. None of them needs a second comparison.
+scene_tests!(
+    sparse_samples,
+    seeds_of(Layout::Sparse, 5..9),
+    many_sparse_samples,
+    seeds_of(Layout::Sparse, many()),
+    matches_reference
+);

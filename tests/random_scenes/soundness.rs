@@ -2,7 +2,7 @@
 //! choices both replicates must be equal.
 
 use crate::harness::*;
-use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, many};
 use crate::random_scenes::layouts::Layout;
 use crate::random_scenes::scene::seeds_of;
 
@@ -63,10 +63,7 @@ fn replicates_are_equal(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-#[test]
-fn soundness() {
-    compare("soundness", 0..80, sound);
-}
+scene_tests!(soundness, 0..80, many_soundness, many(), sound);
 
 /// Checks scenes whose objects have positions and sizes from 1e-6 to 1e6.
 #[test]
@@ -74,26 +71,11 @@ fn wild_soundness() {
     compare("soundness", seeds_of(Layout::Wild, 20..170), sound);
 }
 
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_soundness() {
-    compare_many("soundness", sound);
-}
-
-#[test]
-fn replicates() {
-    compare("replicates", 0..48, replicates_are_equal);
-}
+scene_tests!(replicates, 0..48, many_replicates, many(), replicates_are_equal);
 
 #[test]
 fn wild_replicates() {
     compare("replicates", seeds_of(Layout::Wild, 12..162), replicates_are_equal);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_replicates() {
-    compare_many("replicates", replicates_are_equal);
 }
 
 #[test]

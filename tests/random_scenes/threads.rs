@@ -2,7 +2,7 @@
 //! counts must be equal.
 
 use crate::harness::*;
-use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, many};
 use zerkalo_render::film::Noise;
 
 /// Mean number of samples per pixel, enough for several allocation rounds.
@@ -55,13 +55,4 @@ fn same_outcome(scene: &Scene) -> Verdict {
     Verdict::Same
 }
 
-#[test]
-fn threads() {
-    compare("threads", 0..24, same_outcome);
-}
-
-#[test]
-#[ignore = "long: ZERKALO_SCENES scenes"]
-fn many_threads() {
-    compare_many("threads", same_outcome);
-}
+scene_tests!(threads, 0..24, many_threads, many(), same_outcome);

@@ -148,7 +148,7 @@ fn chi2_quantile(n: f64, z: f64) -> f64 {
 /// many standard errors; half of the samples show it.
 pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
     let reference = reference(&small(original.clone()), samples, Mutation::None);
-    let reference = reference.expect("the plain tracer supports the scene");
+    let reference = reference.expect("the reference tracer supports the scene");
     let of_picture = if tested == original { SAMPLES } else { SAMPLES / 2 };
     let verdict = Picture::new(&small(tested.clone()), of_picture).beside(&reference, samples);
     ensure(verdict.agree(), || verdict.to_string())
@@ -159,7 +159,7 @@ pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
 
-/// Returns `scene` with its camera turned to `point` and with a vertical view angle of `degrees`.
+/// Returns `scene` with its camera directed at `point` and with a vertical view angle of `degrees`.
 /// If the camera has a focus point, the plane in focus still contains the focus point.
 pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     let mut scene = scene.clone();

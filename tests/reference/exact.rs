@@ -41,7 +41,7 @@ pub fn first_hits(scene: &Scene) -> Vec<FirstHit> {
 /// `original`: object, distance and normal at each pixel centre.
 pub fn hits_agree(original: &Scene, tested: &Scene) -> Verdict {
     let original = at_centers(original);
-    let tracer = Tracer::new(&original, Mutation::None).expect("the plain tracer supports it");
+    let tracer = Tracer::new(&original, Mutation::None).expect("the reference tracer supports it");
     let hits = first_hits(&at_centers(tested));
     let compared = centers(RASTER).into_par_iter().zip(&hits);
     let wrong: Vec<String> = compared
@@ -78,7 +78,7 @@ pub fn without_noise(scene: &Scene) -> Vec<DVec3> {
 
 /// Returns the reference tracer's picture of a scene without random numbers.
 pub fn reference_without_noise(scene: &Scene) -> Vec<DVec3> {
-    let tracer = Tracer::new(scene, Mutation::None).expect("the plain tracer supports it");
+    let tracer = Tracer::new(scene, Mutation::None).expect("the reference tracer supports it");
     let [width, height] = scene.film.size;
     let pixel = |i| tracer.pixel(i % width, i / width, 2, &mut Numbers::new(1)).mean;
     (0..width * height).into_par_iter().map(pixel).collect()

@@ -16,7 +16,7 @@ const ASIDE: f64 = 1e-6;
 
 /// Limit of the cylindrical mapping: its coordinate v, as a share of the height, is clamped to this
 /// distance from both ends. The ends of a cylinder thus show the texture next to their rims.
-const RIM: f64 = 1e-6;
+const RIM: f64 = 1.0 / 16384.0;
 
 /// Image file of the folder `scenes`. The lowest row is the first.
 pub struct Pixels {
@@ -119,7 +119,7 @@ fn flat(normal: DVec3) -> DMat3 {
 impl Canvas {
     pub fn new(shape: &Shape, mesh: Option<&Triangles>) -> Self {
         let v = |a: [f64; 3]| DVec3::from(a);
-        let turned = |degrees: f64| DMat3::from_rotation_y(degrees.to_radians());
+        let rotated = |degrees: f64| DMat3::from_rotation_y(degrees.to_radians());
         let (frame, usual) = match shape {
             Shape::Sphere(_) => (DMat3::IDENTITY, Mapping::Spherical),
             Shape::Plane(p) => (flat(v(p.normal)), Mapping::Planar),
@@ -134,9 +134,9 @@ impl Canvas {
             Shape::Cone(c) => (around(v(c.apex) - v(c.base)), Mapping::Cylindrical),
             Shape::Torus(t) => (around(v(t.axis)), Mapping::Uv),
             Shape::UnitFrustum(_) => (around(DVec3::Z), Mapping::Cylindrical),
-            Shape::Cube(c) => (turned(c.rotation), Mapping::Box),
-            Shape::Prism(p) => (turned(p.rotation), Mapping::Box),
-            Shape::Pyramid(p) => (turned(p.rotation), Mapping::Box),
+            Shape::Cube(c) => (rotated(c.rotation), Mapping::Box),
+            Shape::Prism(p) => (rotated(p.rotation), Mapping::Box),
+            Shape::Pyramid(p) => (rotated(p.rotation), Mapping::Box),
             _ if mesh.is_some_and(Triangles::has_uv) => (DMat3::IDENTITY, Mapping::Uv),
             _ => (DMat3::IDENTITY, Mapping::Box),
         };

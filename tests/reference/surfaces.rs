@@ -317,8 +317,8 @@ fn frustum(corner: DVec3, base: &[[f64; 2]], height: f64, top: f64, degrees: f64
     let ring = |scale: f64, y: f64| -> Vec<DVec3> {
         let place = |b: &DVec2| {
             let d = (*b - middle) * scale;
-            let turned = DVec2::new(d.x * cos + d.y * sin, -d.x * sin + d.y * cos);
-            corner + DVec3::new(middle.x + turned.x, y, middle.y + turned.y)
+            let rotated = DVec2::new(d.x * cos + d.y * sin, -d.x * sin + d.y * cos);
+            corner + DVec3::new(middle.x + rotated.x, y, middle.y + rotated.y)
         };
         base.iter().map(place).collect()
     };

@@ -53,9 +53,9 @@ fn orbit_keeps_pivot_and_distance() {
     assert!(start.orbit(0.0, 5.0, 1.0).eye[1] > start.eye[1], "upwards");
     let (start, reach) = free();
     let pivot = |camera: &Camera| eye(camera) + camera.view().unwrap() * reach;
-    let turned = start.orbit(70.0, 20.0, reach);
-    assert!((pivot(&turned) - pivot(&start)).length() < 1e-4, "a pivot ahead stays, too");
-    assert_eq!(turned.target, None);
+    let rotated = start.orbit(70.0, 20.0, reach);
+    assert!((pivot(&rotated) - pivot(&start)).length() < 1e-4, "a pivot ahead stays, too");
+    assert_eq!(rotated.target, None);
 }
 
 #[test]

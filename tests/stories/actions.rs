@@ -1,12 +1,8 @@
 //! Stories (scene, keys, expected result) of the command table, at least one for every command.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
+use super::*;
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
-use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::update::commands::COMMANDS;
 use zerkalo_scene::camera::Focus as LensFocus;
 
 const BALL: Target = Target::Object(1);

@@ -1,10 +1,7 @@
 //! Stories of typing, forms, drags and refusals.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, ROOM};
+use super::*;
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::message::{Effect, Message};
-use zerkalo::dashboard::overlay::Overlay;
 
 const BALL: Target = Target::Object(1);
 

@@ -1,12 +1,6 @@
 //! Stories of files: saving, changes by other programs, errors in the file, quitting.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
-use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
-use zerkalo::dashboard::model::Model;
-use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::update::update;
-use zerkalo_scene::SaveError;
+use super::*;
 
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);

@@ -11,3 +11,15 @@ mod roughness;
 mod simulated_dashboard;
 mod table;
 mod watch;
+
+use crate::harness::*;
+use simulated_dashboard::{Desk, FILE, ROOM};
+use zerkalo::dashboard::message::{
+    DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits,
+};
+use zerkalo::dashboard::model::Model;
+use zerkalo::dashboard::overlay::Overlay;
+use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
+use zerkalo::dashboard::update::update;
+use zerkalo_scene::SaveError;
+use zerkalo_terminal::event::{Button, Code, Key, Mouse, MouseKind};

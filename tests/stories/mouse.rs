@@ -1,12 +1,8 @@
 //! Stories of mouse events.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, ROOM};
+use super::*;
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::message::{Effect, Message};
-use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::panel_lines::outline;
-use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Returns column and row of the cell at the centre of the picture, which shows the ball.
 fn middle(desk: &Desk) -> [u16; 2] {

@@ -1,12 +1,7 @@
 //! Ten thousand random key and mouse events on three scenes. The model must stay valid, and it must
 //! be possible to undo every edit.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, ROOM};
-use zerkalo::dashboard::message::{Effect, Message};
-use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo_terminal::event::{Button, Code, Key, MouseKind};
+use super::*;
 
 const EVENTS: usize = 10_000;
 /// Label of the command that quits the program.

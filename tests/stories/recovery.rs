@@ -1,9 +1,6 @@
 //! Stories of unsaved edits: autosave, and recovery at the next start.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::{Desk, ROOM};
-use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
-use zerkalo::dashboard::overlay::Overlay;
+use super::*;
 
 /// Returns the autosave requests since the last call. Each is a scene to be saved, or `None` if the
 /// recovery file is to be removed.

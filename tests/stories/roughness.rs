@@ -1,8 +1,7 @@
 //! Keys that change the roughness of a mirror: they must change the pixels that show the mirror and
 //! leave all others equal in every bit.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::Desk;
+use super::*;
 use zerkalo_render::FirstHitBuffer;
 
 const SIZE: [u32; 2] = [96, 72];

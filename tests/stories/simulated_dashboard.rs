@@ -1,16 +1,9 @@
 //! Simulated environment of a dashboard for story tests, without terminal, renderer or disk. Keys
 //! are given by name, and effects are answered at once.
 
-use crate::harness::*;
+use super::*;
 use zerkalo::dashboard::editor::Editor;
-use zerkalo::dashboard::message::{Effect, Exported, Message};
-use zerkalo::dashboard::model::Model;
-use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::dashboard::update::update;
 use zerkalo_render::film::LinearImage;
-use zerkalo_scene::SaveError;
-use zerkalo_terminal::event::{Button, Code, Key, Mouse, MouseKind};
 
 /// Path of the scene file.
 pub const FILE: &str = "room.toml";

@@ -1,9 +1,6 @@
 //! Consistency of the command table.
 
-use crate::harness::*;
-use crate::stories::watch;
-use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo_terminal::event::Key;
+use super::*;
 
 #[test]
 fn every_key_runs_one_command_per_context() {

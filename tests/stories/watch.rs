@@ -1,14 +1,10 @@
 //! Stories of `zerkalo watch`. Reports must change the table of files, and no key may edit the
 //! scene or start a render.
 
-use crate::harness::*;
-use crate::stories::simulated_dashboard::Desk;
+use super::*;
 use zerkalo::dashboard::hints::{HelpLine, help};
 use zerkalo::dashboard::key_context::KeyContext;
-use zerkalo::dashboard::message::{DisplayChannel, Effect, Message};
-use zerkalo::dashboard::update::commands::COMMANDS;
 use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
-use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 fn shard(number: usize, state: WatchedState) -> WatchedShards {
     WatchedShards {

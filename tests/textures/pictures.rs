@@ -58,9 +58,9 @@ fn bumps_on_transformed_and_textured_objects() {
 fn seams_and_poles() {
     let desk = Desk::new();
     for case in mappings().into_iter().filter(|c| c.lay.mapping.ends_with("ical")) {
-        let turned = Case { transform: "{ rotate_y = 170 }, { rotate_x = 60 }, ", ..case };
-        check(&turned, &desk);
-        check(&Case { height: 0.08, ..turned }, &desk);
+        let rotated = Case { transform: "{ rotate_y = 170 }, { rotate_x = 60 }, ", ..case };
+        check(&rotated, &desk);
+        check(&Case { height: 0.08, ..rotated }, &desk);
     }
 }
 

@@ -32,13 +32,12 @@ const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions.
-pub struct RegionRender<'a> {
+pub struct RegionRender {
     /// Compiled scene, with the film of the current region. `None` after a failed exchange of the
     /// film.
     state: Option<RenderState>,
     settings: Settings,
     pool: rayon::ThreadPool,
-    provenance: Provenance,
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
     finished_rows: u32,
@@ -46,10 +45,9 @@ pub struct RegionRender<'a> {
     estimates: Vec<Option<TileNoise>>,
     report: Report,
     stopped_by: StoppedBy,
-    observer: Observer<'a>,
 }
 
-impl<'a> RegionRender<'a> {
+impl RegionRender {
     /// Compiles `scene`, which must be valid, for regions of `rows` rows, a multiple of
     /// [`TILE`](crate::film::TILE). Each region is rendered until a stop criterion is reached; a
     /// time limit is divided among them. Fails if a thread cannot be started, or if there is not
@@ -58,9 +56,8 @@ impl<'a> RegionRender<'a> {
         scene: &Arc<Scene>,
         options: &Options,
         settings: Settings,
-        (rows, threads): (u32, usize),
-        provenance: Provenance,
-        observer: Observer<'a>,
+        rows: u32,
+        threads: usize,
     ) -> Result<Self, String> {
         let start = Instant::now();
         let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
@@ -78,13 +75,11 @@ impl<'a> RegionRender<'a> {
             state: Some(state),
             settings: Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings },
             pool,
-            provenance,
             rows,
             finished_rows: 0,
             estimates: Vec::new(),
             report,
             stopped_by: StoppedBy::Full,
-            observer,
         })
     }
 
@@ -92,14 +87,28 @@ impl<'a> RegionRender<'a> {
     /// picture and the stop criterion that ended it. After an error an existing file is unchanged.
     pub fn write(
         &mut self,
+        provenance: &Provenance,
         depth: Depth,
         output: &ImageOutput,
+        observer: Observer,
     ) -> Result<(Report, StoppedBy), WriteError> {
         let state = self.state();
         let (mix, group_names) = (&state.mix.clone(), &state.group_names());
         let (size, display) = (state.scene().film.size, state.display());
-        output.write(&ImageData { size, mix, group_names, display, depth }, self)?;
+        let picture = ImageData { size, mix, group_names, display, depth };
+        output.write(&picture, &mut Rows { render: self, provenance, observer })?;
         Ok((self.report.clone(), self.stopped_by))
+    }
+
+    /// Returns the film with the row `y`, after the regions down to it have been rendered.
+    pub fn film_with_row(&mut self, y: usize, observer: Observer) -> io::Result<&Film> {
+        if y < self.finished_rows as usize {
+            observer(&self.report)?;
+        }
+        while y >= self.finished_rows as usize {
+            self.render_region(observer)?;
+        }
+        Ok(&self.state().film)
     }
 
     pub fn state(&self) -> &RenderState {
@@ -107,7 +116,7 @@ impl<'a> RegionRender<'a> {
     }
 
     /// Renders the region whose first row is `self.finished_rows`.
-    fn render_region(&mut self) -> io::Result<()> {
+    fn render_region(&mut self, observer: Observer) -> io::Result<()> {
         let height = self.state().scene().film.size[1];
         let rows = self.finished_rows..height.min(self.finished_rows + self.rows);
         let state = self.state.take().expect("a region after a failed one is not rendered");
@@ -137,7 +146,7 @@ impl<'a> RegionRender<'a> {
             let report = state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             seconds += start.elapsed().as_secs_f64();
             schedule.complete(&wave, &report);
-            (self.observer)(&progress(&self.report, &schedule, seconds, &rows, height))?;
+            observer(&progress(&self.report, &schedule, seconds, &rows, height))?;
         };
         self.estimates.extend(schedule.tile_estimates());
         self.finished_rows = rows.end;
@@ -195,18 +204,19 @@ fn progress(
     }
 }
 
-impl Bands for RegionRender<'_> {
+/// Rows of a render in regions, as the writer of its picture requests them.
+struct Rows<'a> {
+    render: &'a mut RegionRender,
+    provenance: &'a Provenance,
+    observer: Observer<'a>,
+}
+
+impl Bands for Rows<'_> {
     fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
-        if y < self.finished_rows as usize {
-            (self.observer)(&self.report)?;
-        }
-        while y >= self.finished_rows as usize {
-            self.render_region()?;
-        }
-        Ok(&self.state().film)
+        self.render.film_with_row(y, self.observer)
     }
 
     fn metadata(&self) -> Vec<(String, String)> {
-        metadata(self.state(), &self.report, &self.provenance)
+        metadata(self.render.state(), &self.render.report, self.provenance)
     }
 }

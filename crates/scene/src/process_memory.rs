@@ -70,13 +70,25 @@ pub fn megabytes(bytes: u64) -> String {
     }
 }
 
-/// Returns the number of bytes of address space that this process may still allocate; `None`
-/// without a limit, and on systems other than Linux.
+/// Address space \[bytes\] that the allocator of glibc reserves for each thread: its memory arena.
+const ARENA: u64 = 64 << 20;
+
+/// Number of threads whose arenas are reserved at most: a tracing thread for each processor, up to
+/// eight, and six others.
+fn expected_threads() -> u64 {
+    let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    processors.min(8) as u64 + 6
+}
+
+/// Returns the number of bytes of address space that this process may still allocate, without the
+/// arenas of threads that have not started; `None` without a limit, and on systems other than Linux.
 fn free_address_space() -> Option<u64> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let limit = number_after(&limits, "Max address space")?;
     let status = fs::read_to_string("/proc/self/status").ok()?;
-    Some(limit.saturating_sub(1024 * number_after(&status, "VmSize:")?))
+    let starting = expected_threads().saturating_sub(number_after(&status, "Threads:")?);
+    let in_use = 1024 * number_after(&status, "VmSize:")?;
+    Some(limit.saturating_sub(in_use + starting * ARENA))
 }
 
 /// File names of one version of Linux control groups.

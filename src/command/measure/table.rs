@@ -1,6 +1,6 @@
 //! Results of `zerkalo measure` as a text table.
 
-use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
+use crate::measure::{Experiment, Measured, Measurement, Median, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
@@ -178,7 +178,7 @@ impl MeasureReport<'_> {
                 (None, None) => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
             }
         }
-        if let (Some(slope), Some((speed, spread))) =
+        if let (Some(slope), Some(Median { value: speed, spread })) =
             (default.slope(), default.samples_per_second())
         {
             writeln!(
@@ -228,7 +228,7 @@ impl MeasureReport<'_> {
             (None, None) => (format!("> {}", time(followed())), String::new()),
         };
         let spp = reached_at.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
-        let rate = measured.samples_per_second().map_or(0.0, |(speed, _)| speed * 1e-6);
+        let rate = measured.samples_per_second().map_or(0.0, |speed| speed.value * 1e-6);
         write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
         match measured.bias {
             Some(b) if b.is_seen() => writeln!(f, "   {:.2} levels (z = {:.0})", b.levels, b.z),

@@ -7,7 +7,7 @@ use crate::film::noise::Estimator;
 use crate::film::store::Film;
 
 /// Samples, value and error of one pixel under given light weights and display transform.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelProbe {
     /// Column and row of the pixel in the film.
     pub pixel: [usize; 2],
@@ -37,15 +37,8 @@ impl PixelProbe {
         if x >= film.width() || y >= film.height() {
             return None;
         }
-        let mut probe = Self {
-            pixel: [x, y],
-            samples: [0; 2],
-            radiance: [0.0; 3],
-            levels: display.levels([0.0; 3]),
-            difference: None,
-            tile_rmse_linear: None,
-            tile_rmse_levels: None,
-        };
+        let levels = display.levels([0.0; 3]);
+        let mut probe = Self { pixel: [x, y], levels, ..Self::default() };
         let Some(tile) = film.tile(y / TILE * film.tile_columns() + x / TILE) else {
             return Some(probe);
         };

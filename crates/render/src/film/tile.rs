@@ -22,7 +22,7 @@ static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 ///
 /// All pixels have the same number of samples in a replicate, except during the first pass, which
 /// adds the first sample of replicate A to more and more pixels, see [`Tile::lattice_px`].
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Tile {
     /// Epoch of the film when the tile was written; 0 for a new tile.
     epoch: u64,
@@ -45,18 +45,7 @@ pub struct Tile {
 
 impl Tile {
     pub(super) fn cleared(groups: usize, extent: [usize; 2]) -> Self {
-        Self {
-            epoch: 0,
-            stride: groups * 3,
-            extent,
-            counts: [0; 2],
-            lattice_px: 0,
-            full: false,
-            saturated_samples: 0,
-            bad: InvalidSamples::default(),
-            sums: Vec::new(),
-            written: Default::default(),
-        }
+        Self { stride: groups * 3, extent, ..Self::default() }
     }
 
     /// Takes the memory of `old`, a tile of another film. Nothing may have been written to this

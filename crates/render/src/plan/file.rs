@@ -39,7 +39,7 @@ pub struct PlanError {
     pub path: PathBuf,
     /// Line of the error, counted from 1; 0 for the file as a whole.
     pub line: usize,
-    /// What was found and expected, as a clause.
+    /// Clause about what was found and expected.
     pub what: String,
     /// Advice to the user, as a clause.
     pub remedy: &'static str,

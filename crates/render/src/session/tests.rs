@@ -40,7 +40,7 @@ fn expensive_scene() -> Arc<Scene> {
         [film]
         size = [256, 256]
         [trace]
-        depth = 500
+        max_depth = 500
         [camera]
         eye = [0.0, 0.0, 0.5]
         target = [0.1, 0.2, 0.0]

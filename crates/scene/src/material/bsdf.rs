@@ -168,8 +168,8 @@ pub struct BsdfQuery<L> {
     pub incident: Vec3<L>,
     /// Unit normal on the side of the incident rays.
     pub normal: Vec3<L>,
-    /// What happens to directions of a cone or square on the wrong side of the surface: `true`
-    /// mirrors them to the right side, `false` absorbs them.
+    /// `true` mirrors directions of a cone or square on the wrong side of the surface to the right
+    /// side; `false` absorbs them.
     pub fold: bool,
 }
 

@@ -115,7 +115,8 @@ impl Shape {
         }
     }
 
-    /// Returns the mesh file that the shape names; `None` if the shape is no mesh or names no file.
+    /// Returns the mesh file that the shape names; `None` if the shape is not a mesh or names no
+    /// file.
     pub fn file(&self) -> Option<&str> {
         let Self::MeshDesc(mesh) = self else { return None };
         Some(mesh.file.as_str()).filter(|file| !file.is_empty())

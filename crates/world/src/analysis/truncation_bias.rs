@@ -100,8 +100,9 @@ impl Reach {
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
-                let matt = if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
-                let rho = max_albedo(material, traits.flat) + matt;
+                let diffuse_albedo =
+                    if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
+                let rho = max_albedo(material, traits.flat) + diffuse_albedo;
                 if rho > 0.0 && traits.sees_itself(material) {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
@@ -218,7 +219,7 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         out.extend(albedo.map(|albedo| {
             format!(
                 "max_diffuse_depth 0 leaves out the light of emissive objects without sampled \
-                 points on matt surfaces ({})",
+                 points on diffuse surfaces ({})",
                 bound(albedo * specular.from(0))
             )
         }));
@@ -232,7 +233,7 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         }
         if specular.first > 0.0 && !scene.trace.caustics {
             out.push(format!(
-                "caustics false leaves out what mirrors and glass send to matt surfaces ({})",
+                "caustics false leaves out what mirrors and glass send to diffuse surfaces ({})",
                 bound(reach.from(2))
             ));
         }

@@ -79,7 +79,7 @@ impl CullingMode {
 }
 
 /// Returns for each of `forms` whether it is a convex solid that rays hit only from outside. Paths
-/// are inside a solid only if they start there or are transmitted, which `entered` tells for each.
+/// are inside a solid only if they start there or are transmitted, as `entered` says for each.
 /// `start` is a sphere around the origins of all camera rays; `None` if they may start anywhere.
 pub(crate) fn outside_only<'a>(
     forms: impl Iterator<Item = &'a Form>,

@@ -76,7 +76,7 @@ pub(crate) struct ReflectedRays<L: SimdFloat> {
 }
 
 /// Returns the value and the density of the reflection lobe of BSDF number `index` for light from
-/// `direction`.
+/// `direction`. For a mirror the value is zero, and the density is the largest finite number.
 #[inline(never)]
 pub(crate) fn eval_lobe<L: SimdFloat>(
     world: &World<L>,
@@ -86,29 +86,17 @@ pub(crate) fn eval_lobe<L: SimdFloat>(
     direction: Vec3<L>,
 ) -> BsdfValue<L> {
     let bsdf = &world.bsdfs[index];
-    let lobe = bsdf.eval(query, direction);
-    if !world.smooth {
-        return lobe;
+    if bsdf.is_delta() {
+        return BsdfValue { value: Vec3::zero(), density: L::from_f64(L::MAX) };
     }
-    // Sampled rays that point into the surface are mirrored out of it.
-    let mirrored = bsdf.eval(query, interaction.mirrored(direction));
-    BsdfValue { value: lobe.value + mirrored.value, density: lobe.density + mirrored.density }
-}
-
-/// Returns the density \[1/sr\] with which the BSDF number `index` samples reflected rays in
-/// `direction`. For a mirror it is the largest finite number.
-#[inline(always)]
-pub(crate) fn reflected_density<L: SimdFloat>(
-    world: &World<L>,
-    interaction: &SurfaceInteraction<L>,
-    query: &BsdfQuery<L>,
-    index: usize,
-    direction: Vec3<L>,
-) -> L {
-    if world.bsdfs[index].is_delta() {
-        return L::from_f64(L::MAX);
+    let mut lobe = bsdf.eval(query, direction);
+    if world.smooth {
+        // Sampled rays that point into the surface are mirrored out of it.
+        let mirrored = bsdf.eval(query, interaction.mirrored(direction));
+        lobe.value += mirrored.value;
+        lobe.density += mirrored.density;
     }
-    eval_lobe(world, interaction, query, index, direction).density
+    lobe
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
@@ -163,7 +151,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let occluded = |lit| {
                 let ray = Ray { origin, direction: light.wi };
                 let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
-                occluded | world.emitter_covered(index, &ray, light.distance, lit.and_not(occluded))
+                let (ray, lanes) = ((&ray, light.distance), lit.and_not(occluded));
+                occluded | world.emitters.covered(index, &world.geometry, ray, lanes)
             };
             self.add_light(source.group, lit, occluded, |vertex, _| {
                 source.emitted(vertex.unoccluded(value, light))
@@ -212,20 +201,5 @@ impl<L: SimdFloat> Vertex<'_, L> {
     ) -> Option<LightSource<LightSample<L>, L::Scalar>> {
         let numbers = self.sampler.light_2d(self.bounce, index as u32);
         self.world.emitters.sample(index, origin, numbers)
-    }
-}
-
-impl<L: SimdFloat> World<L> {
-    /// Returns those of `lanes` in which a touching object covers the point of emitter number
-    /// `index` at the end of the shadow rays `ray`, at `distance`.
-    #[inline(always)]
-    pub(crate) fn emitter_covered(
-        &self,
-        index: usize,
-        ray: &Ray<L>,
-        distance: L,
-        lanes: L::Mask,
-    ) -> L::Mask {
-        self.emitters.covered(index, &self.geometry, (ray, distance), lanes)
     }
 }

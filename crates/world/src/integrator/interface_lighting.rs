@@ -147,13 +147,10 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let occluded = |lit| {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
             let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
-            match emitter {
-                Some(index) => {
-                    let lanes = lit.and_not(occluded);
-                    occluded | world.emitter_covered(index, &ray, t_max, lanes)
-                }
-                None => occluded,
-            }
+            emitter.map_or(occluded, |index| {
+                let (ray, lanes) = ((&ray, t_max), lit.and_not(occluded));
+                occluded | world.emitters.covered(index, &world.geometry, ray, lanes)
+            })
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);

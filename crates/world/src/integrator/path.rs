@@ -62,6 +62,19 @@ impl<L: SimdFloat> Path<L> {
         Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
     }
 
+    /// Returns `yes` in the lanes of `mask` and `no` elsewhere.
+    #[inline(always)]
+    pub(crate) fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
+        Self {
+            ray: Ray {
+                origin: Vec3::select(mask, yes.ray.origin, no.ray.origin),
+                direction: Vec3::select(mask, yes.ray.direction, no.ray.direction),
+            },
+            throughput: Vec3::select(mask, yes.throughput, no.throughput),
+            lobe_density: L::select(mask, yes.lobe_density, no.lobe_density),
+        }
+    }
+
     /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let
     /// it grow without limit.
     #[inline(always)]

@@ -4,7 +4,7 @@
 use crate::culling::tile::TileCandidates;
 use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState};
-use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density, visible_emitters};
+use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe, visible_emitters};
 use crate::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::integrator::interaction::{SurfaceInteraction, interact};
 use crate::integrator::interface_lighting::RoughInterface;
@@ -42,26 +42,6 @@ impl<L: SimdFloat> Branch<L> {
         let media = MediumStack::vacuum();
         Self { path: Path::new(ray), lanes, media, bounce: 0, coincident: None }
     }
-
-    /// Returns the branch `yes` in lanes where `mask` is true and `no` elsewhere. Fields that are
-    /// the same for all lanes are those of `no`.
-    #[inline(always)]
-    fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
-        let coincident = yes.coincident.as_ref().zip(no.coincident.as_ref());
-        Self {
-            path: Path {
-                ray: Ray {
-                    origin: Vec3::select(mask, yes.path.ray.origin, no.path.ray.origin),
-                    direction: Vec3::select(mask, yes.path.ray.direction, no.path.ray.direction),
-                },
-                throughput: Vec3::select(mask, yes.path.throughput, no.path.throughput),
-                lobe_density: L::select(mask, yes.path.lobe_density, no.path.lobe_density),
-            },
-            media: MediumStack::select(mask, &yes.media, &no.media),
-            coincident: coincident.map(|(yes, no)| CoincidentState::select(mask, yes, no)),
-            ..*no
-        }
-    }
 }
 
 /// Reflected and transmitted paths at the interfaces of a packet.
@@ -71,6 +51,10 @@ struct Split<'a, L: SimdFloat> {
     interface: Interface<L>,
     reflected: Path<L>,
     transmitted: Path<L>,
+    /// Lanes whose reflected paths continue.
+    reflects: L::Mask,
+    /// Lanes whose transmitted paths continue.
+    transmits: L::Mask,
 }
 
 /// Integrator of scenes with transmission.
@@ -172,42 +156,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             branch.bounce += 1;
             return branch.lanes.any();
         };
-        let branches = self.split(&mut vertex, interface_hit, stack, coincident);
-        self.follow(branch, branches, waiting, &mut out.counts)
-    }
-
-    /// Adds the light of emitters at rough interfaces, and returns the reflected and the transmitted
-    /// branch of the paths. `coincident` is the state of transmitted rays.
-    fn split(
-        &self,
-        vertex: &mut Vertex<'_, L>,
-        hit: &InterfaceHit<L>,
-        stack: &MediumStack<L>,
-        coincident: Option<CoincidentState<L>>,
-    ) -> [Branch<L>; 2] {
-        let (world, bounce) = (vertex.world, vertex.bounce + 1);
         let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
-        let rough = RoughInterface::new(vertex, hit, coincident_lanes);
+        let rough = RoughInterface::new(&vertex, interface_hit, coincident_lanes);
         if rough.reflecting.any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }
-        let Split { reflected, transmitted, .. } = Split::new(vertex, &rough);
-        let reflects = vertex.interaction.reflecting | hit.lanes;
-        let reflected = Branch {
-            path: reflected,
-            lanes: reflects & world.reaches_min_weight(reflected.throughput),
-            media: hit.stack_reflected(stack),
-            bounce,
-            coincident: coincident.as_ref().map(CoincidentState::reversed),
-        };
-        let transmitted = Branch {
-            path: transmitted,
-            lanes: hit.lanes & world.reaches_min_weight(transmitted.throughput),
-            media: hit.medium_transmitted,
-            bounce,
-            coincident,
-        };
-        [reflected, transmitted]
+        let split = Split::new(&mut vertex, &rough);
+        self.follow(branch, split, coincident.as_ref(), waiting, &mut out.counts)
     }
 
     /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
@@ -321,34 +276,50 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Continues `branch` with the transmitted paths, and with the reflected ones in other lanes.
     /// Lanes with both store the reflected branch in `waiting`, or choose one of the two at random
-    /// after [`SPLIT_DEPTH`] surfaces. Returns `false` if no path continues.
+    /// after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of transmitted rays. Returns `false`
+    /// if no path continues.
     fn follow(
         &self,
         branch: &mut Branch<L>,
-        [mut reflected, mut transmitted]: [Branch<L>; 2],
+        split: Split<'_, L>,
+        coincident: Option<&CoincidentState<L>>,
         waiting: &mut [Option<Branch<L>>],
         counts: &mut Counts,
     ) -> bool {
-        let surfaces = reflected.bounce as usize;
-        let both = reflected.lanes & transmitted.lanes;
-        let mut transmits = transmitted.lanes;
+        let Split { rough, mut reflected, mut transmitted, reflects, mut transmits, .. } = split;
+        let lanes = reflects | transmits;
+        let bounce = branch.bounce + 1;
+        let media = rough.hit.stack_reflected(&branch.media);
+        let reversed = coincident.map(CoincidentState::reversed);
+        let both = reflects & transmits;
         if both.any() {
-            if surfaces <= SPLIT_DEPTH {
-                let entry = waiting.len() + surfaces - 1 - SPLIT_DEPTH;
-                waiting[entry] = Some(Branch { lanes: both, ..reflected });
+            if bounce as usize <= SPLIT_DEPTH {
+                let entry = waiting.len() + bounce as usize - 1 - SPLIT_DEPTH;
+                waiting[entry] = Some(Branch {
+                    path: reflected,
+                    lanes: both,
+                    media,
+                    bounce,
+                    coincident: reversed,
+                });
             } else {
                 counts.glossy = true;
-                let [r, t] = [&reflected, &transmitted].map(|b| b.path.throughput.max_element());
-                let number = self.base.sampler.branch_1d((surfaces - 1 - SPLIT_DEPTH) as u32);
+                let [r, t] = [&reflected, &transmitted].map(|path| path.throughput.max_element());
+                let number = self.base.sampler.branch_1d(bounce - 1 - SPLIT_DEPTH as u32);
                 transmits = transmits.and_not(both & (number * (r + t)).lt(r));
-                for (branch, own) in [(&mut reflected, r), (&mut transmitted, t)] {
-                    let throughput = &mut branch.path.throughput;
-                    *throughput = Vec3::select(both, *throughput * ((r + t) / own), *throughput);
+                for (path, own) in [(&mut reflected, r), (&mut transmitted, t)] {
+                    let scaled = path.throughput * ((r + t) / own);
+                    path.throughput = Vec3::select(both, scaled, path.throughput);
                 }
             }
         }
-        let lanes = reflected.lanes | transmitted.lanes;
-        *branch = Branch { lanes, ..Branch::select(transmits, &transmitted, &reflected) };
+        branch.path = Path::select(transmits, &transmitted, &reflected);
+        branch.lanes = lanes;
+        branch.media = MediumStack::select(transmits, &rough.hit.medium_transmitted, &media);
+        branch.bounce = bounce;
+        branch.coincident = coincident
+            .zip(reversed.as_ref())
+            .map(|(passed, reversed)| CoincidentState::select(transmits, passed, reversed));
         lanes.any()
     }
 }
@@ -393,6 +364,8 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             interface,
             reflected: path(interaction.ray_origin(), incident.reflect(interaction.normal)),
             transmitted: path(interaction.ray_origin_behind(), refracted),
+            reflects: interaction.reflecting | hit.lanes,
+            transmits: hit.lanes,
         };
         let mut numbers = None;
         for (index, lanes) in interaction.bsdfs(interaction.reflecting | hit.lanes) {
@@ -420,6 +393,8 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             }
             path.throughput = Path::bounded(path.throughput);
         }
+        split.reflects = split.reflects & world.reaches_min_weight(split.reflected.throughput);
+        split.transmits = split.transmits & world.reaches_min_weight(split.transmitted.throughput);
         split
     }
 
@@ -459,7 +434,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             if world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
-            let density = reflected_density(world, interaction, &query.rays, index, direction);
+            let density = eval_lobe(world, interaction, &query.rays, index, direction).density;
             self.reflected.lobe_density = L::select(lanes, density, self.reflected.lobe_density);
         }
         let throughput = throughput.component_mul(sample.weight) * share;

@@ -1,7 +1,7 @@
 //! Vertices of a packet of paths: what both integrators do where their rays hit surfaces.
 
 use crate::culling::tile::TileCandidates;
-use crate::integrator::emitter_lighting::{ReflectedRays, reflected_density};
+use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe};
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::Media;
 use crate::integrator::path::{Path, Radiance};
@@ -95,7 +95,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
             if emitters {
-                let density = reflected_density(world, interaction, &query, index, direction);
+                let density = eval_lobe(world, interaction, &query, index, direction).density;
                 path.lobe_density = L::select(lanes, density, path.lobe_density);
             }
             path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);

@@ -357,12 +357,12 @@ mod tests {
     const GLOWING: &str = "
         [materials.lamp]
         emission = 4.0
-        [materials.matt]
+        [materials.white]
         [[object]]
         material = \"lamp\"
         shape.sphere = { center = [0.0, 3.0, 0.0], radius = 1.0 }
         [[object]]
-        material = \"matt\"
+        material = \"white\"
         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
     ";
 
@@ -382,7 +382,7 @@ mod tests {
         assert!(reusable(|s| lamp(s).emission = 0.0));
         assert!(reusable(|s| lamp(s).emission_color = Color([1.0, 0.5, 0.0])));
         assert!(!reusable(|s| lamp(s).diffuse = 0.5));
-        assert!(!reusable(|s| s.materials.get_mut("matt").unwrap().emission = 1.0));
+        assert!(!reusable(|s| s.materials.get_mut("white").unwrap().emission = 1.0));
         assert!(!reusable(|s| s.objects[1].material = "lamp".to_string()));
         // A light group is identified by the name of its material, so the samples cannot be reused
         // if the material has another name.

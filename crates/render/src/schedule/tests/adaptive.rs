@@ -10,7 +10,7 @@ fn adaptive_spp_is_the_mean_and_noisy_tiles_get_most() {
     assert_eq!(reason, StoppedBy::Spp);
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
-    // The picture has 200 samples per pixel in the mean. The tiles without noise, 0.7 of all tiles,
+    // The picture has a mean of 200 samples per pixel. The tiles without noise, 0.7 of all tiles,
     // share the rays of exploration: 200 * EXPLORATION / 0.7 samples per pixel, in whole blocks.
     assert!((2 * MIN_SAMPLES..=40).contains(&spp.min), "{spp:?}");
     assert!(spp.max > 500, "{spp:?}");
