@@ -1,5 +1,7 @@
 //! Materials: descriptions of surfaces in scene files, and the compiled BSDFs.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 mod bsdf;
 mod fresnel;
 mod mapping;

@@ -1,6 +1,8 @@
 //! Judgements about a scene as a whole: precision, range of radiance, bias of truncated paths, reuse
 //! of samples after an edit, inventory.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 pub(crate) mod clearance;
 pub(crate) mod inventory;
 pub(crate) mod precision;

@@ -6,12 +6,11 @@
 //! half a step, which more samples do not reduce. The size of a step therefore has two bounds:
 //!
 //! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
-//! brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
-//! levels.
-//!
+//!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
+//!   levels.
 //! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
-//! holds 2^19 samples in each replicate before its sum saturates. Five bits remain for single
-//! samples that are brighter.
+//!   holds 2^19 samples in each replicate before its sum saturates. Five bits remain for single
+//!   samples that are brighter.
 //!
 //! The two bounds are 28 bits apart. By default the typical radiance has 2^28 steps. The brightest
 //! spot may then be up to 2^16 times as bright as the typical radiance. The brightest spot of the
@@ -215,7 +214,7 @@ impl<'a> SceneDistances<'a> {
         // transmission. In the other modes the coefficients of both may have a sum above 1.
         let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
-            _ => m.reflection + m.transmission,
+            Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => m.reflection + m.transmission,
         });
         let gain = match reflects {
             true => max_factors.fold(1.0, f64::max).powf(f64::from(scene.trace.max_depth)),

@@ -46,10 +46,7 @@ impl LightGroups {
     /// emission of lights that have a group of their own.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
-            let contains = |source: &LightGroupSource| match source {
-                LightGroupSource::Light(light) => *light == i,
-                _ => false,
-            };
+            let contains = |source: &_| matches!(source, LightGroupSource::Light(j) if *j == i);
             self.members.iter().flat_map(LightGroupSource::emitting).any(contains)
         };
         let same_but_emission = |i: usize, light: &Light| {
@@ -57,11 +54,9 @@ impl LightGroups {
         };
         let mut emitting =
             scene.lights.iter().enumerate().filter(|(_, light)| contributes(light, self.lit));
-        let same_emission_if_shared = |source: &LightGroupSource| match source {
-            LightGroupSource::Shared(list) => {
-                list.iter().all(|source| source.emission(scene) == source.emission(compiled))
-            }
-            _ => true,
+        let same_emission_if_shared = |source: &LightGroupSource| {
+            let LightGroupSource::Shared(list) = source else { return true };
+            list.iter().all(|source| source.emission(scene) == source.emission(compiled))
         };
         emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
             && self.members.iter().all(same_emission_if_shared)
@@ -88,10 +83,8 @@ impl LightGroups {
         (scene, name_b): (&Scene, &str),
     ) -> bool {
         let (a, b) = (material(compiled, name_a), material(scene, name_b));
-        let is_a = |source: &LightGroupSource| match source {
-            LightGroupSource::Material(name) => name == name_a,
-            _ => false,
-        };
+        let is_a =
+            |source: &_| matches!(source, LightGroupSource::Material(name) if name == name_a);
         if self.members.iter().flat_map(LightGroupSource::emitting).any(is_a) {
             name_a == name_b && without_emission(&a) == without_emission(&b)
         } else {

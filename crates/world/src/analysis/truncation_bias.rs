@@ -12,14 +12,17 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     let f = match material.fresnel_mode() {
         Fresnel::Constant => material.f0().0.into_iter().fold(0.0, f64::max).min(1.0),
         // At grazing angles Fresnel reflectance reaches 1.
-        _ => 1.0,
+        Fresnel::Schlick | Fresnel::Exact | Fresnel::Dielectric => 1.0,
     };
-    match material.fresnel_mode() {
-        _ if k_t == 0.0 => k_r * f,
-        Fresnel::Dielectric => k_r.max(k_t),
-        _ if flat => k_r * f + k_t,
+    if k_t == 0.0 {
+        k_r * f
+    } else if material.fresnel_mode() == Fresnel::Dielectric {
+        k_r.max(k_t)
+    } else if flat {
+        k_r * f + k_t
+    } else {
         // Past the critical angle all light is reflected.
-        _ => (k_r * f + k_t).max(1.0),
+        (k_r * f + k_t).max(1.0)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Integrators: radiance along camera rays.
 
+#![deny(clippy::wildcard_enum_match_arm)]
+
 pub(crate) mod coincident_surfaces;
 mod direct_lighting;
 mod emitter_lighting;

@@ -135,18 +135,16 @@ impl LightGroups {
     /// Returns each light in a group: its index in the scene, the index of the group, and the
     /// emission by which the tracer multiplies its samples, which is 1 in a group of its own.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
-        let light = |source: &LightGroupSource| match source {
-            LightGroupSource::Light(i) => Some(*i),
-            _ => None,
+        let light = |source: &LightGroupSource| {
+            if let LightGroupSource::Light(i) = source { Some(*i) } else { None }
         };
         self.emitting(scene, light)
     }
 
     /// Returns each emissive material as [`LightGroups::lights`] returns lights, by its name.
     pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
-        let material = |source: &LightGroupSource| match source {
-            LightGroupSource::Material(name) => Some(name.clone()),
-            _ => None,
+        let material = |source: &LightGroupSource| {
+            if let LightGroupSource::Material(name) = source { Some(name.clone()) } else { None }
         };
         self.emitting(scene, material)
     }
@@ -223,11 +221,9 @@ impl LightGroups {
             let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
             Some(range_of_one(source)?.times(low, high))
         };
-        let range_of = |member: &LightGroupSource| match member {
-            LightGroupSource::Shared(list) => {
-                list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
-            }
-            member => range_of_one(member),
+        let range_of = |member: &LightGroupSource| {
+            let LightGroupSource::Shared(list) = member else { return range_of_one(member) };
+            list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
         };
         // The largest sample and its square have to be finite in the precision of the samples.
         let (min_exponent, max_exponent) =
