@@ -37,13 +37,13 @@ fn failures_have_status_1_a_located_message_and_leave_the_old_picture() {
     fs::write(desk.path("bad.toml"), SCENE.replace("radius = 0.5", "radius = -0.5")).unwrap();
     fs::write(desk.path("file"), "").unwrap();
     for (args, word) in [
-        (&["render", "bad.toml", "-o", "old.png"] as &[&str], "bad.toml:14:"),
+        (&["render", "bad.toml", "-o", "old.png"] as &[&str], "bad.toml:15:"),
         (&["render", "none.toml", "-o", "old.png"], "none.toml"),
         (&["render", ".", "-o", "old.png"], "directory"),
         (&["render", "scene.toml", "-o", "none/a.png"], "none"),
         (&["render", "scene.toml", "-o", "file/a.png"], "file"),
         (&["render", "scene.toml", "-o", "old.png", "--stats", "none/s.json"], "none"),
-        (&["check", "bad.toml"], "bad.toml:14:"),
+        (&["check", "bad.toml"], "bad.toml:15:"),
         (&["new", "scene.toml"], "scene.toml: there is such a file already"),
         (&["new", "none/a.toml"], "none"),
     ] {
