@@ -97,9 +97,9 @@ const MIN_COUNTED: usize = 5;
 /// larger one are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Half the width of the confidence interval of a median by the sign test, in units of sqrt(n) / 2
-/// ranks, the standard deviation of the number of values above the true median: 1.4 of them cover
-/// four of five cases; sqrt 2 is for the difference of two medians.
+/// Half-width of the confidence interval of a median by the sign test, in standard deviations of the
+/// rank, which are sqrt(n) / 2: 1.4 covers 84 %, and sqrt 2 widens it to the difference of two
+/// medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median of `values`, NaN without any.

@@ -204,7 +204,7 @@ fn progress(
     }
 }
 
-/// Rows of a render in regions, as the writer of its picture requests them.
+/// Source of rows for the writer of a picture, which renders the region of each requested row.
 struct Rows<'a> {
     render: &'a mut RegionRender,
     provenance: &'a Provenance,

@@ -160,7 +160,7 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which [`FramePipeline::draw`] must be called next, if not only after the
+    /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` until the
     /// next event. `changed` is `true` if the model has changed since the last frame, and `answers`
     /// if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {

@@ -12,9 +12,9 @@ const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 pub(super) enum Coalesce {
     /// The edit is an undo step of its own.
     Single,
-    /// The edit joins if it comes soon enough.
+    /// The edit joins the previous step if it comes soon enough.
     Repeat,
-    /// The edit joins until the gesture (a drag or mode) ends.
+    /// The edits of a gesture (a drag or mode) are one undo step.
     Gesture,
 }
 

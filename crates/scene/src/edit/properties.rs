@@ -12,7 +12,7 @@ use crate::value::{
 /// Word that a property accepts as its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Text of the word. The name of a material may contain any character.
+    /// Word as shown and typed. If it names a material, it may contain any character.
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,

@@ -105,7 +105,8 @@ impl<S: Float> Sides<S> {
 pub(super) struct PointSample<L: SimdFloat> {
     pub wi: Vec3<L>,
     pub distance: L,
-    /// Density \[1/sr\] of the directions that other triangles share with this one.
+    /// Density \[1/sr\] with which any triangle is sampled in this direction, for multiple importance
+    /// sampling.
     pub density: L,
     /// Density \[1/sr\] by which the radiance is divided; zero if no light arrives.
     pub pdf: L,
@@ -178,14 +179,14 @@ impl<S: Float> Emitter<S> {
     }
 
     /// Creates a disk at an infinite distance around the direction `wi`, with the angular radius
-    /// `angle`. The irradiance on a surface that faces it is pi.
-    pub fn distant_disk(wi: DVec3, angle: f64) -> Self {
-        let one_minus_cos = S::from_f64(2.0 * (0.5 * angle).sin().powi(2));
+    /// `radius` in radians. The irradiance on a surface that faces it is pi.
+    pub fn distant_disk(wi: DVec3, radius: f64) -> Self {
+        let one_minus_cos = S::from_f64(2.0 * (0.5 * radius).sin().powi(2));
         let axis = wi.to_array().map(S::from_f64);
         Self {
             surface: Surface::DistantDisk { axis, one_minus_cos },
             sides: Sides { lift: S::default(), both: false },
-            radiance: S::from_f64(angle.sin().powi(-2)),
+            radiance: S::from_f64(radius.sin().powi(-2)),
             center: DVec3::ZERO,
             radius: EVERYWHERE,
             area: f64::INFINITY,
@@ -193,7 +194,7 @@ impl<S: Float> Emitter<S> {
     }
 
     pub fn is_distant(&self) -> bool {
-        self.area == f64::INFINITY
+        matches!(self.surface, Surface::DistantDisk { .. })
     }
 
     /// Returns the distance at which each ray hits the front of a surface without a body; the
@@ -433,7 +434,7 @@ mod tests {
 
     const LIFT: f64 = 1e-10;
 
-    /// Returns one light-emitting surface of every kind. The points of [`points`] are in front of,
+    /// Returns spheres, rectangles and triangles that emit light. The points of [`points`] are in front of,
     /// behind, beside and inside of these surfaces.
     fn surfaces() -> Vec<EmissiveSurface> {
         let tetrahedron = [

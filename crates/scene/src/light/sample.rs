@@ -8,11 +8,11 @@ use zerkalo_kernel::lanes::Vec3;
 pub struct LightSample<L> {
     /// Unit vector from the hit point towards the light.
     pub wi: Vec3<L>,
-    /// Distance from the hit point to the light; the largest finite number for directional lights
-    /// and environments.
+    /// Distance from the hit point to the light; the largest finite number for parallel light and
+    /// environments, half of it for a sun.
     pub distance: L,
     /// Irradiance on a surface that faces the light. For a light with a size or an environment it
-    /// is an estimate: the radiance divided by `density`. Zero if no light arrives.
+    /// is an estimate: the radiance divided by the sampling density. Zero if no light arrives.
     pub irradiance: Vec3<L>,
     /// Density \[1/sr\] with which `wi` is sampled; the largest finite number for lights without a
     /// size, zero if no light arrives.

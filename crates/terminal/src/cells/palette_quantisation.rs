@@ -27,7 +27,7 @@ impl QuantisedPalette {
     pub fn nearest(&self, rgb: [u8; 3]) -> usize {
         let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
         let known = &self.known[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
-        // Two threads that search the same colour store the same index.
+        // Relaxed suffices: threads that race for a colour store the same index.
         match known.load(Ordering::Relaxed) {
             0 => {
                 // The 64 levels are spread over 0..=255, so that black and white are exact.

@@ -310,8 +310,8 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply, which acknowledges the oldest frame in flight. Returns `false` if none was
-    /// awaited.
+    /// Records a reply, which acknowledges the oldest frame in flight. Returns `false` if no
+    /// frame was in flight.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
             // The connection has been interrupted.

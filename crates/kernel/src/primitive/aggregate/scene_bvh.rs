@@ -24,8 +24,9 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
     primitives: Vec<u32>,
-    /// Bounds for [`Ray::is_coherent`].
+    /// Largest difference of unit directions for which [`Ray::is_coherent`].
     turn: f64,
+    /// Largest difference of the coordinates of origins for which [`Ray::is_coherent`].
     shift: f64,
 }
 

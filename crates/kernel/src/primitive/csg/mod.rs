@@ -73,7 +73,7 @@ pub struct Compounds<S> {
     compounds: Vec<Compound<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// For each part: the number of its compound if it is the first part, otherwise `None`.
+    /// For each part: the index of the compound that begins with it; `None` for later parts.
     first: Vec<Option<u32>>,
 }
 
