@@ -1,7 +1,7 @@
 //! Dashboard: the user interface in the terminal, for editing a scene while it is rendered.
 //!
-//! `update` handles a [`Message`](message::Message): it changes the [`Model`](model::Model) and
-//! returns [`Effect`](message::Effect)s, without access to clock, files or terminal. `view` draws a
+//! `update` handles a `Message`: it changes the `Model` and
+//! returns `Effect`s, without access to clock, files or terminal. `view` draws a
 //! model into a buffer of cells. `run` is the event loop, which executes the effects.
 
 // Public for tests of the program only; many names of fields and variants need no comment.

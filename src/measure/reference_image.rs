@@ -34,7 +34,7 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative mean squared error, see [`RELATIVE_FLOOR`].
+    /// Relative mean squared error, see `RELATIVE_FLOOR`.
     pub rel_mse: f64,
     /// Relative uncertainty of `rmse_levels`, 0..=1: its standard deviation over references as
     /// noisy as this one.

@@ -168,7 +168,7 @@ impl RenderState {
         Schedule::new(&pixels, settings).with_light_period(self.world.light_period())
     }
 
-    /// Traces the jobs of the first pass, see [`first_pass::run`]. The film of a cancelled pass may
+    /// Traces the jobs of the first pass, see `first_pass::run`. The film of a cancelled pass may
     /// only be displayed; no further samples may be added to it.
     pub fn trace_first_pass(
         &mut self,

@@ -40,7 +40,7 @@ pub trait ShapeDesc: Description {
         false
     }
 
-    /// Returns the rotation about the vertical [degrees], as far as the keys of the kind express it.
+    /// Returns the rotation about the vertical \[degrees\], as far as the keys of the kind express it.
     fn rotation(&self) -> f64 {
         0.0
     }

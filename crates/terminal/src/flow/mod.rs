@@ -192,7 +192,7 @@ impl FlowControl {
         }
     }
 
-    /// Records user input. For [`ACTIVE_TIME`] the round trip is then measured only if the rate is
+    /// Records user input. For `ACTIVE_TIME` the round trip is then measured only if the rate is
     /// doubtful.
     pub fn record_input(&mut self, now: Duration) {
         if now >= self.active_until {
