@@ -1,8 +1,8 @@
 //! Dashboard: the user interface in the terminal, for editing a scene while it is rendered.
 //!
-//! `update` handles a `Message`: it changes the `Model` and
-//! returns `Effect`s, without access to clock, files or terminal. `view` draws a
-//! model into a buffer of cells. `run` is the event loop, which executes the effects.
+//! `update` handles a `Message`: it changes the `Model` and returns `Effect`s, without access to
+//! clock, files or terminal. `view` draws a model into a buffer of cells. `run` is the event loop,
+//! which executes the effects.
 
 // Public for tests of the program only; many names of fields and variants need no comment.
 #![allow(missing_docs)]

@@ -230,8 +230,8 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Returns the reliability of the times of the default settings to each target, and of all
-    /// variants to the noise at which they are compared.
+    /// Returns how steady the measured times are: those of the default settings to each target, and
+    /// those of all variants to the noise at which they are compared.
     pub fn steadiness(&self) -> Steadiness {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {

@@ -71,10 +71,10 @@ fn check_growth(fewest: usize, limit: f64) {
     }
 }
 
-/// Checks the growth of the time of an edit from 2,000 to 8,000 objects: where the
-/// clock has ticks of 4 ms, fewer are too few to time. The limit for a doubling
-/// is halfway between linear (2) and quadratic (4), on a logarithmic scale. The growth is not
-/// exactly linear, because only small scenes fit into the caches.
+/// Checks the growth of the time of an edit from 2,000 to 8,000 objects; fewer are too few for a
+/// clock with ticks of 4 ms. The limit for a doubling is halfway between linear (2) and quadratic
+/// (4), on a logarithmic scale. The growth is not exactly linear, because only small scenes fit into
+/// the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {

@@ -115,7 +115,7 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 /// visible or not: independent normal deviates with the variance 1/2, from `u` and `v`. Then the
 /// component of the slope along the azimuth of the view is replaced by the slope that has the same
 /// quantile among the visible microfacets. For views near the normal this changes the slope little;
-/// the reflection of an edge along x or y is then stratified like one of the two numbers.
+/// samples across the reflection of an edge along x or y are then spaced as evenly as `u` or `v`.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,

@@ -26,7 +26,7 @@ const LATE: Duration = Duration::from_secs(180);
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
     plans: Plans,
-    /// Plan file that the user named, as an input without shards.
+    /// Plan file that the user named; it is joined like a film that holds no shard.
     named: Option<MergeInput>,
     /// Plan that all files share. `None` before the first file, and for a checkpoint without a
     /// plan.

@@ -111,8 +111,8 @@ impl Schedule {
     /// Sets the light period: the number of samples of a pixel that together trace a shadow ray to
     /// each light once; see [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
     ///
-    /// The error falls steeply at this count. As soon as a tile has an estimate from so many
-    /// samples, those from fewer samples, which do not predict the error, are discarded.
+    /// Number of samples at which the error falls steeply. Estimates from fewer samples do not
+    /// predict the error, and are discarded once a tile has one from this many.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }

@@ -301,7 +301,7 @@ impl<S: Float> Bsdf<S> {
                 let (nh, tan2) = along_tan2(h, n);
                 let h2 = h.length_squared();
                 let (visible, total) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
-                // f N.L = D G F / (4 N.V): the factor N.L cancels.
+                // Cook-Torrance times the cosine of incidence: D G F / (4 N.V), in which N.L has cancelled.
                 let d = facets.density(tan2);
                 let k = L::from_f64(0.25 * strength.to_f64());
                 let value = d * visible * k / (nv * total);

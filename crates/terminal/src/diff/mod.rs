@@ -258,7 +258,7 @@ impl FrameDiff {
         room: usize,
         cell: impl Fn(usize) -> &'a Cell,
     ) -> Part {
-        // Frames are deterministic.
+        // Equal gains are ordered by index, so that equal input gives equal frames.
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let encoded = |count: usize| {
             let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();

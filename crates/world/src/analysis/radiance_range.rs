@@ -308,8 +308,8 @@ impl<'a> SceneDistances<'a> {
         self.emitting_surface(ball, emitter.area, emitter.radiance.to_f64(), visible)
     }
 
-    /// Returns the range of the radiance that a disk at an infinite distance causes, of which surfaces
-    /// have the irradiance pi. `emitted` is its own radiance, seen if it is `visible`.
+    /// Returns the range of the radiance due to an infinitely distant disk that gives a facing surface
+    /// the irradiance pi. `emitted` is the radiance of the disk, counted if it is `visible`.
     fn distant_disk(&self, emitted: f64, visible: bool) -> RadianceRange {
         let Response { least, most, peak } = self.response();
         let range = self.range_of(1.0, (least, most, peak));

@@ -274,7 +274,7 @@ impl<S: Float> ChosenSets<'_, S> {
     }
 }
 
-/// Kinds of lights of which a scene has so many that paths choose a few of them.
+/// Kinds of lights that are too many in a scene for a shadow ray to each: paths choose a few.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ManyLights {
     /// `true` if the scene has `MIN_LIGHTS` point lights or more.

@@ -4,8 +4,8 @@
 use crate::schedule::tests::*;
 
 /// Renders the simulated picture to the end in pieces. Before each wave is traced, [`Wave::cut`]
-/// shortens its jobs to at most `longest` samples per pixel. It then keeps only so many jobs that
-/// they have about `tiles` times `longest` samples per pixel in total. Later waves have the samples
+/// shortens its jobs to at most `longest` samples per pixel. It then keeps jobs with
+/// about `tiles` times `longest` samples per pixel in total. Later waves have the samples
 /// that were cut off.
 fn finish_in_pieces(
     model: &mut Model,

@@ -54,7 +54,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Changes the beginning of the file so that the library reads it in its format. Returns whether it
+/// Changes the beginning of the file so that `stl_io` takes text for text and binary for binary. Returns whether it
 /// is a text file, and the number of triangles in the header of a binary one.
 fn normalise(source: &mut FileContents) -> Result<(bool, usize), AssetError> {
     let bytes = &mut source.bytes;
