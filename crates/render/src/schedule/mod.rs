@@ -111,7 +111,7 @@ impl Schedule {
     /// Sets the light period: the number of samples of a pixel that together trace a shadow ray to
     /// each light once; see [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
     ///
-    /// Number of samples at which the error falls steeply. Estimates from fewer samples do not
+    /// The error falls steeply at this number of samples. Estimates from fewer samples do not
     /// predict the error, and are discarded once a tile has one from this many.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
