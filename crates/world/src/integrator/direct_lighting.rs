@@ -119,27 +119,33 @@ impl<L: SimdFloat> Vertex<'_, L> {
             if let DeltaLight::Point { cone: Some(_), .. } = target.light {
                 lit = lit & light.irradiance.x.gt(L::zero());
             }
-            let occluded = |lit| {
-                let (direction, t_max) = match &target.on_surface {
-                    None => (light.wi, light.distance),
-                    Some(on_surface) => on_surface.end(origin),
-                };
-                let ray = Ray { origin, direction };
-                if SIMPLE {
-                    world.geometry.occluded_linear(&ray, t_max, lit, occluders)
-                } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                    let (primitive, outside) = (interaction.primitive, interaction.front);
-                    let start = RayStart { primitive, outside };
-                    buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
-                } else {
-                    world.geometry.occluded(&ray, t_max, lit, occluders)
-                }
-            };
-            self.add_light(source.group, lit, occluded, |vertex, lit| {
-                let diffuse = cosine_density(interaction.normal.dot(light.wi));
-                let value = vertex.direct_value(light.wi, diffuse, lit);
-                source.emitted(vertex.unoccluded(value, &light))
-            });
+            self.add_light(
+                source.group,
+                lit,
+                #[inline(always)]
+                |lit| {
+                    let (direction, t_max) = match &target.on_surface {
+                        None => (light.wi, light.distance),
+                        Some(on_surface) => on_surface.end(origin),
+                    };
+                    let ray = Ray { origin, direction };
+                    if SIMPLE {
+                        world.geometry.occluded_linear(&ray, t_max, lit, occluders)
+                    } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
+                        let (primitive, outside) = (interaction.primitive, interaction.front);
+                        let start = RayStart { primitive, outside };
+                        buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
+                    } else {
+                        world.geometry.occluded(&ray, t_max, lit, occluders)
+                    }
+                },
+                #[inline(always)]
+                |vertex, lit| {
+                    let diffuse = cosine_density(interaction.normal.dot(light.wi));
+                    let value = vertex.direct_value(light.wi, diffuse, lit);
+                    source.emitted(vertex.unoccluded(value, &light))
+                },
+            );
         }
     }
 

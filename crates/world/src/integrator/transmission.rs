@@ -1,7 +1,6 @@
 //! Integrator of worlds with transmission. At an interface a path splits into a reflected and a
 //! transmitted ray.
 
-use crate::culling::tile::TileCandidates;
 use crate::integrator::Integrator;
 use crate::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState};
 use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe, visible_emitters};
@@ -115,7 +114,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let Integrator { world, sampler, candidates, depth } = self.base;
         let candidates = if branch.bounce == 0 { candidates } else { &world.all_candidates };
         out.counts.add_rays(branch.lanes);
-        let (mut hit, behind) = self.hit(branch, candidates);
+        let geometry = &world.geometry;
+        let mut hit = geometry.closest_masked(&branch.path.ray, &candidates.primary, branch.lanes);
+        let behind = self.behind(branch, &mut hit);
         // Paths and media are large, so they are borrowed instead of copied.
         let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
         let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
@@ -161,8 +162,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if rough.reflecting.any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }
-        let split = Split::new(&mut vertex, &rough);
-        self.follow(branch, split, coincident.as_ref(), waiting, &mut out.counts)
+        let mut split = Split::new(&mut vertex, &rough);
+        self.follow(branch, &mut split, coincident.as_ref(), waiting, &mut out.counts)
     }
 
     /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
@@ -248,30 +249,21 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
-    /// Finds the hits of the rays of `branch`. Rays that start on coincident surfaces may hit the
-    /// next of these surfaces, which is returned as well; their origin is then moved onto it.
-    fn hit(
-        &self,
-        branch: &mut Branch<L>,
-        candidates: &TileCandidates,
-    ) -> (Hit<L>, Option<CoincidentQuery<L>>) {
-        let geometry = &self.base.world.geometry;
-        let ray = &mut branch.path.ray;
-        let mut hit = geometry.closest_masked(ray, &candidates.primary, branch.lanes);
-        let (Some(contacts), Some(coincident)) =
-            (&self.nested_dielectrics.contacts, &branch.coincident)
-        else {
-            return (hit, None);
-        };
+    /// Finds the next of several coincident surfaces behind rays of `branch` that start on one of
+    /// them. Replaces their hits in `hit`, and moves their origin onto that surface.
+    fn behind(&self, branch: &mut Branch<L>, hit: &mut Hit<L>) -> Option<CoincidentQuery<L>> {
+        let contacts = self.nested_dielectrics.contacts.as_ref()?;
+        let coincident = branch.coincident.as_ref()?;
         let lanes = coincident.lanes & branch.lanes;
         if lanes.none() {
-            return (hit, None);
+            return None;
         }
         let coincident = CoincidentState { lanes, ..*coincident };
-        let next = contacts.next(geometry, &coincident, &branch.media);
+        let next = contacts.next(&self.base.world.geometry, &coincident, &branch.media);
+        let ray = &mut branch.path.ray;
         ray.origin = Vec3::select(next.lanes, coincident.point, ray.origin);
         hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
-        (hit, Some(next))
+        Some(next)
     }
 
     /// Continues `branch` with the transmitted paths, and with the reflected ones in other lanes.
@@ -281,12 +273,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     fn follow(
         &self,
         branch: &mut Branch<L>,
-        split: Split<'_, L>,
+        split: &mut Split<'_, L>,
         coincident: Option<&CoincidentState<L>>,
         waiting: &mut [Option<Branch<L>>],
         counts: &mut Counts,
     ) -> bool {
-        let Split { rough, mut reflected, mut transmitted, reflects, mut transmits, .. } = split;
+        let Split { rough, reflected, transmitted, reflects, transmits, .. } = split;
+        let (reflects, mut transmits) = (*reflects, *transmits);
         let lanes = reflects | transmits;
         let bounce = branch.bounce + 1;
         let media = rough.hit.stack_reflected(&branch.media);
@@ -296,7 +289,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             if bounce as usize <= SPLIT_DEPTH {
                 let entry = waiting.len() + bounce as usize - 1 - SPLIT_DEPTH;
                 waiting[entry] = Some(Branch {
-                    path: reflected,
+                    path: *reflected,
                     lanes: both,
                     media,
                     bounce,
@@ -304,16 +297,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 });
             } else {
                 counts.glossy = true;
-                let [r, t] = [&reflected, &transmitted].map(|path| path.throughput.max_element());
+                let [r, t] = [&*reflected, &*transmitted].map(|path| path.throughput.max_element());
                 let number = self.base.sampler.branch_1d(bounce - 1 - SPLIT_DEPTH as u32);
                 transmits = transmits.and_not(both & (number * (r + t)).lt(r));
-                for (path, own) in [(&mut reflected, r), (&mut transmitted, t)] {
+                for (path, own) in [(&mut *reflected, r), (&mut *transmitted, t)] {
                     let scaled = path.throughput * ((r + t) / own);
                     path.throughput = Vec3::select(both, scaled, path.throughput);
                 }
             }
         }
-        branch.path = Path::select(transmits, &transmitted, &reflected);
+        branch.path = Path::select(transmits, transmitted, reflected);
         branch.lanes = lanes;
         branch.media = MediumStack::select(transmits, &rough.hit.medium_transmitted, &media);
         branch.bounce = bounce;
