@@ -39,7 +39,7 @@ pub struct EditArgs {
     pub precision: PrecisionArgs,
     #[command(flatten)]
     pub terminal: TerminalArgs,
-    /// Write the latencies of keys and mouse as CSV, and print their distribution at the end
+    /// Write the latencies of keys and mouse as CSV
     #[arg(long, value_name = "FILE.csv", hide = true)]
     pub trace: Option<PathBuf>,
 }

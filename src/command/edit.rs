@@ -95,7 +95,6 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
         Ok(None) => {}
         Err(reason) => warn(reason),
     }
-    ended.latencies.iter().for_each(|line| warn(line));
     match ended.signalled {
         Some(status) => Err(Failure::Signalled(status)),
         None => printed,
@@ -203,7 +202,6 @@ mod tests {
             exported: vec![Ok(exported)],
             kept: Ok(None),
             checkpoints: vec![Ok(PathBuf::from("room.film"))],
-            latencies: Vec::new(),
         }
     }
 

@@ -143,8 +143,6 @@ pub enum Effect {
     Stop(Stop),
     /// Put into later snapshots the data that the view requests.
     View(View),
-    /// Pause (`true`) or resume (`false`) the render.
-    Pause(bool),
     /// Discard all samples and restart rendering.
     Restart,
     /// Render with this number of threads.

@@ -319,9 +319,7 @@ fn picture_stories() -> Vec<Story> {
         story("difference of pinned and live", "k C", |_, d| {
             d.model.comparison.shown == CompareView::Difference
         }),
-        story("pause or resume", "Space", |_, d| {
-            d.model.paused && d.asked(|e| *e == Effect::Pause(true))
-        }),
+        story("pause or resume", "Space", |_, d| d.model.paused),
         story("restart the picture", "R", |_, d| d.asked(|e| *e == Effect::Restart)),
         story("stop at …", "T Ctrl-u `spp 100, time 5` Enter", |_, d| {
             d.model.stop.spp == Some(100)

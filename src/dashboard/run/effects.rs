@@ -1,6 +1,6 @@
 //! Executor of the effects that `update` returns.
 
-use crate::dashboard::run::exports::{ExportRequest, Exporter, ResizedExport, image_viewer, paths};
+use crate::dashboard::run::exports::{Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
@@ -11,9 +11,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::Options;
-use zerkalo_render::film::LinearImage;
+use zerkalo_render::film::{Display, LinearImage};
 use zerkalo_render::plan::WatchedFilms;
-use zerkalo_render::schedule::Settings;
+use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::Session;
 use zerkalo_scene::{Scene, SceneFile};
 
@@ -94,10 +94,6 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
-    pub fn rest(&self, resting: bool) {
-        if resting { self.session.pause() } else { self.session.resume() }
-    }
-
     /// Executes `effect`. Its results arrive as messages.
     pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
@@ -108,7 +104,6 @@ impl EffectRunner {
             Effect::Display(display) => self.session.set_display(display),
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
-            Effect::Pause(paused) => self.rest(paused),
             Effect::Pin => self.pin(),
             Effect::Export(format) => self.export(format),
             Effect::Checkpoint(scene) => self.write_checkpoint(&scene),
@@ -117,53 +112,57 @@ impl EffectRunner {
                 let viewport = image_viewer::viewport(frames, screen);
                 image_viewer::prepare(path, display, viewport, self.results.clone());
             }
-            Effect::Threads(_)
-            | Effect::LowPriority(_)
-            | Effect::Save { .. }
-            | Effect::Load
-            | Effect::Autosave(_)
-            | Effect::Recover
-            | Effect::Discard
-            | Effect::ExportSized { .. }
-            | Effect::CancelExport => self.edit(effect),
+            Effect::Threads(threads) => self.edit(|editing, session| {
+                editing.threads = threads;
+                editing.set_threads(session);
+            }),
+            Effect::LowPriority(low) => self.edit(|editing, session| {
+                editing.niceness = if low { LOW_PRIORITY } else { 0 };
+                editing.set_threads(session);
+            }),
+            Effect::Save { scene, path, overwrite } => {
+                self.edit(|editing, _| editing.files.save(scene, path, overwrite));
+            }
+            Effect::Load => self.edit(|editing, _| editing.files.give(Job::Load)),
+            Effect::Autosave(scene) => self.edit(|editing, _| editing.files.autosave(scene)),
+            Effect::Recover => {
+                self.edit(|editing, _| editing.files.give_autosave(AutosaveJob::Recover));
+            }
+            Effect::Discard => {
+                self.edit(|editing, _| editing.files.give_autosave(AutosaveJob::Discard));
+            }
+            Effect::ExportSized { scene, format, display, stop } => {
+                self.export_sized(scene, format, display, stop);
+            }
+            Effect::CancelExport => {
+                self.edit(|editing, _| editing.resized.iter().for_each(ResizedExport::cancel));
+            }
         }
         Outcome::Done
     }
 
-    fn edit(&mut self, effect: Effect) {
+    /// Calls `act` unless this is `zerkalo watch`, which neither edits nor renders.
+    fn edit(&mut self, act: impl FnOnce(&mut Editing, &Session)) {
+        if let Some(editing) = &mut self.editing {
+            act(editing, &self.session);
+        }
+    }
+
+    /// Starts the render and export of `scene`, whose film has the requested size.
+    fn export_sized(&mut self, scene: Arc<Scene>, format: Format, display: Display, stop: Stop) {
         let Some(editing) = &mut self.editing else { return };
-        match effect {
-            Effect::Threads(threads) => {
-                editing.threads = threads;
-                editing.set_threads(&self.session);
+        let options = Options { display, ..editing.options.clone() };
+        let settings = Settings { stop, ..editing.settings };
+        let started = Session::new(editing.threads, options, settings).and_then(|mut session| {
+            session.set_scene(scene);
+            ResizedExport::start(session, format, self.exporter.clone(), self.results.clone())
+        });
+        match started {
+            Ok(export) => editing.resized = Some(export),
+            Err(error) => {
+                let why = format!("cannot start a rendering thread: {error}");
+                let _ = self.results.send(Message::Exported(Err(why)));
             }
-            Effect::LowPriority(low) => {
-                editing.niceness = if low { LOW_PRIORITY } else { 0 };
-                editing.set_threads(&self.session);
-            }
-            Effect::Save { scene, path, overwrite } => editing.files.save(scene, path, overwrite),
-            Effect::Load => editing.files.give(Job::Load),
-            Effect::Autosave(scene) => editing.files.autosave(scene),
-            Effect::Recover => editing.files.give_autosave(AutosaveJob::Recover),
-            Effect::Discard => editing.files.give_autosave(AutosaveJob::Discard),
-            Effect::ExportSized { scene, format, display, stop } => {
-                let request = ExportRequest {
-                    scene,
-                    format,
-                    options: Options { display, ..editing.options.clone() },
-                    settings: Settings { stop, ..editing.settings },
-                    threads: editing.threads,
-                };
-                match ResizedExport::start(request, self.exporter.clone(), self.results.clone()) {
-                    Ok(resized) => editing.resized = Some(resized),
-                    Err(error) => {
-                        let why = format!("cannot start a rendering thread: {error}");
-                        let _ = self.results.send(Message::Exported(Err(why)));
-                    }
-                }
-            }
-            Effect::CancelExport => editing.resized.iter().for_each(ResizedExport::cancel),
-            _ => {}
         }
     }
 

@@ -11,7 +11,6 @@ use crate::dashboard::update::update;
 use crate::dashboard::{Effect, Message, Model, Overlay};
 use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::session::{Snapshot, State};
 use zerkalo_terminal::flow::LinkStatus;
@@ -38,7 +37,7 @@ pub struct Dashboard {
     pub resizing: ResizeDebounce,
     /// Time at which the model last received the connection's status or upload progress.
     pub status_sent_at: Duration,
-    /// `true` if rendering is paused because the terminal does not reply.
+    /// `true` if rendering is paused, by the user or because the terminal does not reply.
     pub resting: bool,
     /// `true` if the model has changed since the last frame.
     pub changed: bool,
@@ -150,10 +149,8 @@ impl Dashboard {
     pub fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
-            match self.terminal_io.input.recv_timeout(left) {
-                Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
-                _ => break,
-            }
+            let Ok(Ok(event)) = self.terminal_io.input.recv_timeout(left) else { break };
+            self.enqueue(event, &mut Vec::new());
             if !self.frames.flow.is_waiting() {
                 break;
             }
@@ -167,19 +164,14 @@ impl Dashboard {
         let is_snapshot = matches!(message, Message::Snapshot(_));
         let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
-            let scene = match &effect {
-                Effect::Show(scene) => Some(Arc::clone(scene)),
-                _ => None,
-            };
+            let is_edit = matches!(effect, Effect::Show(_));
             match self.effects.run(effect, &mut self.frames) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
                     // A change of lights alone needs none: the snapshot has one picture per light
                     // group.
-                    let snapshot = self.model.snapshot.as_deref();
-                    let relit =
-                        scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
-                    if !relit {
+                    let mix = |s: &Box<Snapshot>| s.mix_for(self.model.scene());
+                    if !is_edit || self.model.snapshot.as_ref().and_then(mix).is_none() {
                         awaited = Some(generation);
                     }
                 }
@@ -251,7 +243,6 @@ impl Dashboard {
             if due.is_some_and(|at| at <= now) {
                 let drawn =
                     self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
-                self.latency.line(now, self.frames.diff.pending().visible, self.frames.sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
@@ -281,23 +272,22 @@ impl Dashboard {
     /// [`STATUS_INTERVAL`], and its end at once.
     fn report_upload(&mut self, now: Duration) {
         let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
-        let known = match &self.model.overlay {
-            Some(Overlay::ViewerImage(viewed)) => viewed.sent,
-            _ => return,
-        };
-        if sent != known && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
+        let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay else { return };
+        if sent != viewed.sent && (sent == 1.0 || self.status_sent_at + STATUS_INTERVAL <= now) {
             self.status_sent_at = now;
             self.dispatch(Message::ImageSent(sent));
         }
     }
 
-    /// Pauses rendering while the terminal does not reply. Returns the time at which rendering will
-    /// be paused unless a reply arrives before.
+    /// Pauses rendering on the user's request and while the terminal does not reply. Returns the
+    /// time at which the terminal will count as silent unless a reply arrives before.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.flow.silent_at(self.frames.writing_since);
         let is_silent = silent_at.is_some_and(|at| at <= now);
-        if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
-            self.effects.rest(is_silent);
+        let rests = is_silent || self.model.paused;
+        if std::mem::replace(&mut self.resting, rests) != rests {
+            let session = &self.effects.session;
+            if rests { session.pause() } else { session.resume() }
         }
         silent_at.filter(|_| !is_silent)
     }

@@ -32,7 +32,6 @@ pub struct FramePipeline {
     pub writer: Writer,
     /// Time since which a frame is being written; `None` if another one can be sent.
     pub writing_since: Option<Duration>,
-    pub sent: u64,
     /// Last frame that was drawn, whose cells may not all have been sent.
     target: Buffer,
     cursor: Option<Position>,
@@ -76,7 +75,6 @@ impl FramePipeline {
             terminal,
             writer: writer::start(Arc::clone(&tty))?,
             writing_since: None,
-            sent: 0,
             target: Buffer::empty(Rect::ZERO),
             cursor: None,
             clipboard: String::new(),
@@ -240,7 +238,6 @@ impl FramePipeline {
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
         self.request_ack(&mut bytes);
-        self.sent += bytes.len() as u64;
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.send(bytes, now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }

@@ -72,14 +72,11 @@ pub struct Ended {
     pub kept: Result<Option<PathBuf>, String>,
     /// Checkpoints that ended after the screen was restored.
     pub checkpoints: Vec<Result<PathBuf, String>>,
-    /// Summary of input latencies; empty unless [`Setup::trace`] is set.
-    pub latencies: Vec<String>,
 }
 
 impl Ended {
     fn new(signalled: Option<u8>, kept: Result<Option<PathBuf>, String>) -> Self {
-        let (exported, checkpoints, latencies) = Default::default();
-        Self { signalled, exported, kept, checkpoints, latencies }
+        Self { signalled, exported: Vec::new(), kept, checkpoints: Vec::new() }
     }
 }
 
@@ -190,15 +187,14 @@ fn end(
     let kept = dashboard.effects.finish(deadline);
     let mut ended = Ended::new(result?, kept);
     for message in dashboard.done.try_iter() {
-        match message {
-            Message::Exported(result) => ended.exported.push(result),
-            Message::CheckpointWritten(result) => ended.checkpoints.push(result),
-            _ => {}
+        if let Message::Exported(result) = message {
+            ended.exported.push(result);
+        } else if let Message::CheckpointWritten(result) = message {
+            ended.checkpoints.push(result);
         }
     }
     if let Some(path) = trace {
         dashboard.latency.write(&path)?;
-        ended.latencies = dashboard.latency.summary();
     }
     Ok(ended)
 }

@@ -112,7 +112,7 @@ fn always(_: &Model) -> bool {
 /// All commands, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
+    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "rotate"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
     command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
     command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
     command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),

@@ -11,7 +11,6 @@ use zerkalo_render::session::QUALITIES;
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
         self.model.paused = !self.model.paused;
-        self.emit(Effect::Pause(self.model.paused));
     }
 
     pub(super) fn restart(&mut self) {

@@ -16,11 +16,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
+use zerkalo_render::EncodedCheckpoint;
 use zerkalo_render::export::{Provenance, scene_hash};
 use zerkalo_render::image_file::{Depth, ImageOutput};
-use zerkalo_render::schedule::Settings;
 use zerkalo_render::session::{Picture, Session, State};
-use zerkalo_render::{EncodedCheckpoint, Options};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::Existing;
 
@@ -113,20 +112,12 @@ pub struct ResizedExport {
     worker: Worker,
 }
 
-pub struct ExportRequest {
-    /// Scene with the requested film size.
-    pub scene: Arc<Scene>,
-    pub format: Format,
-    pub options: Options,
-    pub settings: Settings,
-    pub threads: usize,
-}
-
 impl ResizedExport {
-    /// Starts the thread that renders and writes the image. It sends [`Message::ExportProgress`]
-    /// and finally [`Message::Exported`], unless it is cancelled.
+    /// Starts the thread that waits for the render of `session` and writes the image. It sends
+    /// [`Message::ExportProgress`] and finally [`Message::Exported`], unless it is cancelled.
     pub fn start(
-        request: ExportRequest,
+        session: Session,
+        format: Format,
         exporter: Exporter,
         results: Sender<Message>,
     ) -> io::Result<Self> {
@@ -134,7 +125,7 @@ impl ResizedExport {
         let cancel_flag = Arc::clone(&cancelled);
         let worker = Worker::spawn("export", move || {
             // Sending fails only at the end of the program, when the receiver is gone.
-            let result = render(request, &exporter, &cancel_flag, &|progress| {
+            let result = finish(session, format, exporter, &cancel_flag, |progress| {
                 let _ = results.send(Message::ExportProgress(progress));
             });
             if let Some(result) = result {
@@ -156,19 +147,15 @@ impl ResizedExport {
     }
 }
 
-/// Renders and writes the picture of `request`. Returns `None` if the render is cancelled.
-fn render(
-    request: ExportRequest,
-    exporter: &Exporter,
+/// Waits for the end of the render and writes the picture. Returns `None` if the render is
+/// cancelled.
+fn finish(
+    session: Session,
+    format: Format,
+    exporter: Exporter,
     cancelled: &AtomicBool,
-    report_progress: &dyn Fn(f64),
+    report_progress: impl Fn(f64),
 ) -> Option<Result<Exported, String>> {
-    let ExportRequest { scene, format, options, settings, threads } = request;
-    let mut session: Session = match Session::new(threads, options, settings) {
-        Ok(session) => session,
-        Err(error) => return Some(Err(error.to_string())),
-    };
-    session.set_scene(scene);
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
@@ -182,7 +169,6 @@ fn render(
             }
         }
     }
-    let exporter = exporter.clone();
     let (sender, receiver) = bounded(1);
     session.submit(move |picture| {
         let written = picture.map(|picture| exporter.write(&picture, format));
