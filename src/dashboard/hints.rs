@@ -1,28 +1,18 @@
 //! Texts derived from the command table: hint line, help and docs/keys.md.
 
+use crate::dashboard::panel_lines::ListLine;
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
 use crate::dashboard::{KeyContext, Model, Overlay};
 
-/// Line of the help.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum HelpLine {
-    /// Heading of a chapter.
-    Heading(&'static str),
-    /// Keys with the contexts in which they work, and the command's label.
-    Keys(String, &'static str),
-}
+/// Line of the help: keys with the contexts in which they work, and the command's label.
+pub type HelpLine = ListLine<(String, &'static str)>;
 
 /// Returns the state that selects the hints. Returns `None` under an exported image, which leaves
 /// no room for a hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
-        Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
-        Some(
-            Overlay::CommandPalette(_)
-            | Overlay::Pick(_)
-            | Overlay::NoiseTargets { .. }
-            | Overlay::Question(_),
-        ) => HintLine::List,
+        Some(Overlay::Help { .. }) => HintLine::Reading,
+        Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,
         Some(Overlay::ViewerImage(_)) => return None,
         Some(Overlay::Form(form)) if form.fields.editor.is_none() => HintLine::Form,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => HintLine::Typing,
@@ -55,7 +45,7 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
 pub fn help(model: &Model) -> Vec<HelpLine> {
     let mut lines = Vec::new();
     for command in COMMANDS.iter().filter(|command| command.is_listed(model)) {
-        let heading = HelpLine::Heading(command.chapter);
+        let heading = HelpLine::Heading(command.chapter.to_string());
         if !lines.contains(&heading) {
             lines.push(heading);
         }
@@ -64,7 +54,7 @@ pub fn help(model: &Model) -> Vec<HelpLine> {
             None => command.all_keys(str::to_string),
         };
         let keys = if keys.is_empty() { ":".to_string() } else { keys };
-        lines.push(HelpLine::Keys(keys, command.label));
+        lines.push(HelpLine::Entry((keys, command.label)));
     }
     lines
 }
@@ -100,7 +90,7 @@ mod tests {
     #[test]
     fn help_lists_every_command() {
         let lines = help(&Model::default());
-        let rows = lines.iter().filter(|line| matches!(line, HelpLine::Keys(..))).count();
+        let rows = lines.iter().filter(|line| line.entry().is_some()).count();
         assert_eq!(rows, COMMANDS.len());
         let chapters = COMMANDS.chunk_by(|a, b| a.chapter == b.chapter);
         assert_eq!(lines.len() - rows, chapters.count(), "the commands of a chapter are together");

@@ -32,6 +32,6 @@ use key_context::KeyContext;
 use layout::{BORDER, Focus, Layout};
 use message::{DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits};
 use model::{CompareView, Drag, FieldList, Mode, Model, WatchTable, short_name};
-use overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question, ViewedImage};
-use panel_lines::{FieldLine, OutlineEntry, OutlineLine, PanelLine};
+use overlay::{Answer, Form, Overlay, Pick, PickEntry, Prompt, Question, ViewedImage};
+use panel_lines::{FieldLine, ListCursor, OutlineEntry, OutlineLine, PanelLine};
 use update::UpdateContext;

@@ -1,9 +1,9 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
 use crate::dashboard::layout::{Request, layout};
-use crate::dashboard::text::wrapped;
 use crate::dashboard::{
-    Convergence, DisplayChannel, Editor, Focus, KeyContext, Layout, OrphanedEdits, Overlay,
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, Layout, ListCursor, OrphanedEdits,
+    Overlay,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -101,9 +101,7 @@ pub struct Notice {
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchTable {
     pub report: WatchReport,
-    pub cursor: usize,
-    /// Index of the first visible row.
-    pub scroll: usize,
+    pub at: ListCursor,
 }
 
 /// Export that renders in the background, at a size of the user's choice.
@@ -289,16 +287,6 @@ impl Model {
     pub fn probed(&self) -> Option<&PixelProbe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;
         (Some(probe.pixel) == self.probe).then_some(probe)
-    }
-
-    /// Returns the features of the compiled scene as lines of `width` columns.
-    pub fn inventory(&self, width: u16) -> Vec<String> {
-        match &self.snapshot {
-            Some(snapshot) if !snapshot.report.inventory.is_empty() => {
-                wrapped(&snapshot.report.inventory, width)
-            }
-            _ => vec!["Nothing has been compiled yet.".to_string()],
-        }
     }
 
     /// Returns the time at which the model needs the next

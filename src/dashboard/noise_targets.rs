@@ -2,6 +2,7 @@
 //! them.
 
 use crate::dashboard::Convergence;
+use crate::dashboard::text::{duration, durations};
 use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each target in [`QUALITIES`].
@@ -17,25 +18,17 @@ pub const LOOKS: [&str; QUALITIES.len()] = [
 /// Note below the list.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// Render time that is needed to reach a noise target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Cost {
-    /// The target was reached after this number of seconds; `None` if the noise in the first report
-    /// was not above it.
-    Reached(Option<f64>),
-    /// Lower and upper estimate of the remaining render time in seconds.
-    Left(f64, f64),
-    /// There is no noise estimate yet.
-    Unknown,
-}
-
-/// Returns the render time to reach the noise target `QUALITIES[at]`.
-pub fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
-    let reached = report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]);
+/// Describes the render time that is needed to reach the noise target `QUALITIES[at]`, such as
+/// `3–5 s more`. The time of a target that the first report had reached is unknown.
+pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> String {
+    let Some(report) = report else { return "not known yet".to_string() };
+    if report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]) {
+        let seconds = convergence.seconds_at(QUALITIES[at]);
+        return seconds.map_or("reached".to_string(), |s| format!("reached after {}", duration(s)));
+    }
     match report.quality_seconds[at] {
-        _ if reached => Cost::Reached(convergence.seconds_at(QUALITIES[at])),
-        Some((from, to)) => Cost::Left(from, to),
-        None => Cost::Unknown,
+        Some((from, to)) => format!("{} more", durations(from, to)),
+        None => "not known yet".to_string(),
     }
 }
 
@@ -55,15 +48,16 @@ mod tests {
         now.quality_seconds[4] = Some((0.2, 0.3));
         // The simulated reports arrive after 10, 20, 40 and 80 ms. Their noise is 2, 1, 0.5 and 0.4
         // levels.
-        for at in [0, 1] {
-            assert_eq!(cost(&now, &convergence, at), Cost::Reached(None), "by the first look");
+        let costs = [0, 1, 2, 3, 4, 5].map(|at| cost(Some(&now), &convergence, at));
+        let [first, second, rest @ ..] = costs;
+        assert_eq!([first, second], ["reached"; 2], "by the first look");
+        let expected =
+            ["reached after 0 s", "reached after 0 s", "0.2–0.3 s more", "not known yet"];
+        assert_eq!(rest, expected);
+        for (levels, seconds) in [(1.0, 0.02), (0.5, 0.04)] {
+            let time = convergence.seconds_at(levels).unwrap();
+            assert!((time - seconds).abs() < 1e-9, "{levels}: {time}");
         }
-        for (at, seconds) in [(2, 0.02), (3, 0.04)] {
-            let Cost::Reached(Some(time)) = cost(&now, &convergence, at) else { panic!("{at}") };
-            assert!((time - seconds).abs() < 1e-9, "{at}: {time}");
-        }
-        assert_eq!(cost(&now, &convergence, 4), Cost::Left(0.2, 0.3));
-        assert_eq!(cost(&now, &convergence, 5), Cost::Unknown);
         // The requested noise is the geometric mean of 2 and 1 levels. `seconds_at` interpolates by
         // a power law, so it returns the geometric mean of the times 10 and 20 ms.
         let between = convergence.seconds_at(2f64.sqrt()).unwrap();

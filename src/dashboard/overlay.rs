@@ -1,12 +1,12 @@
 //! Overlays of the dashboard: help, lists, forms, prompts and questions. An overlay covers panels
 //! and receives the keys.
 
-use crate::dashboard::{Editor, FieldList, UpdateContext};
+use crate::dashboard::{Editor, FieldList, ListCursor, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::session::QUALITIES;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::Target;
+use zerkalo_scene::edit::{Target, Word};
 use zerkalo_terminal::image::ViewerImage;
 
 #[derive(Clone, Debug)]
@@ -15,15 +15,8 @@ pub enum Overlay {
     Help {
         scroll: usize,
     },
-    /// List of the compiled scene's features.
-    Inventory {
-        scroll: usize,
-    },
     /// List of [`noise_targets`](crate::dashboard::noise_targets).
-    NoiseTargets {
-        cursor: usize,
-    },
-    CommandPalette(CommandPalette),
+    NoiseTargets(ListCursor),
     Pick(Pick),
     Form(Form),
     Prompt(Prompt),
@@ -32,19 +25,13 @@ pub enum Overlay {
 }
 
 impl Overlay {
-    /// Returns the cursor, the index of the first visible entry (`None` if the list never scrolls)
-    /// and the number of entries. Returns `None` for overlays without a cursor.
-    pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
+    /// Returns the cursor and the number of entries; `None` for overlays without a list of entries.
+    pub fn list(&mut self) -> Option<(&mut ListCursor, usize)> {
         match self {
-            Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
-            Self::CommandPalette(CommandPalette { cursor, scroll, found, .. }) => {
-                Some((cursor, Some(scroll), found.len()))
-            }
-            Self::Pick(Pick { cursor, scroll, entries, .. }) => {
-                Some((cursor, Some(scroll), entries.len()))
-            }
-            Self::Question(Question { cursor, answers, .. }) => Some((cursor, None, answers.len())),
-            _ => None,
+            Self::NoiseTargets(at) => Some((at, QUALITIES.len())),
+            Self::Pick(pick) => Some((&mut pick.at, pick.found.len())),
+            Self::Question(question) => Some((&mut question.at, question.answers.len())),
+            Self::Help { .. } | Self::Form(_) | Self::Prompt(_) | Self::ViewerImage(_) => None,
         }
     }
 }
@@ -59,28 +46,34 @@ pub struct ViewedImage {
     pub sent: f64,
 }
 
-/// Command palette, which finds commands by fuzzy search.
-#[derive(Clone, Debug)]
-pub struct CommandPalette {
-    pub editor: Editor,
-    /// Indices of the matching commands in the command table, best match first.
-    pub found: Vec<usize>,
-    /// Index in `found`.
-    pub cursor: usize,
-    pub scroll: usize,
-}
-
-/// List from which the user picks an entry.
+/// List from which the user picks an entry, found by fuzzy search: commands, kinds or values.
 #[derive(Clone, Debug)]
 pub struct Pick {
     pub title: String,
-    /// Name and description of each entry.
-    pub entries: Vec<(String, String)>,
-    pub cursor: usize,
-    /// Index of the first visible entry.
-    pub scroll: usize,
+    pub entries: Vec<PickEntry>,
+    /// Editor of the search text.
+    pub editor: Editor,
+    /// Indices in `entries` of those that match the search text, best match first.
+    pub found: Vec<usize>,
+    /// Cursor in `found`.
+    pub at: ListCursor,
     /// Function that is called with the name of the picked entry.
     pub(super) take: fn(&mut UpdateContext<'_>, &str),
+}
+
+#[derive(Clone, Debug)]
+pub struct PickEntry {
+    pub name: String,
+    /// Description of a word, or chapter of a command.
+    pub note: String,
+    /// Keys of a command.
+    pub keys: String,
+}
+
+impl From<Word> for PickEntry {
+    fn from(Word { name, doc }: Word) -> Self {
+        Self { name, note: doc, keys: String::new() }
+    }
 }
 
 /// Form for a new object or light, which the picture previews, confirmed or cancelled as a whole.
@@ -119,7 +112,7 @@ pub struct Question {
     pub text: String,
     /// Letter, text and effect of each answer.
     pub answers: Vec<(char, &'static str, Answer)>,
-    pub cursor: usize,
+    pub at: ListCursor,
 }
 
 /// Effect of an answer.

@@ -40,25 +40,18 @@ impl Model {
                 ..OverlayLayout::default()
             },
             Overlay::Help { .. } => whole(centred(84, height - 2)),
-            Overlay::Inventory { .. } => {
-                let columns = 84.min(width - 2);
-                let rows = self.inventory(columns - 2).len() as u16;
-                whole(centred(columns, rows.saturating_add(2)))
-            }
-            Overlay::NoiseTargets { .. } => {
+            Overlay::NoiseTargets(_) => {
                 let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
                 let frame = low(76, QUALITIES.len() as u16 + 2 + about);
                 let (list, below) = divided(frame.inner(BORDER), QUALITIES.len() as u16);
                 let help = Rect { x: below.x + 3, width: below.width - 3, ..below };
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
-            Overlay::CommandPalette(_) => {
-                let frame = centred(72, height.min(26) - 2);
+            Overlay::Pick(pick) => {
+                let rows = (pick.entries.len() as u16).saturating_add(3).min(height.min(26) - 2);
+                let frame = centred(76, rows);
                 let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
-            }
-            Overlay::Pick(pick) => {
-                whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
             Overlay::Form(form) => self.form_layout(&layout, form),
             Overlay::Prompt(prompt) => {

@@ -6,6 +6,24 @@ use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use zerkalo_scene::value::truncated;
 
+/// Cursor of a list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ListCursor {
+    /// Index of the entry under the cursor.
+    pub index: usize,
+    /// Index of the first visible entry.
+    pub scroll: usize,
+}
+
+impl ListCursor {
+    /// Moves the cursor by `steps` within `len` entries, of which `rows` are visible, the one under
+    /// the cursor among them.
+    pub fn walk(&mut self, steps: isize, len: usize, rows: usize) {
+        self.index = self.index.saturating_add_signed(steps).min(len.saturating_sub(1));
+        self.scroll = scrolled(self.scroll, self.index, len, rows);
+    }
+}
+
 /// Line of a list.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ListLine<T> {

@@ -335,12 +335,11 @@ fn picture_stories() -> Vec<Story> {
         story("low or normal priority", ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),
         story("next colour mode of the terminal", "#", |_, d| d.model.colors == Colors::Indexed),
         story("all keys", "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
-        story("find an action", ":", |_, d| {
-            matches!(d.model.overlay, Some(Overlay::CommandPalette(_)))
-        }),
-        story("inventory of the scene", ":", |_, d| {
-            matches!(d.model.overlay, Some(Overlay::Inventory { .. }))
-        }),
+        story(
+            "find an action",
+            ":",
+            |_, d| matches!(&d.model.overlay, Some(Overlay::Pick(pick)) if pick.title == "all actions"),
+        ),
     ]
 }
 

@@ -91,7 +91,7 @@ fn vector_or_colour_can_be_typed_into_any_component() {
 fn choices_are_selected_from_list_or_stepped() {
     let mut desk = desk(BALL, "Enter Down Enter");
     assert!(
-        matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].0 == "mirror")
+        matches!(&desk.model.overlay, Some(Overlay::Pick(pick)) if pick.entries[0].name == "mirror")
     );
     desk.keys("m Enter");
     assert_eq!(desk.scene().objects[1].material, "mirror");

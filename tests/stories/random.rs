@@ -31,14 +31,8 @@ fn keys() -> Vec<Key> {
 }
 
 fn quits(desk: &Desk, key: Key) -> bool {
-    let palette = match &desk.model.overlay {
-        Some(Overlay::CommandPalette(palette)) => {
-            palette.found.get(palette.cursor).is_some_and(|i| COMMANDS[*i].label == QUIT)
-        }
-        _ => false,
-    };
     lookup(desk.model.context(), key).is_some_and(|c| c.label == QUIT)
-        || palette && key.code == Code::Enter
+        || key.code == Code::Enter && desk.picked_command() == Some(QUIT)
 }
 
 fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {

@@ -54,7 +54,7 @@ fn orphaned_edits_are_offered_and_recovered() {
     let left = orphaned_edits(&desk, false);
     desk.send(Message::OrphanedEdits(left.clone()));
     let Some(Overlay::Question(question)) = &desk.model.overlay else { panic!() };
-    assert!(question.text.contains("12 minutes ago") && !question.text.contains("changed"));
+    assert!(question.text.contains("12 min ago") && !question.text.contains("changed"));
     desk.effects.clear();
     desk.keys("Enter");
     assert_eq!(**desk.model.history.scene(), *left.scene);

@@ -191,12 +191,17 @@ impl Desk {
         }
         let command = lookup(self.model.context(), key);
         let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
-        if let (Some(Overlay::CommandPalette(palette)), Code::Enter) =
-            (&self.model.overlay, key.code)
-        {
-            fired.extend(palette.found.get(palette.cursor).map(|i| COMMANDS[*i].label));
+        if key.code == Code::Enter {
+            fired.extend(self.picked_command());
         }
         fired
+    }
+
+    /// Returns the label of the command under the cursor of the command palette.
+    pub fn picked_command(&self) -> Option<&'static str> {
+        let Some(Overlay::Pick(pick)) = &self.model.overlay else { return None };
+        let name = &pick.entries[*pick.found.get(pick.at.index)?].name;
+        COMMANDS.iter().map(|command| command.label).find(|label| label == name)
     }
 
     /// Presses the keys with the given names. Text between backquotes is typed character by
@@ -218,11 +223,8 @@ impl Desk {
     /// Finds a command by its label in the command palette and runs it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
-        let index = COMMANDS.iter().position(|row| row.label == label);
-        let Some(Overlay::CommandPalette(palette)) = &self.model.overlay else {
-            panic!("no palette")
-        };
-        let downs = palette.found.iter().position(|found| Some(*found) == index);
+        let Some(Overlay::Pick(pick)) = &self.model.overlay else { panic!("no palette") };
+        let downs = pick.found.iter().position(|found| pick.entries[*found].name == label);
         let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));
         assert!(downs < 10, "{label} is {downs} lines down");
         for _ in 0..downs {
@@ -274,7 +276,7 @@ impl Desk {
     /// Returns the text editor that receives the keys; `None` if no text is edited.
     pub fn editor(&self) -> Option<&Editor> {
         match &self.model.overlay {
-            Some(Overlay::CommandPalette(palette)) => Some(&palette.editor),
+            Some(Overlay::Pick(pick)) => Some(&pick.editor),
             Some(Overlay::Prompt(prompt)) => Some(&prompt.editor),
             None | Some(Overlay::Form(_)) => self.model.field_list().editor.as_ref(),
             Some(_) => None,

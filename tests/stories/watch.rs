@@ -86,13 +86,8 @@ fn every_key_edits_and_renders_nothing() {
 
 #[test]
 fn help_and_palette_have_the_keys_that_work() {
-    let listed: Vec<_> = help(&watching(3).model)
-        .into_iter()
-        .filter_map(|line| match line {
-            HelpLine::Keys(keys, label) => Some((keys, label)),
-            HelpLine::Heading(_) => None,
-        })
-        .collect();
+    let lines = help(&watching(3).model);
+    let listed: Vec<_> = lines.iter().filter_map(HelpLine::entry).collect();
     for (keys, label) in &listed {
         let mut desk = watching(3);
         let first = keys.split([' ', ',']).next().unwrap();
@@ -131,7 +126,7 @@ fn exposure_of_the_user_outlives_reports() {
 #[test]
 fn cursor_follows_its_row() {
     let mut desk = watching(30);
-    let cursor = |desk: &Desk| desk.model.watch.as_ref().unwrap().cursor;
+    let cursor = |desk: &Desk| desk.model.watch.as_ref().unwrap().at.index;
     desk.keys("Down Down");
     assert_eq!(cursor(&desk), 2);
     let mut rows: Vec<_> = (0..30).map(|n| shard(n, WatchedState::Running)).collect();
@@ -140,7 +135,7 @@ fn cursor_follows_its_row() {
     assert_eq!(cursor(&desk), 7);
     desk.keys("End");
     assert_eq!(cursor(&desk), 29);
-    assert!(desk.model.watch.as_ref().unwrap().scroll > 0);
+    assert!(desk.model.watch.as_ref().unwrap().at.scroll > 0);
     // The cursor moves to the last row if the table becomes shorter.
     desk.send(Message::Watched(Box::new(report(vec![shard(1, WatchedState::Complete)]))));
     assert_eq!(cursor(&desk), 0);
@@ -176,9 +171,9 @@ fn mouse_selects_rows_and_moves_the_probe() {
         desk.send(at(column, row, MouseKind::Release(Button::Left)));
     };
     click(&mut desk, rows.x + 2, rows.y + 3);
-    assert_eq!(desk.model.watch.as_ref().unwrap().cursor, 3);
+    assert_eq!(desk.model.watch.as_ref().unwrap().at.index, 3);
     desk.send(at(rows.x, rows.y, MouseKind::Scroll(-2)));
-    assert_eq!(desk.model.watch.as_ref().unwrap().cursor, 9);
+    assert_eq!(desk.model.watch.as_ref().unwrap().at.index, 9);
     let scene = desk.scene().clone();
     click(&mut desk, image.x + 4, image.y + 4);
     desk.send(at(image.x, image.y, MouseKind::Scroll(3)));

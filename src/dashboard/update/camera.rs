@@ -1,7 +1,7 @@
 //! Commands that move the camera, by keys and mouse.
 
 use crate::dashboard::UpdateContext;
-use crate::dashboard::update::{Coalesce, Direction, StepSize};
+use crate::dashboard::update::{Coalesce, Direction};
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::Camera;
 use zerkalo_scene::edit::{
@@ -15,10 +15,8 @@ const LOOK_DEGREES: f64 = 3.0;
 /// Length of one step of panning, as a fraction of the distance between the eye and the pivot, the
 /// point that the camera orbits.
 const PAN_SHARE: f64 = 0.05;
-/// Factor of the distance between eye and pivot for a coarse step.
+/// Factor of the distance between eye and pivot for one step.
 const DOLLY: f64 = 0.9;
-/// Factor of the distance between eye and pivot for a fine step.
-const DOLLY_FINE: f64 = 0.99;
 /// Factor of the width of the view for one step of zooming in.
 const ZOOM: f64 = 0.95;
 
@@ -39,43 +37,34 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn orbit(&mut self, direction: Direction) {
-        let [right, up, _] = direction.unit().map(|x| x * ORBIT_DEGREES);
+        let [right, up, _] = direction.map(|x| x * ORBIT_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.orbit(right, up, distance));
     }
 
     pub(super) fn pan(&mut self, direction: Direction) {
-        let [right, up, _] = direction.unit().map(|x| x * PAN_SHARE);
+        let [right, up, _] = direction.map(|x| x * PAN_SHARE);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.pan(right, up, distance));
     }
 
-    pub(super) fn dolly(&mut self, direction: Direction, step_size: StepSize) {
-        let nearer = match step_size {
-            StepSize::Coarse => DOLLY,
-            StepSize::Fine => DOLLY_FINE,
-        };
-        let factor = if direction == Direction::In { nearer } else { 1.0 / nearer };
-        self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
-    }
-
-    /// Moves the camera by `ticks` of the mouse wheel, nearer to its pivot if they are positive.
-    pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
-        let factor = DOLLY.powi(ticks.clamp(-50, 50));
+    /// Moves the camera by `steps`, nearer to its pivot if they are positive.
+    pub(super) fn dolly(&mut self, steps: f64) {
+        let factor = DOLLY.powf(steps.clamp(-50.0, 50.0));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
     pub(super) fn look(&mut self, direction: Direction) {
-        let [right, up, _] = direction.unit().map(|x| x * LOOK_DEGREES);
+        let [right, up, _] = direction.map(|x| x * LOOK_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, _| camera.look(right, up));
     }
 
     pub(super) fn fly(&mut self, direction: Direction) {
         let step = 2.0 * step_length(self.scene());
-        let movement = direction.unit().map(|x| x * step);
+        let movement = direction.map(|x| x * step);
         self.set_camera(Coalesce::Repeat, |camera, _| camera.fly(movement));
     }
 
     pub(super) fn roll(&mut self, direction: Direction) {
-        let degrees = direction.unit()[0] * ORBIT_DEGREES;
+        let degrees = direction[0] * ORBIT_DEGREES;
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 

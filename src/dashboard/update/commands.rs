@@ -2,8 +2,7 @@
 //! derived.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
-use crate::dashboard::update::Direction::{Down, In, Left, Out, Right, Up};
-use crate::dashboard::update::StepSize::{Coarse, Fine};
+use crate::dashboard::update::{BACK, DOWN, FORWARD, LEFT, RIGHT, UP};
 use crate::dashboard::{CompareView, Effect, Format, Mode, Model, Overlay, UpdateContext};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
@@ -99,10 +98,9 @@ fn not_watching(model: &Model) -> bool {
     model.watch.is_none()
 }
 
-/// Returns `true` if there is a picture, or a command palette or question, which need none.
+/// Returns `true` if there is a picture, or a list or question, which need none.
 fn viewing_or_choosing(model: &Model) -> bool {
-    viewing(model)
-        || matches!(model.overlay, Some(Overlay::CommandPalette(_) | Overlay::Question(_)))
+    viewing(model) || matches!(model.overlay, Some(Overlay::Pick(_) | Overlay::Question(_)))
 }
 
 fn always(_: &Model) -> bool {
@@ -112,33 +110,33 @@ fn always(_: &Model) -> bool {
 /// All commands, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "rotate"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
-    command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
-    command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
-    command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),
-    command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
-    command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(Out, Coarse)),
-    command("camera", "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(In, Fine)),
-    command("camera", "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(Out, Fine)),
-    command("camera", "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
-    command("camera", "pan right", &[(Picture, "Shift-Right")], |c| c.pan(Right)),
-    command("camera", "pan up", &[(Picture, "Shift-Up")], |c| c.pan(Up)),
-    command("camera", "pan down", &[(Picture, "Shift-Down")], |c| c.pan(Down)),
-    command("camera", "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::In(Flying)], 4, "arrows", "look")]),
-    command("camera", "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(Right)),
-    command("camera", "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(Up)),
-    command("camera", "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(Down)),
-    command("camera", "roll left", &[(Picture, "Alt-Left")], |c| c.roll(Left)),
-    command("camera", "roll right", &[(Picture, "Alt-Right")], |c| c.roll(Right)),
+    command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(LEFT)).hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
+    command("camera", "orbit right", &[(Picture, "Right")], |c| c.orbit(RIGHT)),
+    command("camera", "orbit up", &[(Picture, "Up")], |c| c.orbit(UP)),
+    command("camera", "orbit down", &[(Picture, "Down")], |c| c.orbit(DOWN)),
+    command("camera", "dolly in", &[(Picture, "PageUp")], |c| c.dolly(1.0)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
+    command("camera", "dolly out", &[(Picture, "PageDown")], |c| c.dolly(-1.0)),
+    command("camera", "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(0.1)),
+    command("camera", "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(-0.1)),
+    command("camera", "pan left", &[(Picture, "Shift-Left")], |c| c.pan(LEFT)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
+    command("camera", "pan right", &[(Picture, "Shift-Right")], |c| c.pan(RIGHT)),
+    command("camera", "pan up", &[(Picture, "Shift-Up")], |c| c.pan(UP)),
+    command("camera", "pan down", &[(Picture, "Shift-Down")], |c| c.pan(DOWN)),
+    command("camera", "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(LEFT)).hints(&[hint(&[H::In(Flying)], 4, "arrows", "look")]),
+    command("camera", "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(RIGHT)),
+    command("camera", "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(UP)),
+    command("camera", "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(DOWN)),
+    command("camera", "roll left", &[(Picture, "Alt-Left")], |c| c.roll(LEFT)),
+    command("camera", "roll right", &[(Picture, "Alt-Right")], |c| c.roll(RIGHT)),
     command("camera", "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
     command("camera", "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
     command("camera", "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
-    command("camera", "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
-    command("camera", "fly back", &[(Flying, "s")], |c| c.fly(Out)),
-    command("camera", "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::In(Flying)], 2, "a d", "left, right")]),
-    command("camera", "fly right", &[(Flying, "d")], |c| c.fly(Right)),
-    command("camera", "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::In(Flying)], 3, "r f", "up, down")]),
-    command("camera", "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
+    command("camera", "fly forward", &[(Flying, "w")], |c| c.fly(FORWARD)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
+    command("camera", "fly back", &[(Flying, "s")], |c| c.fly(BACK)),
+    command("camera", "fly left", &[(Flying, "a")], |c| c.fly(LEFT)).hints(&[hint(&[H::In(Flying)], 2, "a d", "left, right")]),
+    command("camera", "fly right", &[(Flying, "d")], |c| c.fly(RIGHT)),
+    command("camera", "fly up", &[(Flying, "r PageUp")], |c| c.fly(UP)).hints(&[hint(&[H::In(Flying)], 3, "r f", "up, down")]),
+    command("camera", "fly down", &[(Flying, "f PageDown")], |c| c.fly(DOWN)),
     command("camera", "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
     command("camera", "reset the camera to the file", &[(Picture, "Home")], |c| c.reset_camera()),
     command("camera", "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
@@ -176,23 +174,23 @@ pub static COMMANDS: &[Command] = &[
     command("objects", "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 5, "x", "delete")]),
     command("objects", "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
     command("objects", "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::In(Picture), H::In(Outline)], 7, "m", "move")]),
-    command("objects", "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
-    command("objects", "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
-    command("objects", "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
-    command("objects", "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
-    command("objects", "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::In(Moving)], 2, "PgUp PgDn", "height")]),
-    command("objects", "lower", &[(Moving, "PageDown")], |c| c.move_selection(Down, Coarse)),
-    command("objects", "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::In(Moving)], 3, "Shift", "fine")]),
-    command("objects", "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(Right, Fine)),
-    command("objects", "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(In, Fine)),
-    command("objects", "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
-    command("objects", "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
-    command("objects", "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
+    command("objects", "move left", &[(Moving, "Left")], |c| c.move_selection(LEFT, 1.0)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
+    command("objects", "move right", &[(Moving, "Right")], |c| c.move_selection(RIGHT, 1.0)),
+    command("objects", "move away", &[(Moving, "Up")], |c| c.move_selection(FORWARD, 1.0)),
+    command("objects", "move nearer", &[(Moving, "Down")], |c| c.move_selection(BACK, 1.0)),
+    command("objects", "raise", &[(Moving, "PageUp")], |c| c.move_selection(UP, 1.0)).hints(&[hint(&[H::In(Moving)], 2, "PgUp PgDn", "height")]),
+    command("objects", "lower", &[(Moving, "PageDown")], |c| c.move_selection(DOWN, 1.0)),
+    command("objects", "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(LEFT, 0.1)).hints(&[hint(&[H::In(Moving)], 3, "Shift", "fine")]),
+    command("objects", "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(RIGHT, 0.1)),
+    command("objects", "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(FORWARD, 0.1)),
+    command("objects", "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(BACK, 0.1)),
+    command("objects", "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(UP, 0.1)),
+    command("objects", "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(DOWN, 0.1)),
     command("objects", "rotate the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
-    command("objects", "rotate left", &[(Rotating, "Left")], |c| c.rotate_selection(Left, Coarse)).hints(&[hint(&[H::In(Rotating)], 1, "Left Right", "rotate 15°")]),
-    command("objects", "rotate right", &[(Rotating, "Right")], |c| c.rotate_selection(Right, Coarse)),
-    command("objects", "rotate left, fine", &[(Rotating, "Shift-Left")], |c| c.rotate_selection(Left, Fine)).hints(&[hint(&[H::In(Rotating)], 2, "Shift", "1°")]),
-    command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(Right, Fine)),
+    command("objects", "rotate left", &[(Rotating, "Left")], |c| c.rotate_selection(-15.0)).hints(&[hint(&[H::In(Rotating)], 1, "Left Right", "rotate 15°")]),
+    command("objects", "rotate right", &[(Rotating, "Right")], |c| c.rotate_selection(15.0)),
+    command("objects", "rotate left, fine", &[(Rotating, "Shift-Left")], |c| c.rotate_selection(-1.0)).hints(&[hint(&[H::In(Rotating)], 2, "Shift", "1°")]),
+    command("objects", "rotate right, fine", &[(Rotating, "Shift-Right")], |c| c.rotate_selection(1.0)),
     command("objects", "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command("objects", "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
 
@@ -255,14 +253,14 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).available(viewing).hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
     command("picture", "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).available(viewing),
     command("picture", "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).available(viewing).hints(&[hint(&[H::Watching], 4, "i", "probe")]),
-    command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).available(viewing).hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
-    command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).available(viewing),
-    command("picture", "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).available(viewing),
-    command("picture", "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).available(viewing),
-    command("picture", "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).available(viewing).hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
-    command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).available(viewing),
-    command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).available(viewing),
-    command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).available(viewing),
+    command("picture", "probe left", &[(Probing, "Left")], |c| c.move_probe(LEFT)).available(viewing).hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
+    command("picture", "probe right", &[(Probing, "Right")], |c| c.move_probe(RIGHT)).available(viewing),
+    command("picture", "probe up", &[(Probing, "Up")], |c| c.move_probe(UP)).available(viewing),
+    command("picture", "probe down", &[(Probing, "Down")], |c| c.move_probe(DOWN)).available(viewing),
+    command("picture", "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe_by_pixel(LEFT)).available(viewing).hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
+    command("picture", "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe_by_pixel(RIGHT)).available(viewing),
+    command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe_by_pixel(UP)).available(viewing),
+    command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe_by_pixel(DOWN)).available(viewing),
     command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
     command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).available(viewing),
     command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).available(viewing),
@@ -277,8 +275,7 @@ pub static COMMANDS: &[Command] = &[
     command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
 
     command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
-    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
-    command("help", "inventory of the scene", &[], |c| c.model.overlay = Some(Overlay::Inventory { scroll: 0 })),
+    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.pick_command()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
 ];
 
 impl Command {

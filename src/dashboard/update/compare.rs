@@ -1,6 +1,6 @@
 //! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison.
 
-use crate::dashboard::update::{Direction, StepSize, cycled};
+use crate::dashboard::update::{Direction, cycled};
 use crate::dashboard::{CompareView, DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::film::{LinearImage, Tone};
@@ -63,26 +63,26 @@ impl UpdateContext<'_> {
         self.show_view();
     }
 
-    /// Moves the pixel probe by about one terminal cell, or by one pixel of the film.
-    pub(super) fn move_probe(&mut self, direction: Direction, step_size: StepSize) {
+    /// Moves the pixel probe by about one terminal cell.
+    pub(super) fn move_probe(&mut self, direction: Direction) {
+        let [width, height] = self.scene().film.size.map(|n| n as usize);
+        let raster = self.model.layout().map(|layout| layout.raster);
+        self.shift_probe(direction, raster.map_or([1; 2], |[x, y]| [width / x, 2 * height / y]));
+    }
+
+    pub(super) fn move_probe_by_pixel(&mut self, direction: Direction) {
+        self.shift_probe(direction, [1; 2]);
+    }
+
+    /// Moves the pixel probe by `step` pixels, 0 counting as 1, or begins to probe.
+    fn shift_probe(&mut self, [right, up, _]: Direction, step: [usize; 2]) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
             return;
         };
-        let film = self.scene().film.size.map(|n| n as usize);
-        let step = match (step_size, self.model.layout()) {
-            (StepSize::Coarse, Some(layout)) => {
-                [(film[0] / layout.raster[0]).max(1), (2 * film[1] / layout.raster[1]).max(1)]
-            }
-            _ => [1, 1],
-        };
-        let to = match direction {
-            Direction::Left => [x.saturating_sub(step[0]), y],
-            Direction::Right => [x + step[0], y],
-            Direction::Up => [x, y.saturating_sub(step[1])],
-            _ => [x, y + step[1]],
-        };
-        self.set_probe(Some(to));
+        let [across, along] = step.map(|pixels| pixels.max(1) as isize);
+        let x = x.saturating_add_signed(right as isize * across);
+        self.set_probe(Some([x, y.saturating_add_signed(-(up as isize) * along)]));
     }
 
     pub(super) fn pinned(&mut self, picture: Arc<LinearImage>, spp: f64) {

@@ -94,7 +94,7 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn step_field(&mut self, steps: f64) {
-        if matches!(self.model.overlay, Some(Overlay::Pick(_) | Overlay::Question(_))) {
+        if let Some(Overlay::Question(_)) = self.model.overlay {
             self.move_cursor(if steps > 0.0 { 1 } else { -1 });
             return;
         }

@@ -1,9 +1,9 @@
 //! Creation of objects and lights: the user picks a kind, then fills in a form.
 
 use crate::dashboard::update::Coalesce;
-use crate::dashboard::{FieldList, Form, Overlay, Pick, UpdateContext};
+use crate::dashboard::{FieldList, Form, Overlay, UpdateContext};
 use std::sync::Arc;
-use zerkalo_scene::edit::{self, Edit, EditError, Word};
+use zerkalo_scene::edit::{self, Edit, EditError};
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
@@ -16,18 +16,6 @@ impl UpdateContext<'_> {
         self.open_pick("add a light".to_string(), edit::light_kinds(), 0, |c, kind| {
             c.open_form(&format!("{kind} light"), edit::add_light(c.scene(), kind));
         });
-    }
-
-    /// Opens a list of `words`, of which the picked one is passed to `take`.
-    pub(super) fn open_pick(
-        &mut self,
-        title: String,
-        words: Vec<Word>,
-        cursor: usize,
-        take: fn(&mut UpdateContext<'_>, &str),
-    ) {
-        let entries = words.into_iter().map(|word| (word.name, word.doc.to_string())).collect();
-        self.model.overlay = Some(Overlay::Pick(Pick { title, entries, cursor, scroll: 0, take }));
     }
 
     /// Opens the form for a new object or light of the kind `what`, which `edit` adds.

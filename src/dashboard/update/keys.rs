@@ -16,7 +16,7 @@ impl Model {
     /// Returns the text editor that receives the keys.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
-            Some(Overlay::CommandPalette(palette)) => Some(&mut palette.editor),
+            Some(Overlay::Pick(pick)) => Some(&mut pick.editor),
             Some(Overlay::Prompt(prompt)) => Some(&mut prompt.editor),
             Some(Overlay::Form(form)) => form.fields.editor.as_mut(),
             Some(_) => None,
@@ -47,7 +47,7 @@ impl UpdateContext<'_> {
         if let Some(editor) = self.model.editor_mut()
             && editor.key(key)
         {
-            self.text_changed();
+            self.search();
             return;
         }
         if let Some(c) = typed(key)
@@ -90,19 +90,13 @@ impl UpdateContext<'_> {
         match self.model.editor_mut() {
             Some(editor) => {
                 editor.paste(text);
-                self.text_changed();
+                self.search();
             }
             None => self.say("Pasted text goes into fields: open one first (Enter)"),
         }
     }
 
-    fn text_changed(&mut self) {
-        if let Some(Overlay::CommandPalette(_)) = self.model.overlay {
-            self.search();
-        }
-    }
-
-    /// Applies `c` to the open list, form or question. Returns `true` if an overlay is open: the
+    /// Applies `c` to the open form, question or help. Returns `true` if an overlay is open: the
     /// character then runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
@@ -113,10 +107,7 @@ impl UpdateContext<'_> {
                 }
             }
             Some(Overlay::Form(form)) if form.fields.editor.is_none() => self.open_field(Some(c)),
-            Some(Overlay::Pick(_)) => self.jump_to(c),
-            Some(Overlay::Help { .. } | Overlay::Inventory { .. }) if "?q ".contains(c) => {
-                self.model.overlay = None;
-            }
+            Some(Overlay::Help { .. }) if "?q ".contains(c) => self.model.overlay = None,
             Some(_) => {}
             None => return false,
         }

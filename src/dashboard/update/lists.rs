@@ -1,13 +1,15 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
 use crate::dashboard::hints::help;
-use crate::dashboard::panel_lines::{outline, outline_position, scrolled};
-use crate::dashboard::update::commands::{COMMANDS, Command};
+use crate::dashboard::panel_lines::{outline, outline_position};
+use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::{
-    Answer, CommandPalette, Editor, Effect, Focus, OutlineLine, Overlay, Question, UpdateContext,
+    Answer, Editor, Effect, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    UpdateContext,
 };
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
+use std::cmp::Reverse;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
 
@@ -17,18 +19,15 @@ fn moved(cursor: usize, steps: isize, len: usize) -> usize {
 }
 
 impl UpdateContext<'_> {
-    /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines. Scrolls an
-    /// overlay without cursor.
+    /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines. Scrolls the
+    /// help, which has no cursor.
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let list = self.model.overlay_layout().map(|layout| layout.list);
-        let (width, rows) = list.map_or((1, 1), |list| (list.width, usize::from(list.height)));
-        let [help, inventory] = [help(self.model).len(), self.model.inventory(width).len()];
+        let rows = list.map_or(1, |list| usize::from(list.height));
+        let help = help(self.model).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
                 *scroll = moved(*scroll, steps, help.saturating_sub(rows) + 1);
-            }
-            Some(Overlay::Inventory { scroll }) => {
-                *scroll = moved(*scroll, steps, inventory.saturating_sub(rows) + 1);
             }
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
@@ -36,11 +35,8 @@ impl UpdateContext<'_> {
                 }
             }
             Some(overlay) => {
-                if let Some((cursor, scroll, len)) = overlay.list() {
-                    *cursor = moved(*cursor, steps, len);
-                    if let Some(scroll) = scroll {
-                        *scroll = scrolled(*scroll, *cursor, len, rows);
-                    }
+                if let Some((at, len)) = overlay.list() {
+                    at.walk(steps, len, rows);
                 }
             }
             None if self.model.watch.is_some() => self.move_watch_cursor(steps),
@@ -76,22 +72,15 @@ impl UpdateContext<'_> {
     /// Confirms or opens the entry under the cursor.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
-            Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
-            Some(Overlay::NoiseTargets { cursor }) => {
-                let noise_levels = Some(QUALITIES[*cursor]);
+            Some(Overlay::Help { .. }) => self.model.overlay = None,
+            Some(Overlay::NoiseTargets(at)) => {
+                let noise_levels = Some(QUALITIES[at.index]);
                 self.model.overlay = None;
                 self.set_stop(Stop { noise_levels, rmse_linear: None, ..self.model.stop });
             }
-            Some(Overlay::CommandPalette(palette)) => {
-                if let Some(found) = palette.found.get(palette.cursor) {
-                    let command = &COMMANDS[*found];
-                    self.model.overlay = None;
-                    self.run(command);
-                }
-            }
             Some(Overlay::Pick(pick)) => {
-                let Some((name, _)) = pick.entries.get(pick.cursor).cloned() else { return };
-                let take = pick.take;
+                let Some(found) = pick.found.get(pick.at.index) else { return };
+                let (name, take) = (pick.entries[*found].name.clone(), pick.take);
                 self.model.overlay = None;
                 take(self, &name);
             }
@@ -103,7 +92,7 @@ impl UpdateContext<'_> {
                 }
             }
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
-            Some(Overlay::Question(question)) => self.answer(question.cursor),
+            Some(Overlay::Question(question)) => self.answer(question.at.index),
             Some(Overlay::ViewerImage(_)) => {}
             None if self.model.watch.is_some() => {}
             None if self.model.focus == Focus::Inspector => {
@@ -129,59 +118,57 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn open_command_palette(&mut self) {
-        self.model.overlay = Some(Overlay::CommandPalette(CommandPalette {
-            editor: Editor::default(),
-            found: self.offered().into_iter().map(|(i, _)| i).collect(),
-            cursor: 0,
-            scroll: 0,
-        }));
+    pub(super) fn pick_command(&mut self) {
+        let entries = COMMANDS.iter().filter(|command| command.is_listed(self.model));
+        let entries = entries.map(|command| PickEntry {
+            name: command.label.to_string(),
+            note: command.chapter.to_string(),
+            keys: command.all_keys(str::to_string),
+        });
+        self.open_pick("all actions".to_string(), entries.collect::<Vec<_>>(), 0, |c, label| {
+            if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
+                c.run(command);
+            }
+        });
     }
 
-    /// Returns the commands of the command palette, each with its index in the table.
-    fn offered(&self) -> Vec<(usize, &'static Command)> {
-        COMMANDS.iter().enumerate().filter(|(_, command)| command.is_listed(self.model)).collect()
+    /// Opens a list with the cursor on the entry with index `index`. The name of the picked entry is
+    /// passed to `take`.
+    pub(super) fn open_pick(
+        &mut self,
+        title: String,
+        entries: Vec<impl Into<PickEntry>>,
+        index: usize,
+        take: fn(&mut UpdateContext<'_>, &str),
+    ) {
+        let entries: Vec<_> = entries.into_iter().map(Into::into).collect();
+        let (editor, found) = (Editor::default(), (0..entries.len()).collect());
+        let at = ListCursor { index, scroll: 0 };
+        self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
     }
 
-    /// Updates the command palette to the commands that match the search text, best match first.
+    /// Updates the open list to the entries that match the search text, best match first.
     pub(super) fn search(&mut self) {
-        let offered = self.offered();
-        let Some(Overlay::CommandPalette(palette)) = &mut self.model.overlay else { return };
-        let text = palette.editor.text();
+        let Some(Overlay::Pick(pick)) = &mut self.model.overlay else { return };
+        let text = pick.editor.text();
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
-        let mut found: Vec<(u32, usize)> = offered
-            .into_iter()
-            .filter_map(|(i, row)| {
-                let line = format!("{} {}", row.label, row.chapter);
-                let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;
-                Some((score, i))
-            })
-            .collect();
-        found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
-        palette.found = found.into_iter().map(|(_, i)| i).collect();
-        palette.cursor = 0;
-        palette.scroll = 0;
-    }
-
-    /// Moves the cursor to the next entry that starts with `c`, from the first one again after the
-    /// last.
-    pub(super) fn jump_to(&mut self, c: char) {
-        let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
-        let begins = |i: &usize| {
-            let first = pick.entries[*i].0.chars().next();
-            first.is_some_and(|first| first.eq_ignore_ascii_case(&c))
+        let mut score_of = |entry: &PickEntry| {
+            let line = format!("{} {}", entry.name, entry.note);
+            pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)
         };
-        let after = (pick.cursor + 1..pick.entries.len()).find(begins);
-        if let Some(to) = after.or_else(|| (0..pick.entries.len()).find(begins)) {
-            self.move_cursor(to as isize - pick.cursor as isize);
-        }
+        let scored = pick.entries.iter().enumerate();
+        let scored = scored.filter_map(|(i, entry)| Some((Reverse(score_of(entry)?), i)));
+        let mut scored: Vec<_> = scored.collect();
+        scored.sort_unstable();
+        pick.found = scored.into_iter().map(|(_, i)| i).collect();
+        pick.at = ListCursor::default();
     }
 
     /// Opens a question. `answers` holds the letter, text and effect of each answer.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &'static str, Answer)]) {
-        let question = Question { text, answers: answers.to_vec(), cursor: 0 };
+        let question = Question { text, answers: answers.to_vec(), at: ListCursor::default() };
         self.model.overlay = Some(Overlay::Question(question));
     }
 

@@ -56,37 +56,17 @@ pub(super) struct UpdateContext<'a> {
     typed: Option<char>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Direction {
-    Left,
-    Right,
-    Up,
-    Down,
-    /// Forwards, away from the eye.
-    In,
-    /// Backwards, towards the eye.
-    Out,
-}
+/// Unit vector (right, up, forward).
+type Direction = [f64; 3];
 
-impl Direction {
-    /// Returns the unit vector (right, up, forward).
-    fn unit(self) -> [f64; 3] {
-        match self {
-            Self::Left => [-1.0, 0.0, 0.0],
-            Self::Right => [1.0, 0.0, 0.0],
-            Self::Down => [0.0, -1.0, 0.0],
-            Self::Up => [0.0, 1.0, 0.0],
-            Self::Out => [0.0, 0.0, -1.0],
-            Self::In => [0.0, 0.0, 1.0],
-        }
-    }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum StepSize {
-    Coarse,
-    Fine,
-}
+const LEFT: Direction = [-1.0, 0.0, 0.0];
+const RIGHT: Direction = [1.0, 0.0, 0.0];
+const DOWN: Direction = [0.0, -1.0, 0.0];
+const UP: Direction = [0.0, 1.0, 0.0];
+/// Towards the eye.
+const BACK: Direction = [0.0, 0.0, -1.0];
+/// Away from the eye.
+const FORWARD: Direction = [0.0, 0.0, 1.0];
 
 impl UpdateContext<'_> {
     fn handle(&mut self, message: Message) {

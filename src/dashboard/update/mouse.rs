@@ -111,12 +111,11 @@ impl UpdateContext<'_> {
             _ => {}
         }
         let list = self.model.overlay.as_mut().and_then(Overlay::list);
-        let Some((&mut cursor, scroll, len)) = list else { return };
-        let scroll = scroll.map_or(0, |scroll| *scroll);
-        if let Some(line) = line_at(layout.list, scroll, mouse).filter(|line| *line < len) {
-            match line == cursor {
+        let Some((&mut at, len)) = list else { return };
+        if let Some(line) = line_at(layout.list, at.scroll, mouse).filter(|line| *line < len) {
+            match line == at.index {
                 true => self.open(),
-                false => self.move_cursor(line as isize - cursor as isize),
+                false => self.move_cursor(line as isize - at.index as isize),
             }
         }
     }
@@ -139,7 +138,7 @@ impl UpdateContext<'_> {
         match (self.model.mode, other) {
             (Mode::Probe, _) => self.probe_at(mouse),
             (Mode::Move, upright) => self.move_by_hand(right, down, upright),
-            (Mode::Rotate, false) => self.rotate_by(right * 2.0),
+            (Mode::Rotate, false) => self.rotate_selection(right * 2.0),
             (Mode::Fly, false) => self.look_by_hand(right, down),
             (Mode::Orbit, false) => self.orbit_by_hand(right, down),
             (_, true) => self.pan_by_hand(right, down),
@@ -197,7 +196,7 @@ impl UpdateContext<'_> {
         let ticks = ticks.clamp(-100, 100);
         let lines = -(ticks * WHEEL_LINES) as isize;
         if let Some(overlay) = &self.model.overlay {
-            let is_text = matches!(overlay, Overlay::Help { .. } | Overlay::Inventory { .. });
+            let is_text = matches!(overlay, Overlay::Help { .. });
             self.move_cursor(if is_text { lines } else { -ticks as isize });
             return;
         }
@@ -215,7 +214,7 @@ impl UpdateContext<'_> {
         } else if is_in(mouse, layout.outline) {
             &mut self.model.outline_scroll
         } else if is_in(mouse, layout.picture) {
-            return self.dolly_by_wheel(ticks);
+            return self.dolly(f64::from(ticks));
         } else {
             return;
         };

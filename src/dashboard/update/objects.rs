@@ -1,13 +1,10 @@
 //! Commands on the selected part of the scene.
 
-use crate::dashboard::update::{Coalesce, Direction, StepSize};
+use crate::dashboard::update::{Coalesce, Direction};
 use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
-/// Angle of one step of rotating.
-const ROTATE_DEGREES: f64 = 15.0;
-const ROTATE_DEGREES_FINE: f64 = 1.0;
 /// Largest factor by which a drag multiplies the movement in depth. A drag is divided by the sine
 /// of the angle between view direction and ground, by which depth appears shortened. This is
 /// unbounded at grazing angles, and 4 at 14.5 degrees.
@@ -28,12 +25,10 @@ impl UpdateContext<'_> {
         [right, DVec3::Y.cross(right)]
     }
 
-    pub(super) fn move_selection(&mut self, direction: Direction, step_size: StepSize) {
-        let coarse = step_length(self.scene());
-        let step = if step_size == StepSize::Fine { 0.1 * coarse } else { coarse };
-        let [x, y, z] = direction.unit();
+    pub(super) fn move_selection(&mut self, direction: Direction, steps: f64) {
+        let [x, y, z] = direction.map(|d| d * steps * step_length(self.scene()));
         let [right, away] = self.ground_axes();
-        self.move_by(step * (x * right + y * DVec3::Y + z * away));
+        self.move_by(x * right + y * DVec3::Y + z * away);
     }
 
     fn move_by(&mut self, by: DVec3) {
@@ -73,14 +68,9 @@ impl UpdateContext<'_> {
         self.move_by(by);
     }
 
-    pub(super) fn rotate_selection(&mut self, direction: Direction, step_size: StepSize) {
-        let degrees =
-            if step_size == StepSize::Fine { ROTATE_DEGREES_FINE } else { ROTATE_DEGREES };
-        // Counter-clockwise as seen from above, the side that faces the viewer moves to the right.
-        self.rotate_by(if direction == Direction::Right { degrees } else { -degrees });
-    }
-
-    pub(super) fn rotate_by(&mut self, degrees: f64) {
+    /// Rotates the selection counter-clockwise as seen from above: the side that faces the viewer
+    /// moves to the right.
+    pub(super) fn rotate_selection(&mut self, degrees: f64) {
         let edit = edit::rotate(self.scene(), &self.model.selection, degrees);
         self.commit(edit, self.gesture());
     }

@@ -1,9 +1,9 @@
 //! Recovery of unsaved edits after a crash, and requests for autosaves.
 
 use crate::dashboard::model::Tone;
+use crate::dashboard::text::age;
 use crate::dashboard::{Answer, Effect, OrphanedEdits, UpdateContext};
 use std::sync::Arc;
-use std::time::Duration;
 
 impl UpdateContext<'_> {
     /// Asks if the edits of a crashed run are to be recovered, or shows a notice while the user is
@@ -25,9 +25,9 @@ impl UpdateContext<'_> {
             return;
         };
         let mut text = format!(
-            "A session with {} ended unexpectedly {} with unsaved edits.",
+            "A session with {} ended unexpectedly {} ago with unsaved edits.",
             self.model.file.name,
-            ago(edits.age)
+            age(edits.age)
         );
         if self.model.file.unreadable {
             text += " The file has become unreadable since.";
@@ -80,38 +80,6 @@ impl UpdateContext<'_> {
         if now != before {
             self.model.autosaved.clone_from(&scene);
             self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::Autosave(scene));
-        }
-    }
-}
-
-/// Formats the age of a recovery file, such as `12 minutes ago`.
-fn ago(age: Duration) -> String {
-    let minutes = age.as_secs() / 60;
-    let (count, unit) = match minutes {
-        0 => return "a moment ago".to_string(),
-        1..120 => (minutes, "minute"),
-        120..2880 => (minutes / 60, "hour"),
-        _ => (minutes / 1440, "day"),
-    };
-    format!("{count} {unit}{} ago", if count == 1 { "" } else { "s" })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::ago;
-    use std::time::Duration;
-
-    #[test]
-    fn ages_are_formatted_in_words() {
-        for (seconds, words) in [
-            (59, "a moment ago"),
-            (60, "1 minute ago"),
-            (7199, "119 minutes ago"),
-            (7200, "2 hours ago"),
-            (172_799, "47 hours ago"),
-            (172_800, "2 days ago"),
-        ] {
-            assert_eq!(ago(Duration::from_secs(seconds)), words);
         }
     }
 }

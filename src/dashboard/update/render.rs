@@ -3,7 +3,7 @@
 use crate::dashboard::model::Colors;
 use crate::dashboard::update::cycled;
 use crate::dashboard::update::prompt::stop_text;
-use crate::dashboard::{Effect, Format, Overlay, UpdateContext};
+use crate::dashboard::{Effect, Format, ListCursor, Overlay, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
@@ -29,9 +29,9 @@ impl UpdateContext<'_> {
     /// Opens the list of noise targets with the cursor on the current one.
     pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_levels.unwrap_or(0.5);
-        let cursor = QUALITIES.iter().position(|levels| *levels <= wanted);
-        self.model.overlay =
-            Some(Overlay::NoiseTargets { cursor: cursor.unwrap_or(QUALITIES.len() - 1) });
+        let index = QUALITIES.iter().position(|levels| *levels <= wanted);
+        let index = index.unwrap_or(QUALITIES.len() - 1);
+        self.model.overlay = Some(Overlay::NoiseTargets(ListCursor { index, scroll: 0 }));
     }
 
     pub(super) fn threads(&mut self, more: isize) {

@@ -1,8 +1,7 @@
 //! Table of watched film files: reports, cursor and mouse.
 
-use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
-use crate::dashboard::{Focus, Mode, UpdateContext, WatchTable, short_name};
+use crate::dashboard::{Focus, ListCursor, Mode, UpdateContext, WatchTable, short_name};
 use std::path::Path;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
@@ -33,12 +32,13 @@ impl UpdateContext<'_> {
         };
         self.model.stop = Stop { noise_levels: report.target_levels, ..Stop::default() };
         let key = |row: &WatchedShards| (row.path.clone(), row.shards.clone());
-        let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
-        let same = report.shards.iter().position(|row| Some(key(row)) == at);
-        let (cursor, scroll) = before.map_or((0, 0), |table| (table.cursor, table.scroll));
+        let chosen = before.as_ref().and_then(|table| table.report.shards.get(table.at.index));
+        let chosen = chosen.map(key);
+        let same = report.shards.iter().position(|row| Some(key(row)) == chosen);
+        let mut at = before.map_or_else(ListCursor::default, |table| table.at);
         // The first row is the most urgent.
-        let cursor = if cursor == 0 { 0 } else { same.unwrap_or(cursor) };
-        self.model.watch = Some(WatchTable { report, cursor, scroll });
+        at.index = if at.index == 0 { 0 } else { same.unwrap_or(at.index) };
+        self.model.watch = Some(WatchTable { report, at });
         self.move_watch_cursor(0);
     }
 
@@ -46,9 +46,7 @@ impl UpdateContext<'_> {
     pub(super) fn move_watch_cursor(&mut self, steps: isize) {
         let rows = self.model.watch_rows().map_or(1, |(rows, _)| usize::from(rows.height));
         let Some(table) = &mut self.model.watch else { return };
-        let len = table.report.shards.len();
-        table.cursor = table.cursor.saturating_add_signed(steps).min(len.saturating_sub(1));
-        table.scroll = scrolled(table.scroll, table.cursor, len, rows);
+        table.at.walk(steps, table.report.shards.len(), rows);
     }
 
     /// Handles mouse events while no overlay is open.
@@ -60,9 +58,9 @@ impl UpdateContext<'_> {
                 self.model.focus = Focus::Outline;
                 if let Some((rows, _)) = self.model.watch_rows()
                     && let Some(table) = &self.model.watch
-                    && let Some(line) = line_at(rows, table.scroll, mouse)
+                    && let Some(line) = line_at(rows, table.at.scroll, mouse)
                 {
-                    self.move_watch_cursor(line as isize - table.cursor as isize);
+                    self.move_watch_cursor(line as isize - table.at.index as isize);
                 }
             }
             MouseKind::Scroll(ticks) if in_table => {

@@ -3,8 +3,6 @@
 //! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015), whose
 //! lightness rises evenly. Equal steps therefore look equal, even to viewers without colour vision.
 
-use zerkalo_terminal::cells::level;
-
 /// Logarithmic mapping of positive numbers to the colours of a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
@@ -73,39 +71,10 @@ pub fn difference(part: f64) -> [u8; 3] {
 
 /// Returns the colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // The hue advances by the golden angle, so that none is repeated. Objects of similar hue differ
-    // in lightness and chroma.
-    let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
-    let lightness = [0.74, 0.58, 0.86][id as usize % 3];
-    let chroma = [0.13, 0.15, 0.09][id as usize % 3];
-    displayable(lightness, chroma, hue)
-}
-
-/// Converts OKLab in polar form to sRGB, with a chroma within the gamut.
-fn displayable(lightness: f64, chroma: f64, hue: f64) -> [u8; 3] {
-    let mut chroma = chroma;
-    loop {
-        let linear = linear_from_oklab(lightness, chroma * hue.cos(), chroma * hue.sin());
-        if chroma < 0.005 || linear.iter().all(|c| (0.0..=1.0).contains(c)) {
-            return linear.map(|c| level(c as f32));
-        }
-        chroma *= 0.95;
-    }
-}
-
-/// Converts OKLab to linear sRGB (Ottosson 2020).
-fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
-    let [l, m, s] = [
-        l + 0.396_337_777_4 * a + 0.215_803_757_3 * b,
-        l - 0.105_561_345_8 * a - 0.063_854_172_8 * b,
-        l - 0.089_484_177_5 * a - 1.291_485_548_0 * b,
-    ]
-    .map(|v| v * v * v);
-    [
-        4.076_741_662_1 * l - 3.307_711_591_3 * m + 0.230_969_929_2 * s,
-        -1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s,
-        -0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s,
-    ]
+    // The hue advances by the golden section, so that none is repeated.
+    let hue = (f64::from(id) * 0.618_033_988_749_895).fract();
+    let color = colorous::SINEBOW.eval_continuous(hue);
+    [color.r, color.g, color.b]
 }
 
 /// Colour of a pixel whose camera ray hits no object.

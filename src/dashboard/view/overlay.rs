@@ -1,14 +1,13 @@
 //! Drawing of overlays.
 
 use crate::dashboard::hints::{HelpLine, help};
-use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
+use crate::dashboard::noise_targets::{ABOUT, LOOKS, cost};
 use crate::dashboard::overlay_layout::OverlayLayout;
-use crate::dashboard::text::{columns, cut, duration, durations};
-use crate::dashboard::update::commands::COMMANDS;
+use crate::dashboard::text::{columns, cut};
 use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
-use crate::dashboard::{CommandPalette, Form, Model, Overlay, Pick, Prompt, Question};
+use crate::dashboard::{Form, Model, Overlay, Pick, PickEntry, Prompt, Question};
 use ratatui::layout::Position;
 use ratatui::style::Style;
 use zerkalo_render::session::QUALITIES;
@@ -19,10 +18,8 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
     let mut overlay = OverlayPainter { place: model.overlay_layout()?, theme, painter };
     match model.overlay.as_ref()? {
         Overlay::Help { scroll } => overlay.help(model, *scroll),
-        Overlay::Inventory { scroll } => overlay.inventory(model, *scroll),
-        Overlay::NoiseTargets { cursor } => overlay.noise_targets(model, *cursor),
-        Overlay::CommandPalette(palette) => return overlay.palette(palette),
-        Overlay::Pick(pick) => overlay.pick(pick),
+        Overlay::NoiseTargets(at) => overlay.noise_targets(model, at.index),
+        Overlay::Pick(pick) => return overlay.pick(pick),
         Overlay::Form(form) => return overlay.form(model, form),
         Overlay::Prompt(prompt) => return overlay.prompt(prompt),
         // `View::draw` draws it on the whole screen.
@@ -84,7 +81,7 @@ impl OverlayPainter<'_, '_> {
             let mut to = self.row(row);
             match &lines[index] {
                 HelpLine::Heading(title) => heading(to, title),
-                HelpLine::Keys(keys, label) => {
+                HelpLine::Entry((keys, label)) => {
                     // A long list of keys must not shorten the label.
                     let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
                     to.put_right(" ", 0, theme.text());
@@ -95,28 +92,13 @@ impl OverlayPainter<'_, '_> {
         }
     }
 
-    fn inventory(&mut self, model: &Model, scroll: usize) {
-        self.frame("inventory");
-        let lines = model.inventory(self.place.list.width);
-        for VisibleLine { row, index } in self.window(scroll, lines.len()) {
-            let style = self.theme.text();
-            self.row(row).put(&lines[index], style);
-        }
-    }
-
     fn noise_targets(&mut self, model: &Model, cursor: usize) {
         self.frame("noise targets in 8-bit levels");
         let good = self.theme.good();
         let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
-        let cost_of = |i| report.map_or(Cost::Unknown, |r| cost(r, &model.convergence, i));
         for (row, (i, noise_levels)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
             let Choice { mut to, name, text, .. } = self.choice(row, i == cursor);
-            let cost = match cost_of(i) {
-                Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
-                Cost::Reached(None) => "reached".to_string(),
-                Cost::Left(from, to) => format!("{} more", durations(from, to)),
-                Cost::Unknown => "not known yet".to_string(),
-            };
+            let cost = cost(report, &model.convergence, i);
             let mark = if model.stop.noise_levels == Some(noise_levels) { "→ " } else { "  " };
             to.put_right("  ", 0, text).put_right(&cost, 8, name);
             to.put_right("  ", 0, text).put(mark, good);
@@ -126,35 +108,27 @@ impl OverlayPainter<'_, '_> {
         self.say(ABOUT, self.theme.dim());
     }
 
-    fn palette(&mut self, palette: &CommandPalette) -> Option<Position> {
-        self.frame("all actions");
+    fn pick(&mut self, pick: &Pick) -> Option<Position> {
+        self.frame(&pick.title);
         let mut input = self.painter.row(self.place.input, 0);
         input.put(" : ", self.theme.accent());
-        let cursor = typed(&palette.editor, &mut input);
-        if palette.found.is_empty() {
-            let none = "no matching action";
+        let cursor = typed(&pick.editor, &mut input);
+        if pick.found.is_empty() {
             let style = self.theme.dim();
-            self.row(0).skip(3).put(none, style);
+            self.row(0).skip(3).put("no match", style);
         }
-        for VisibleLine { row, index } in self.window(palette.scroll, palette.found.len()) {
-            let command = &COMMANDS[palette.found[index]];
-            let Choice { mut to, name, text, key } = self.choice(row, index == palette.cursor);
-            let keys = command.all_keys(str::to_string);
-            to.put_right(" ", 0, key).put_right(&keys, columns(command.label) + 2, key);
-            to.put(command.label, name);
-            to.put_right("  ", 1, text).put_right(command.chapter, 1, text);
+        let names = pick.entries.iter().map(|entry| columns(&entry.name)).max().unwrap_or(0);
+        for VisibleLine { row, index } in self.window(pick.at.scroll, pick.found.len()) {
+            let PickEntry { name: entry, note, keys } = &pick.entries[pick.found[index]];
+            let Choice { mut to, name, text, key } = self.choice(row, index == pick.at.index);
+            to.put_right(" ", 0, key).put_right(keys, columns(entry) + 2, key);
+            to.put_wide(entry, names, name).skip(2);
+            // A description may be truncated, a chapter beside long keys not.
+            if keys.is_empty() || columns(note) < to.left() {
+                to.put(note, text);
+            }
         }
         cursor
-    }
-
-    fn pick(&mut self, pick: &Pick) {
-        self.frame(&pick.title);
-        let names = pick.entries.iter().map(|(name, _)| columns(name)).max().unwrap_or(0);
-        for VisibleLine { row, index } in self.window(pick.scroll, pick.entries.len()) {
-            let (word, doc) = &pick.entries[index];
-            let Choice { mut to, name, text, .. } = self.choice(row, index == pick.cursor);
-            to.put_wide(word, names, name).skip(2).put(doc, text);
-        }
     }
 
     fn form(&mut self, model: &Model, form: &Form) -> Option<Position> {
@@ -183,7 +157,7 @@ impl OverlayPainter<'_, '_> {
         self.frame("");
         self.say(&question.text, self.theme.text());
         for (row, (i, (letter, words, _))) in (0..).zip(question.answers.iter().enumerate()) {
-            let Choice { mut to, name, key, .. } = self.choice(row, i == question.cursor);
+            let Choice { mut to, name, key, .. } = self.choice(row, i == question.at.index);
             to.put(&letter.to_string(), key).skip(2).put(words, name);
         }
     }

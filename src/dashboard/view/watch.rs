@@ -1,13 +1,12 @@
 //! Drawing of the table of watched film files, and of their summary in the status line.
 
-use crate::dashboard::text::wrapped;
+use crate::dashboard::text::{age, wrapped};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::{Focus, Layout, Model, short_name};
 use ratatui::layout::Rect;
 use ratatui::style::Style;
-use std::time::Duration;
 use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
 use zerkalo_scene::value::sanitized;
 
@@ -31,10 +30,10 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     to.put(name, theme.heading());
     let shards = &table.report.shards;
     let border = theme.border(active);
-    for VisibleLine { row, index } in painter.window(rows, table.scroll, shards.len(), border) {
+    for VisibleLine { row, index } in painter.window(rows, table.at.scroll, shards.len(), border) {
         let (shard, mut to) = (&shards[index], painter.row(rows, row));
         let (mark, style) = mark(&shard.state, &theme);
-        let (plain, dim, style) = match index == table.cursor {
+        let (plain, dim, style) = match index == table.at.index {
             true => {
                 to.fill(theme.selected(active));
                 (theme.selected(active), theme.selected(active), theme.selected(active))
@@ -59,7 +58,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         }
         to.put(&label(shard), plain);
     }
-    if let Some(selected) = shards.get(table.cursor) {
+    if let Some(selected) = shards.get(table.at.index) {
         explain(selected, details, painter);
     }
 }
@@ -143,17 +142,6 @@ fn samples(shard: &WatchedShards) -> String {
     match shard.total {
         Some(total) => format!("{}/{}{name}", digits(shard.samples), digits(total)),
         None => format!("{}{name}", digits(shard.samples)),
-    }
-}
-
-/// Formats the time since a file was written, such as `40 s`, `12 min`, `3 h` or `2 d`.
-fn age(age: Duration) -> String {
-    let seconds = age.as_secs();
-    match seconds {
-        0..60 => format!("{seconds} s"),
-        60..3600 => format!("{} min", seconds / 60),
-        3600..86400 => format!("{} h", seconds / 3600),
-        _ => format!("{} d", seconds / 86400),
     }
 }
 

@@ -56,7 +56,6 @@ fn paint() {
                 let mut snapshot = picture.clone();
                 snapshot.probe = before.probe;
                 snapshot.report = before.report.clone();
-                snapshot.report.inventory = "6 objects: 2 spheres (list), 3 convex solids, 1 rectangle, Phong, cone lobe, 1 point light, single precision".into();
                 model.snapshot = Some(Box::new(snapshot));
             }
             for (level, colors) in levels {

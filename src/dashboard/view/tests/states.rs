@@ -4,11 +4,10 @@ use crate::dashboard::model::{Notice, RunningExport, Tone};
 use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
-use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
 use crate::dashboard::{
-    Answer, CommandPalette, CompareView, DisplayChannel, Editor, FieldList, Focus, Form, Message,
-    Mode, Model, OrphanedEdits, Overlay, PanelLine, Pick, Prompt, Question,
+    Answer, CompareView, DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode,
+    Model, OrphanedEdits, Overlay, PanelLine, Prompt, Question,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +21,13 @@ use zerkalo_scene::edit::{self, Target};
 
 /// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
+
+/// Sends the keys with the given names.
+fn press(model: &mut Model, keys: &str) {
+    for key in keys.split(' ') {
+        update(model, Message::Key(key.parse().unwrap()), Duration::ZERO);
+    }
+}
 
 /// Creates the model of a dashboard of `screen` columns and rows that has rendered 212 samples per
 /// pixel of the built-in scene.
@@ -313,34 +319,16 @@ pub const STATES: &[Named] = &[
     }),
     ("watching-refusal", |m| {
         watching(m, &watched_plan());
-        update(m, Message::Key("x".parse().unwrap()), Duration::ZERO);
+        press(m, "x");
     }),
     ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
     ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
-    ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),
-    ("noise-targets", |m| m.overlay = Some(Overlay::NoiseTargets { cursor: 3 })),
-    ("palette", |m| {
-        let found = (0..COMMANDS.len()).filter(|i| COMMANDS[*i].label.contains("light")).collect();
-        let editor = Editor::new("light");
-        m.overlay =
-            Some(Overlay::CommandPalette(CommandPalette { editor, found, cursor: 1, scroll: 0 }));
+    ("noise-targets", |m| {
+        m.overlay = Some(Overlay::NoiseTargets(ListCursor { index: 3, scroll: 0 }));
     }),
-    ("palette-empty", |m| {
-        let editor = Editor::new("teapot");
-        m.overlay = Some(Overlay::CommandPalette(CommandPalette {
-            editor,
-            found: vec![],
-            cursor: 0,
-            scroll: 0,
-        }));
-    }),
-    ("kinds", |m| {
-        let kinds = edit::object_kinds();
-        let entries = kinds.iter().map(|w| (w.name.to_string(), w.doc.to_string())).collect();
-        let title = "add an object".to_string();
-        let pick = Pick { title, entries, cursor: 1, scroll: 0, take: |_, _| () };
-        m.overlay = Some(Overlay::Pick(pick));
-    }),
+    ("palette", |m| press(m, ": l i g h t Down")),
+    ("palette-empty", |m| press(m, ": t e a p o t")),
+    ("kinds", |m| press(m, "a Down")),
     ("form", |m| adding(m, None)),
     ("form-refused", |m| {
         adding(m, Some("radius is -1. Expected a number greater than 0, at most 1e9."));
@@ -362,7 +350,7 @@ pub const STATES: &[Named] = &[
             ('d', "discard them and quit", Answer::Quit),
             ('c', "cancel", Answer::Nothing),
         ];
-        m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
+        m.overlay = Some(Overlay::Question(Question { text, answers, at: ListCursor::default() }));
     }),
     ("orphaned-edits", |m| {
         let age = Duration::from_secs(720);
