@@ -67,9 +67,9 @@ impl DoctorReport {
         lines.push(row("terminal", &self.terminal()));
         lines.push(row("multiplexer", &self.multiplexer()));
         lines.push(row("colours", &self.colors()));
-        if let Ok(TerminalReport { terminal, mode, cells, pixels, rate }) = &self.diagnosis {
+        if let Ok(TerminalReport { terminal, mode, cells, rate }) = &self.diagnosis {
             lines.push(row("background", &background(terminal)));
-            lines.push(row("size", &size(*cells, *pixels)));
+            lines.push(row("size", &size(*cells, terminal.cell_px)));
             lines.push(row("whole frames", whole_frames(terminal)));
             lines.push(row("still pictures", &stills(terminal)));
             lines.push(row("keyboard", "plain key sequences; nothing special is needed"));
@@ -249,8 +249,11 @@ fn background(terminal: &Capabilities) -> String {
     }
 }
 
-fn size([columns, rows]: [u16; 2], pixels: Option<[u16; 2]>) -> String {
-    let pixels = pixels.map_or(String::new(), |[w, h]| format!(", {w} x {h} pixels"));
+fn size([columns, rows]: [u16; 2], cell_px: Option<[u16; 2]>) -> String {
+    let pixels = cell_px.map_or(String::new(), |[width, height]| {
+        let [width, height] = [width.saturating_mul(columns), height.saturating_mul(rows)];
+        format!(", {width} x {height} pixels")
+    });
     format!("{columns} x {rows} cells{pixels}")
 }
 
@@ -305,13 +308,8 @@ mod tests {
             variable.map(|(_, value)| value.to_string())
         });
         let terminal = Capabilities::from_environment(environment.clone());
-        let diagnosis = TerminalReport {
-            terminal,
-            mode: PacingMode::Unlimited,
-            cells: [120, 36],
-            pixels: None,
-            rate: None,
-        };
+        let diagnosis =
+            TerminalReport { terminal, mode: PacingMode::Unlimited, cells: [120, 36], rate: None };
         DoctorReport {
             environment,
             diagnosis: if queried { Ok(diagnosis) } else { Err("stdin or stdout is no terminal") },
@@ -340,11 +338,11 @@ mod tests {
     fn full_featured_local_terminal_gets_no_hints() {
         let mut report = report(&[("TERM", "xterm-kitty"), ("COLORTERM", "truecolor")], true);
         let diagnosis = diagnosis(&mut report);
-        diagnosis.pixels = Some([960, 720]);
         diagnosis.rate = Some(2.5e6);
         let terminal = &mut diagnosis.terminal;
         terminal.version = Some("kitty(0.40.1)".into());
         terminal.kitty_graphics = true;
+        terminal.cell_px = Some([8, 20]);
         terminal.synchronised = true;
         terminal.background = Some([0x1e, 0x1e, 0x2e]);
         terminal.round_trip = Some(Duration::from_micros(1234));

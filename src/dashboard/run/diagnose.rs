@@ -1,7 +1,6 @@
 //! Diagnostics of the terminal and its connection, without visible output.
 
 use crate::dashboard::run::job_control::handle_signals;
-use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
 use zerkalo_terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
@@ -27,8 +26,6 @@ pub struct TerminalReport {
     pub mode: PacingMode,
     /// Columns and rows.
     pub cells: [u16; 2],
-    /// Width and height in pixels; `None` if unknown.
-    pub pixels: Option<[u16; 2]>,
     /// Measured transfer rate in bytes per second. `None` if it was not requested or cannot be
     /// measured.
     pub rate: Option<f64>,
@@ -70,12 +67,8 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
         _ => None,
     };
     terminal.cell_px = cell_px().or(terminal.cell_px);
-    let window = tcgetwinsize(io::stdout())?;
     let cells = size()?;
-    let known = window.ws_xpixel > 0 && window.ws_ypixel > 0;
-    let by_cells = || terminal.cell_px.map(|px| [0, 1].map(|i| px[i].saturating_mul(cells[i])));
-    let pixels = known.then_some([window.ws_xpixel, window.ws_ypixel]).or_else(by_cells);
-    Ok(TerminalReport { terminal, mode, cells, pixels, rate })
+    Ok(TerminalReport { terminal, mode, cells, rate })
 }
 
 /// Writes `before` and a request of the cursor position, wrapped for the multiplexer `through`.

@@ -13,7 +13,6 @@ use crossbeam_channel::{Receiver, after, never, select};
 use std::io;
 use std::time::{Duration, Instant};
 use zerkalo_render::session::{Snapshot, State};
-use zerkalo_terminal::flow::LinkStatus;
 use zerkalo_terminal::{Event, HUNG_UP, Reply, TimedEvent};
 
 /// Shortest interval between updates of the displayed connection status or upload progress.
@@ -227,12 +226,9 @@ impl Dashboard {
             self.resize();
         }
         self.frames.look(now);
-        let reading = self.frames.flow.reading();
-        let mode = |link: &Option<LinkStatus>| link.as_ref().map(|link| link.mode);
-        let mode_changed = mode(&reading) != mode(&self.model.link);
-        if mode_changed || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
+        if self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
-            self.dispatch(Message::LinkStatus(reading));
+            self.dispatch(Message::LinkStatus(self.frames.flow.reading()));
         }
         self.report_upload(now);
         self.frames.follow(&self.model);

@@ -120,6 +120,7 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
+                self.follow = true;
                 // Indices may differ in the reloaded scene, so the selection is restored by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;

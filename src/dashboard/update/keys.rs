@@ -35,6 +35,7 @@ impl Model {
 
 impl UpdateContext<'_> {
     pub(super) fn key(&mut self, key: Key) {
+        self.follow = true;
         self.model.first_time = false;
         self.model.notice.take_if(|notice| notice.until.is_none());
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
@@ -86,6 +87,7 @@ impl UpdateContext<'_> {
 
     /// Inserts pasted text into the open text editor. As keys it would run commands.
     pub(super) fn paste(&mut self, text: &str) {
+        self.follow = true;
         self.model.first_time = false;
         match self.model.editor_mut() {
             Some(editor) => {

@@ -1,5 +1,6 @@
 //! State transitions of the dashboard, without access to clock, files or terminal.
 
+mod adjust;
 mod camera;
 pub mod commands;
 mod compare;
@@ -9,10 +10,7 @@ mod focus;
 mod form;
 mod image_viewer;
 mod keys;
-mod lens;
-mod light;
 mod lists;
-mod mirror_material;
 mod mouse;
 mod objects;
 mod prompt;
@@ -37,7 +35,7 @@ use zerkalo_scene::value::sanitized;
 /// Updates the model with a message and returns the effects. `now` is the time since any fixed
 /// origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
-    let mut context = UpdateContext { model, now, effects: Vec::new(), follow: true, typed: None };
+    let mut context = UpdateContext { model, now, effects: Vec::new(), follow: false, typed: None };
     context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
     context.handle(message);
     context.normalize();
@@ -49,8 +47,7 @@ pub(super) struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if lists are scrolled until their cursors are visible; `false` for messages that must
-    /// not scroll.
+    /// `true` if lists are scrolled until their cursors are visible.
     follow: bool,
     /// Character of the key that ran the current command.
     typed: Option<char>,
@@ -75,12 +72,12 @@ impl UpdateContext<'_> {
             Message::Mouse(mouse) => self.mouse(mouse),
             Message::Paste(text) => self.paste(&text),
             Message::Resize(screen) => {
+                self.follow = true;
                 self.model.screen = screen;
                 self.refit_image();
                 self.repaint();
             }
             Message::Snapshot(snapshot) => {
-                self.follow = false;
                 if let State::Failed(reason) = &snapshot.report.state {
                     let text = format!("This scene cannot be rendered: {reason}");
                     self.notify(Tone::Bad, text, None);
@@ -89,39 +86,28 @@ impl UpdateContext<'_> {
                 self.model.snapshot = Some(snapshot);
                 self.repaint();
             }
-            Message::Watched(report) => {
-                self.follow = false;
-                self.watched(*report);
-            }
+            Message::Watched(report) => self.watched(*report),
             Message::Pinned(picture, spp) => self.pinned(picture, spp),
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
-            Message::Warning(text) => {
-                self.follow = false;
-                self.notify(Tone::Bad, capital(&text), None);
-            }
+            Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
             Message::Exported(result) => self.exported(result),
             Message::CheckpointWritten(result) => self.checkpoint_written(result),
             Message::ExportProgress(progress) => {
-                self.follow = false;
                 if let Some(export) = &mut self.model.export {
                     export.progress = progress;
                 }
             }
             Message::ViewerImage(path, result) => self.image_ready(&path, result),
             Message::ImageSent(sent) => {
-                self.follow = false;
                 if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {
                     viewed.sent = sent;
                 }
             }
-            Message::LinkStatus(link) => {
-                self.follow = false;
-                self.model.link = link;
-            }
-            Message::Tick => self.follow = false,
+            Message::LinkStatus(link) => self.model.link = link,
+            Message::Tick => {}
         }
     }
 

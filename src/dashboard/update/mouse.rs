@@ -25,6 +25,7 @@ pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> 
 
 impl UpdateContext<'_> {
     pub(super) fn mouse(&mut self, mouse: Mouse) {
+        self.follow = true;
         self.model.first_time = false;
         if self.model.watch.is_some() && self.model.overlay.is_none() {
             return self.mouse_on_watch(mouse);

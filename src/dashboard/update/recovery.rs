@@ -9,7 +9,6 @@ impl UpdateContext<'_> {
     /// Asks if the edits of a crashed run are to be recovered, or shows a notice while the user is
     /// busy.
     pub(super) fn orphaned_edits(&mut self, edits: OrphanedEdits) {
-        self.follow = false;
         self.model.orphaned_edits = Some(edits);
         if self.model.is_busy() {
             let text = "Unsaved edits of a crashed session were found · : recover restores them";

@@ -17,14 +17,7 @@ impl Scale {
     /// Creates a scale from the smallest to the largest positive finite number of `values`, or from
     /// 1 to 10 without any.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
-        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
-        for value in values.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
-            low = low.min(value);
-            high = high.max(value);
-        }
-        if low > high {
-            (low, high) = (1.0, 10.0);
-        }
+        let (low, high) = positive_range(values).unwrap_or((1.0, 10.0));
         Self { low, high, reversed: false }
     }
 
@@ -46,6 +39,12 @@ impl Scale {
     pub fn color(&self, value: f64) -> [u8; 3] {
         magnitude(self.part(value))
     }
+}
+
+/// Returns the smallest and the largest positive finite number of `values`.
+pub fn positive_range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    let values = values.into_iter().filter(|v| *v > 0.0 && v.is_finite()).map(|v| (v, v));
+    values.reduce(|(low, high), (value, _)| (low.min(value), high.max(value)))
 }
 
 /// Returns the colour at a position of the colour map, clamped to 0 (dark) to 1 (bright).

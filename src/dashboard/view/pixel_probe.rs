@@ -89,20 +89,16 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }
 
-/// Draws a cross in a cell, in a colour that contrasts with the cell.
+/// Draws a cross in a cell, in a colour that contrasts with its background.
 fn mark(column: u16, row: u16, painter: &mut Painter) {
     let Some(cell) = painter.buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
         _ => false,
     };
-    // The cross covers both half cells, so its colour must contrast with both.
-    let style = match (cell.bg, cell.fg) {
-        (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
-            painter.theme.accent()
-        }
-        (bg @ Color::Rgb(..), _) if light(bg) => Style::new().fg(Color::Rgb(0, 0, 0)),
-        (Color::Rgb(..), _) => Style::new().fg(Color::Rgb(255, 255, 255)),
+    let style = match cell.bg {
+        bg @ Color::Rgb(..) if light(bg) => Style::new().fg(Color::Rgb(0, 0, 0)),
+        Color::Rgb(..) => Style::new().fg(Color::Rgb(255, 255, 255)),
         _ => Style::new().add_modifier(Modifier::REVERSED),
     };
     cell.set_char('┼').set_style(style);

@@ -2,6 +2,7 @@
 //! the estimated time at which it is reached.
 
 use crate::dashboard::text::{columns, number};
+use crate::dashboard::view::false_color::positive_range;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{BORDER, Layout, Model};
 use ratatui::layout::Rect;
@@ -20,16 +21,10 @@ struct Axis {
 impl Axis {
     /// Creates an axis that contains all positive finite `values`.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
-        for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
-            low = low.min(value);
-            high = high.max(value);
-        }
+        let (low, high) = positive_range(values)?;
         // The axis spans at least a factor of 2, and both ends get a margin of 10 %.
-        (low <= high).then(|| {
-            let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
-            Self { low: low / stretch, high: high * stretch }
-        })
+        let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
+        Some(Self { low: low / stretch, high: high * stretch })
     }
 
     /// Returns the position of `value`: 0 at the lower end, 1 at the upper end.

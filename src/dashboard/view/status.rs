@@ -12,8 +12,6 @@ use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use zerkalo_render::schedule::StoppedBy;
 use zerkalo_render::session::{Report, State};
-use zerkalo_terminal::Multiplexer;
-use zerkalo_terminal::flow::PacingMode;
 
 /// Part of the status line, shown or omitted as a whole.
 struct Part {
@@ -90,7 +88,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
     if let Some(link) = &model.link {
-        parts.push(part(6, vec![plain(rate(link.rate)), dim(" "), dim(mode(link.mode))]));
+        parts.push(part(6, vec![plain(rate(link.rate))]));
     }
     if !watching {
         parts.extend(machine(model, report, theme));
@@ -120,17 +118,6 @@ fn rate(bytes_per_second: f64) -> String {
         ..10.0 => format!("{kilobytes:.1} KB/s"),
         ..1000.0 => format!("{kilobytes:.0} KB/s"),
         _ => format!("{:.1} MB/s", kilobytes / 1e3),
-    }
-}
-
-fn mode(mode: PacingMode) -> &'static str {
-    match mode {
-        PacingMode::Unlimited => "local",
-        PacingMode::AckClocked(None) => "acknowledged",
-        PacingMode::AckClocked(Some(Multiplexer::Tmux)) => "acknowledged through tmux",
-        PacingMode::AckClocked(Some(Multiplexer::Screen)) => "acknowledged through screen",
-        PacingMode::SendQueue => "send queue",
-        PacingMode::FixedRate => "fixed rate",
     }
 }
 

@@ -1,0 +1,143 @@
+//! Commands that adjust a light, the mirror or the lens by a key, and report the new values.
+
+use crate::dashboard::UpdateContext;
+use crate::dashboard::update::Coalesce;
+use crate::dashboard::update::mouse::first_hit;
+use zerkalo_scene::Scene;
+use zerkalo_scene::camera::{Aperture, Camera};
+use zerkalo_scene::edit::{self, Edit, EditError, Target, bounds};
+use zerkalo_scene::value::{number, round_significant};
+
+impl UpdateContext<'_> {
+    /// Records an edit and reports the new values of the edited part.
+    fn adjust(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
+        let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
+        self.commit(edit, coalesce);
+        if let Some(values) = subject.and_then(|subject| values(self.scene(), &subject)) {
+            self.say(values);
+        }
+    }
+
+    pub(super) fn next_light(&mut self) {
+        let lights = self.scene().lights.len();
+        if lights == 0 {
+            self.say("There is no light · A adds one");
+            return;
+        }
+        let next = match self.model.selection {
+            Target::Light(i) => (i + 1) % lights,
+            _ => 0,
+        };
+        self.select(Target::Light(next));
+        let label = self.model.selection.label(self.scene());
+        self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
+    }
+
+    /// Returns the light that commands change: the selection if it is a light, the ambient light or
+    /// the background, otherwise the first light.
+    fn target_light(&self) -> Result<Target, EditError> {
+        match &self.model.selection {
+            s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
+            _ if !self.scene().lights.is_empty() => Ok(Target::Light(0)),
+            _ => {
+                let [found, help] = ["there is no light", "A adds one."].map(str::to_string);
+                Err(EditError { found, help })
+            }
+        }
+    }
+
+    pub(super) fn intensity(&mut self, steps: f64) {
+        let edit = self.target_light().and_then(|light| {
+            let key = if matches!(light, Target::Light(_)) { "intensity" } else { "color" };
+            edit::step(self.scene(), &light, key, None, steps)
+        });
+        self.adjust(edit, Coalesce::Repeat);
+    }
+
+    pub(super) fn switch_light(&mut self) {
+        let edit = self.target_light().and_then(|light| match light {
+            Target::Light(_) => edit::toggle(self.scene(), &light, "on", true),
+            other => {
+                let found = format!("{} has no switch", other.label(self.scene()));
+                Err(EditError { found, help: "Black is off.".to_string() })
+            }
+        });
+        self.adjust(edit, Coalesce::Single);
+    }
+
+    /// Steps the property `key` of the mirror: a reflecting material of the selection, or else of
+    /// the scene.
+    pub(super) fn step_mirror(&mut self, key: &str, steps: f64) {
+        let edit = edit::step_mirror(self.scene(), Some(&self.model.selection), key, steps);
+        self.adjust(edit, Coalesce::Repeat);
+    }
+
+    /// Opens the aperture by `stops` stops; a negative number closes it.
+    pub(super) fn aperture(&mut self, stops: f64) {
+        let edit = edit::change_aperture(self.scene(), stops);
+        self.adjust(edit, Coalesce::Repeat);
+    }
+
+    /// Focuses on the pixel probe, else on the middle of the selection, else on the centre of the
+    /// picture.
+    pub(super) fn focus(&mut self) {
+        let [width, height] = self.scene().film.size.map(|n| n as usize);
+        let selection = bounds(self.scene(), &self.model.selection);
+        match (self.model.probe, selection) {
+            (Some(pixel), _) => self.focus_on_pixel(pixel),
+            (None, Some(ball)) => self.focus_on(ball.center),
+            (None, None) => self.focus_on_pixel([width / 2, height / 2]),
+        }
+    }
+
+    /// Focuses on the object that is visible at the centre of film pixel `pixel`.
+    pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
+        match first_hit(self.scene(), pixel) {
+            Some((_, point)) => self.focus_on(point.to_array()),
+            None => self.refuse("There is no object to focus on here."),
+        }
+    }
+
+    fn focus_on(&mut self, point: [f64; 3]) {
+        let edit = edit::focus_on(self.scene(), point);
+        self.adjust(edit, Coalesce::Single);
+    }
+}
+
+/// Describes the adjustable values of a light, a material or the lens for a notice.
+fn values(scene: &Scene, subject: &Target) -> Option<String> {
+    let color = |color: [f64; 3]| format!("color {}", color.map(number).join(" "));
+    let state = match subject {
+        Target::Camera => lens(&scene.camera),
+        Target::Light(i) => {
+            let light = scene.lights.get(*i)?;
+            let off = if light.on { "" } else { ", off" };
+            format!("intensity {}{off}", number(light.intensity))
+        }
+        Target::Ambient => color(scene.ambient.color.0),
+        Target::Background => color(scene.background.color.0),
+        Target::Material(name) => {
+            let material = scene.materials.get(name)?;
+            let [roughness, reflection] = [material.roughness, material.reflection].map(number);
+            let rows = edit::rows(scene, subject).ok()?;
+            let lobe = rows.into_iter().find(|row| row.key == "lobe");
+            let lobe = lobe.map_or_else(String::new, |row| format!(" · {}", row.value));
+            format!("roughness {roughness} · reflection {reflection}{lobe}")
+        }
+        Target::View(_) | Target::Object(_) | Target::Film | Target::IntegratorSettings => {
+            return None;
+        }
+    };
+    Some(format!("{}: {state}", subject.label(scene)))
+}
+
+/// Describes aperture and focus.
+fn lens(camera: &Camera) -> String {
+    let distance = number(round_significant(camera.focus_depth(), 4));
+    let aperture = match camera.aperture {
+        Some(Aperture::FNumber(f)) => format!("f/{}", number(f)),
+        Some(Aperture::Radius(radius)) if radius > 0.0 => format!("aperture {}", number(radius)),
+        _ => return format!("focus at {distance} · pinhole, all in focus · * opens the aperture"),
+    };
+    format!("focus at {distance} · {aperture} · / * close, open · right click focuses")
+}
