@@ -6,18 +6,17 @@
 //! the process ends at once.
 
 use crate::LEAVE;
-use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
 use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-/// Script of the helper process. `$0` is [`LEAVE`]; the other arguments are those of `stty`. A line
-/// from the program ends the script. The modes are set only if output processing is still off
+/// Script of the helper process. `$0` is [`LEAVE`], and `$1` the modes in the format of `stty -g`. A
+/// line from the program ends the script. The modes are set only if output processing is still off
 /// (`-opost`); otherwise the user's shell has already set its own.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit
-case $(stty -a </dev/tty) in *-opost*) stty \"$@\" </dev/tty ;; esac
+case $(stty -a </dev/tty) in *-opost*) stty \"$1\" </dev/tty ;; esac
 printf %s \"$0\" >/dev/tty";
 
 /// Helper process, which waits until this value is dropped or the program ends.
@@ -27,13 +26,13 @@ pub struct Restorer {
 }
 
 impl Restorer {
-    /// Starts the helper process, which would restore `modes_before`.
+    /// Starts the helper process, which would restore the present modes of the terminal at stdin.
     ///
-    /// # Errors Fails if there is no shell.
-    pub fn start(modes_before: &Termios) -> io::Result<Self> {
+    /// # Errors Fails if there is no shell or no `stty`.
+    pub fn start() -> io::Result<Self> {
+        let modes = Command::new("stty").arg("-g").stdin(Stdio::inherit()).output()?.stdout;
         let mut shell = Command::new("/bin/sh")
-            .args(["-c", PROGRAM, LEAVE])
-            .args(stty_arguments(modes_before))
+            .args(["-c", PROGRAM, LEAVE, String::from_utf8_lossy(&modes).trim_end()])
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -43,29 +42,6 @@ impl Restorer {
         let messages = shell.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
         Ok(Self { shell, messages })
     }
-}
-
-/// Returns the arguments of POSIX `stty` for all modes that raw mode changes, such as `echo` or
-/// `-echo`.
-fn stty_arguments(modes: &Termios) -> Vec<String> {
-    let (input, local) = (modes.input_modes, modes.local_modes);
-    let is_set = [
-        ("ignbrk", input.contains(InputModes::IGNBRK)),
-        ("brkint", input.contains(InputModes::BRKINT)),
-        ("parmrk", input.contains(InputModes::PARMRK)),
-        ("istrip", input.contains(InputModes::ISTRIP)),
-        ("inlcr", input.contains(InputModes::INLCR)),
-        ("igncr", input.contains(InputModes::IGNCR)),
-        ("icrnl", input.contains(InputModes::ICRNL)),
-        ("ixon", input.contains(InputModes::IXON)),
-        ("echo", local.contains(LocalModes::ECHO)),
-        ("echonl", local.contains(LocalModes::ECHONL)),
-        ("icanon", local.contains(LocalModes::ICANON)),
-        ("isig", local.contains(LocalModes::ISIG)),
-        ("iexten", local.contains(LocalModes::IEXTEN)),
-        ("opost", modes.output_modes.contains(OutputModes::OPOST)),
-    ];
-    is_set.map(|(name, is_set)| format!("{}{name}", if is_set { "" } else { "-" })).to_vec()
 }
 
 impl Drop for Restorer {

@@ -83,7 +83,7 @@ impl Screen {
     /// Fails if stdin is no terminal or stdout cannot be written.
     pub fn enter() -> io::Result<Self> {
         let modes_before = tcgetattr(io::stdin())?;
-        let restorer = Restorer::start(&modes_before).ok();
+        let restorer = Restorer::start().ok();
         set_raw_mode(&modes_before)?;
         // From here on `Drop` restores the terminal, even if `over` fails.
         let mut screen = Self::over(Box::new(io::stdout()), Some(modes_before))?;

@@ -7,17 +7,17 @@ use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Attributes with the SGR parameters that set and reset them.
-const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
-    (Modifier::BOLD, 1, 22),
-    (Modifier::DIM, 2, 22),
-    (Modifier::ITALIC, 3, 23),
-    (Modifier::UNDERLINED, 4, 24),
-    (Modifier::SLOW_BLINK, 5, 25),
-    (Modifier::RAPID_BLINK, 6, 25),
-    (Modifier::REVERSED, 7, 27),
-    (Modifier::HIDDEN, 8, 28),
-    (Modifier::CROSSED_OUT, 9, 29),
+/// Attributes in the order of the SGR parameters that set them: 1 for bold, 2 for dim and so on.
+const ATTRIBUTES: [Modifier; 9] = [
+    Modifier::BOLD,
+    Modifier::DIM,
+    Modifier::ITALIC,
+    Modifier::UNDERLINED,
+    Modifier::SLOW_BLINK,
+    Modifier::RAPID_BLINK,
+    Modifier::REVERSED,
+    Modifier::HIDDEN,
+    Modifier::CROSSED_OUT,
 ];
 
 /// Attributes that are visible on a space.
@@ -132,27 +132,18 @@ impl Encoder {
             return;
         }
         let mut codes = Vec::new();
-        if pen != Pen::default() {
-            let removed = self.pen.modifier - pen.modifier;
-            let mut reset_too = Modifier::empty();
-            for (attribute, _, reset) in ATTRIBUTES {
-                if removed.contains(attribute) {
-                    codes.push(reset.to_string());
-                    // 22 resets both bold and dim.
-                    let affected = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
-                    affected.for_each(|(attribute, _, _)| reset_too |= *attribute);
-                }
-            }
-            let missing = pen.modifier - (self.pen.modifier - reset_too);
-            for (attribute, set, _) in ATTRIBUTES {
-                if missing.contains(attribute) {
-                    codes.push(set.to_string());
-                }
-            }
-            for (new, old, base) in [(pen.fg, self.pen.fg, 30), (pen.bg, self.pen.bg, 40)] {
-                if new != old {
-                    codes.push(color_code(new, base));
-                }
+        // The parameter 0 resets all attributes and colours; those that reset one attribute may
+        // affect another one.
+        if !pen.modifier.contains(self.pen.modifier) || pen == Pen::default() {
+            self.pen = Pen::default();
+            codes.push("0".to_string());
+        }
+        let missing = pen.modifier - self.pen.modifier;
+        let set = (1..).zip(ATTRIBUTES).filter(|(_, attribute)| missing.contains(*attribute));
+        codes.extend(set.map(|(parameter, _): (u8, _)| parameter.to_string()));
+        for (new, old, base) in [(pen.fg, self.pen.fg, 30), (pen.bg, self.pen.bg, 40)] {
+            if new != old {
+                codes.push(color_code(new, base));
             }
         }
         // Writing to memory does not fail.
