@@ -58,6 +58,16 @@ pub struct FieldList {
     pub scroll: usize,
     /// Editor of the field under the cursor; `None` unless a value is being typed.
     pub editor: Option<Editor>,
+    /// Reason why the last change in a form was refused.
+    pub refusal: Option<String>,
+}
+
+impl FieldList {
+    /// Returns the reason why the typed value or the last change was refused.
+    pub fn problem(&self) -> Option<&str> {
+        let typed = self.editor.as_ref().and_then(|editor| editor.problem.as_deref());
+        typed.or(self.refusal.as_deref())
+    }
 }
 
 /// Comparison of the live picture with a pinned one, which the user has stored earlier.

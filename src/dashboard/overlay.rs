@@ -90,8 +90,6 @@ pub struct Form {
     pub before: Target,
     /// State of the list, whose lines are those of `panel_lines::form`.
     pub fields: FieldList,
-    /// Reason why the last change of a field was refused.
-    pub problem: Option<String>,
 }
 
 /// Prompt in which the user types a line of text.

@@ -81,9 +81,7 @@ impl Model {
         let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
         let columns = side.min(width);
         let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
-        let problem = form.problem.is_some()
-            || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
-        let (list, help) = split(frame.inner(BORDER), problem);
+        let (list, help) = split(frame.inner(BORDER), form.fields.problem().is_some());
         OverlayLayout { frame, input: Rect::default(), list, help }
     }
 
@@ -105,7 +103,7 @@ impl Model {
     /// Returns the areas of the inspector's lines and of help on the field under the cursor.
     /// Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
-        let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
+        let problem = self.inspector.problem().is_some();
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
     }
 }

@@ -7,10 +7,8 @@ use zerkalo_scene::edit::{self, Edit, EditError, Widget};
 
 impl UpdateContext<'_> {
     fn set_editor(&mut self, editor: Option<Editor>) {
-        self.model.field_list_mut().editor = editor;
-        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
-            form.problem = None;
-        }
+        let fields = self.model.field_list_mut();
+        (fields.editor, fields.refusal) = (editor, None);
     }
 
     pub(super) fn move_field_cursor(&mut self, steps: isize) {

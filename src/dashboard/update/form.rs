@@ -30,7 +30,6 @@ impl UpdateContext<'_> {
                     label,
                     before: self.model.selection.clone(),
                     fields: FieldList::default(),
-                    problem: None,
                 }));
                 self.show();
             }

@@ -163,7 +163,7 @@ impl UpdateContext<'_> {
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
             let changed = *form.scene != *scene;
             form.scene = scene;
-            form.problem = None;
+            form.fields.refusal = None;
             if changed {
                 self.show();
             }
@@ -222,7 +222,7 @@ impl UpdateContext<'_> {
 
     fn refuse(&mut self, text: &str) {
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
-            form.problem = Some(sanitized(text));
+            form.fields.refusal = Some(sanitized(text));
         } else {
             self.notify(Tone::Bad, text, Some(5.0));
         }

@@ -92,7 +92,7 @@ impl UpdateContext<'_> {
     /// Opens the clicked property if the cursor is on it already and the list had the focus,
     /// otherwise moves the cursor there.
     fn press_in_fields(&mut self, rows: Rect, focused: bool, mouse: Mouse) {
-        let FieldList { cursor, scroll, editor } = self.model.field_list();
+        let FieldList { cursor, scroll, editor, .. } = self.model.field_list();
         let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
         let opens = focused && editor.is_none();
         let lines = self.model.field_lines();
@@ -206,7 +206,7 @@ impl UpdateContext<'_> {
         };
         let scroll = if is_in(mouse, layout.inspector) {
             let rows = self.model.inspector_rows().map(|(rows, _)| rows).unwrap_or_default();
-            let FieldList { cursor, scroll, editor } = &mut self.model.inspector;
+            let FieldList { cursor, scroll, editor, .. } = &mut self.model.inspector;
             let is_chosen = line_at(rows, *scroll, mouse) == Some(*cursor) && editor.is_none();
             if self.model.focus == Focus::Inspector && is_chosen {
                 return self.step_field(f64::from(ticks));

@@ -4,7 +4,7 @@ use crate::dashboard::panel_lines::outline;
 use crate::dashboard::text::columns;
 use crate::dashboard::view::false_color::object_color;
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::painter::{Painter, VisibleLine};
+use crate::dashboard::view::painter::{ListRow, Painter, VisibleLine};
 use crate::dashboard::{
     BORDER, CompareView, DisplayChannel, Focus, Layout, Model, OutlineEntry, OutlineLine,
 };
@@ -22,27 +22,21 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
     for VisibleLine { row, index } in painter.window(inner, scroll, lines.len(), border) {
-        let mut to = painter.row(inner, row);
         match &lines[index] {
             OutlineLine::Heading(title) => {
-                to.put(" ", theme.heading()).put(title, theme.heading());
+                painter.row(inner, row).skip(1).put(title, theme.heading());
             }
             OutlineLine::Entry(OutlineEntry { subject, label, note }) => {
-                let selected = *subject == model.selection;
-                let (name, noted) = match selected {
-                    true => (theme.selected(active), theme.selected(active)),
-                    false => (theme.text(), theme.dim()),
-                };
-                if selected {
-                    to.fill(name);
-                }
+                let selected = (*subject == model.selection).then_some(active);
+                let ListRow { mut to, name, note: noted, .. } =
+                    painter.list_row(inner, row, selected);
                 let id = match subject {
                     Target::Object(i) if with_ids => theme.swatch(object_color(*i as u32)),
                     _ => None,
                 };
                 match id {
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
-                    None => to.put(if selected { " ▸ " } else { "   " }, name),
+                    None => to.put(if selected.is_some() { " ▸ " } else { "   " }, name),
                 };
                 // The name has precedence over the note.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);

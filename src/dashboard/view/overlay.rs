@@ -4,10 +4,10 @@ use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::noise_targets::{ABOUT, LOOKS, cost};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut};
-use crate::dashboard::view::fields::{Fields, heading, typed};
-use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
+use crate::dashboard::view::fields::{self, heading, typed};
+use crate::dashboard::view::painter::{ListRow, Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
-use crate::dashboard::{Form, Model, Overlay, Pick, PickEntry, Prompt, Question};
+use crate::dashboard::{Model, Overlay, Pick, Prompt, Question};
 use ratatui::layout::Position;
 use ratatui::style::Style;
 use zerkalo_render::session::QUALITIES;
@@ -20,7 +20,11 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
         Overlay::Help { scroll } => overlay.help(model, *scroll),
         Overlay::NoiseTargets(at) => overlay.noise_targets(model, at.index),
         Overlay::Pick(pick) => return overlay.pick(pick),
-        Overlay::Form(form) => return overlay.form(model, form),
+        Overlay::Form(form) => {
+            overlay.frame(&form.title);
+            let OverlayLayout { list, help, .. } = overlay.place;
+            return fields::draw(model, (list, help), true, overlay.painter);
+        }
         Overlay::Prompt(prompt) => return overlay.prompt(prompt),
         // `View::draw` draws it on the whole screen.
         Overlay::ViewerImage(_) => {}
@@ -33,13 +37,6 @@ struct OverlayPainter<'a, 'b> {
     place: OverlayLayout,
     theme: Theme,
     painter: &'a mut Painter<'b>,
-}
-
-struct Choice<'a> {
-    to: Row<'a>,
-    name: Style,
-    text: Style,
-    key: Style,
 }
 
 impl OverlayPainter<'_, '_> {
@@ -60,18 +57,10 @@ impl OverlayPainter<'_, '_> {
     }
 
     /// Starts a row of the list. `is_chosen` is `true` for the row under the cursor.
-    fn choice(&mut self, row: u16, is_chosen: bool) -> Choice<'_> {
-        let theme = self.theme;
-        let mut to = self.row(row);
-        let [name, text, key] = match is_chosen {
-            true => [theme.selected(true); 3],
-            false => [theme.text(), theme.dim(), theme.accent()],
-        };
-        if is_chosen {
-            to.fill(name);
-        }
-        to.put(if is_chosen { " ▸ " } else { "   " }, name);
-        Choice { to, name, text, key }
+    fn choice(&mut self, row: u16, is_chosen: bool) -> ListRow<'_> {
+        let mut choice = self.painter.list_row(self.place.list, row, is_chosen.then_some(true));
+        choice.to.put(if is_chosen { " ▸ " } else { "   " }, choice.name);
+        choice
     }
 
     fn help(&mut self, model: &Model, scroll: usize) {
@@ -97,7 +86,7 @@ impl OverlayPainter<'_, '_> {
         let good = self.theme.good();
         let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
         for (row, (i, noise_levels)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
-            let Choice { mut to, name, text, .. } = self.choice(row, i == cursor);
+            let ListRow { mut to, name, note: text, .. } = self.choice(row, i == cursor);
             let cost = cost(report, &model.convergence, i);
             let mark = if model.stop.noise_levels == Some(noise_levels) { "→ " } else { "  " };
             to.put_right("  ", 0, text).put_right(&cost, 8, name);
@@ -119,29 +108,16 @@ impl OverlayPainter<'_, '_> {
         }
         let names = pick.entries.iter().map(|entry| columns(&entry.name)).max().unwrap_or(0);
         for VisibleLine { row, index } in self.window(pick.at.scroll, pick.found.len()) {
-            let PickEntry { name: entry, note, keys } = &pick.entries[pick.found[index]];
-            let Choice { mut to, name, text, key } = self.choice(row, index == pick.at.index);
-            to.put_right(" ", 0, key).put_right(keys, columns(entry) + 2, key);
-            to.put_wide(entry, names, name).skip(2);
+            let entry = &pick.entries[pick.found[index]];
+            let ListRow { mut to, name, note, key } = self.choice(row, index == pick.at.index);
+            to.put_right(" ", 0, key).put_right(&entry.keys, columns(&entry.name) + 2, key);
+            to.put_wide(&entry.name, names, name).skip(2);
             // A description may be truncated, a chapter beside long keys not.
-            if keys.is_empty() || columns(note) < to.left() {
-                to.put(note, text);
+            if entry.keys.is_empty() || columns(&entry.note) < to.left() {
+                to.put(&entry.note, note);
             }
         }
         cursor
-    }
-
-    fn form(&mut self, model: &Model, form: &Form) -> Option<Position> {
-        self.frame(&form.title);
-        let fields = Fields {
-            lines: &model.field_lines(),
-            list: self.place.list,
-            help: self.place.help,
-            state: &form.fields,
-            problem: form.problem.as_deref(),
-            active: true,
-        };
-        fields.draw(self.painter)
     }
 
     fn prompt(&mut self, prompt: &Prompt) -> Option<Position> {
@@ -157,7 +133,7 @@ impl OverlayPainter<'_, '_> {
         self.frame("");
         self.say(&question.text, self.theme.text());
         for (row, (i, (letter, words, _))) in (0..).zip(question.answers.iter().enumerate()) {
-            let Choice { mut to, name, key, .. } = self.choice(row, i == question.at.index);
+            let ListRow { mut to, name, key, .. } = self.choice(row, i == question.at.index);
             to.put(&letter.to_string(), key).skip(2).put(words, name);
         }
     }

@@ -20,7 +20,30 @@ pub struct VisibleLine {
     pub index: usize,
 }
 
+/// Row of a list, with the styles of its parts.
+pub struct ListRow<'a> {
+    pub to: Row<'a>,
+    pub name: Style,
+    pub note: Style,
+    pub key: Style,
+}
+
 impl Painter<'_> {
+    /// Starts row `row` of a list in `area`. `selected` is `None` unless the cursor is on the row,
+    /// and `true` if the list has the focus.
+    pub fn list_row(&mut self, area: Rect, row: u16, selected: Option<bool>) -> ListRow<'_> {
+        let theme = self.theme;
+        let mut to = self.row(area, row);
+        let [name, note, key] = match selected {
+            Some(active) => [theme.selected(active); 3],
+            None => [theme.text(), theme.dim(), theme.accent()],
+        };
+        if selected.is_some() {
+            to.fill(name);
+        }
+        ListRow { to, name, note, key }
+    }
+
     /// Returns a writer of row `row` of `area`, counted from 0.
     pub fn row(&mut self, area: Rect, row: u16) -> Row<'_> {
         let bounds = area.intersection(self.buffer.area);

@@ -2,7 +2,7 @@
 
 use crate::dashboard::text::{age, wrapped};
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::painter::{Painter, Row, VisibleLine};
+use crate::dashboard::view::painter::{ListRow, Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::{Focus, Layout, Model, short_name};
 use ratatui::layout::Rect;
@@ -31,15 +31,11 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let shards = &table.report.shards;
     let border = theme.border(active);
     for VisibleLine { row, index } in painter.window(rows, table.at.scroll, shards.len(), border) {
-        let (shard, mut to) = (&shards[index], painter.row(rows, row));
+        let shard = &shards[index];
+        let selected = (index == table.at.index).then_some(active);
+        let ListRow { mut to, name: plain, note: dim, .. } = painter.list_row(rows, row, selected);
         let (mark, style) = mark(&shard.state, &theme);
-        let (plain, dim, style) = match index == table.at.index {
-            true => {
-                to.fill(theme.selected(active));
-                (theme.selected(active), theme.selected(active), theme.selected(active))
-            }
-            false => (theme.text(), theme.dim(), style),
-        };
+        let style = if selected.is_some() { plain } else { style };
         to.put(mark, style);
         let age = shard.age.map_or(String::new(), age);
         let late = if shard.state == WatchedState::Late { style } else { dim };

@@ -136,8 +136,11 @@ fn adding(model: &mut Model, problem: Option<&str>) {
         subject: edit.subject,
         label: edit.label,
         before: model.selection.clone(),
-        fields: FieldList { cursor: 2, ..FieldList::default() },
-        problem: problem.map(str::to_string),
+        fields: FieldList {
+            cursor: 2,
+            refusal: problem.map(str::to_string),
+            ..FieldList::default()
+        },
     };
     model.overlay = Some(Overlay::Form(form));
 }
