@@ -41,7 +41,7 @@ fn extreme_17_odd_cameras() {
                         target: None,
                         direction: Some(direction),
                         view_angle,
-                        ..Camera::default()
+                        ..Camera::at_origin()
                     };
                     let name = format!("{direction:?} {view_angle:?} {size:?}");
                     check_finite::<Double>(&camera, size, &name);
@@ -57,7 +57,7 @@ fn extreme_17_odd_cameras() {
 fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;
     for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
-        let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
+        let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::at_origin() };
         let view = PerspectiveCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
             let Ray { direction: left, .. } =

@@ -47,6 +47,7 @@ pub use zerkalo_render::plan::{Plan, PlanSettings};
 pub use zerkalo_render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
 pub use zerkalo_render::session::{Session, State};
 pub use zerkalo_render::{Checkpoint, RenderState};
+pub use zerkalo_scene::TomlText;
 pub use zerkalo_scene::asset::Assets;
 pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
 pub use zerkalo_scene::disk::Existing;
@@ -59,7 +60,7 @@ pub use zerkalo_scene::material::{
     ReflectionLobe,
 };
 pub use zerkalo_scene::shape::{CsgOperand, Cuboid, Cylinder, EXAMPLES, Shape, ShapeDesc};
-pub use zerkalo_scene::value::{Color, Field, TomlValue, ValueType};
+pub use zerkalo_scene::value::{Color, Field, ValueType};
 pub use zerkalo_scene::{
     Acceleration, AssetResolver, BelowHorizon, Document, FIELDS, Filter, Object, RayTypes, Scale,
     Scene, TransformOp, edit,

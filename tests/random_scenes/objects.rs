@@ -155,7 +155,8 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
 /// Returns the compound of the parts `of` by the set operation `key`. Returns `None` if the
 /// compound has validation errors.
 fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
-    let parts = Table::from_iter([("of".to_string(), of.to_toml())]);
+    let of = of.iter().map(|part| Value::Table(part.to_table())).collect();
+    let parts = Table::from_iter([("of".to_string(), Value::Array(of))]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
     Shape::from_text(&whole.to_string()).ok().filter(|shape| shape.faults().is_empty())
 }

@@ -280,7 +280,7 @@ impl Tracer<'_> {
     pub fn raised(&self, material: &Material, spot: &Spot, normal: DVec3) -> DVec3 {
         let Some(Bump::Image(image)) = &material.bump else { return normal };
         let Some(pixels) = self.images.get(&image.file) else { return normal };
-        let placement = image.placement();
+        let placement = image.placement;
         let slope = pixels.slope(spot.uv(&placement, spot.point), image.wrap);
         let height =
             if self.mutation == Mutation::SunkenBumps { -image.height } else { image.height };

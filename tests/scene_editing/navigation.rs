@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 /// Returns the camera of the mirror room.
 fn aimed() -> Camera {
-    Camera { eye: [0.6, 1.4, 4.5], target: Some([0.0, 0.8, -0.5]), ..Camera::default() }
+    Camera { eye: [0.6, 1.4, 4.5], target: Some([0.0, 0.8, -0.5]), ..Camera::at_origin() }
 }
 
 /// Returns the camera of the mirror room with a direction instead of a target. Also returns the

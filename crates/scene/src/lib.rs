@@ -30,6 +30,7 @@ mod recovery;
 mod settings;
 mod validate;
 
+pub use crate::format::TomlText;
 pub use crate::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
 pub use acceleration::Acceleration;
@@ -48,13 +49,11 @@ pub use validate::Problem;
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::Material;
-use crate::value::{TableReader, TomlError, TomlValue, written};
+use crate::value::{FieldValue, KeyNode, ValueType, children};
 use std::collections::BTreeMap;
-use toml::de::DeValue;
-use toml::{Spanned, Value};
 
 /// Description of a whole scene, valid or not: see [`Scene::faults`].
-#[derive(Clone, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Film settings: size, pixel filter, sample limit.
     pub film: FilmSettings,
@@ -78,34 +77,45 @@ pub struct Scene {
     pub resolver: AssetResolver,
 }
 
-impl TomlValue for Scene {
-    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
-        let table = TableReader::new(value, FIELDS)?;
-        let mut scene = Self::default();
-        table.replace("ambient", &mut scene.ambient)?;
-        table.replace("background", &mut scene.background)?;
-        table.replace("camera", &mut scene.camera)?;
-        table.replace("cameras", &mut scene.cameras)?;
-        table.replace("film", &mut scene.film)?;
-        table.replace("light", &mut scene.lights)?;
-        table.replace("materials", &mut scene.materials)?;
-        table.replace("object", &mut scene.objects)?;
-        table.replace("trace", &mut scene.trace)?;
-        Ok(scene)
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            film: FilmSettings::default(),
+            trace: IntegratorSettings::default(),
+            camera: Camera::at_origin(),
+            cameras: BTreeMap::new(),
+            background: Background::default(),
+            ambient: Ambient::default(),
+            lights: Vec::new(),
+            materials: BTreeMap::new(),
+            objects: Vec::new(),
+            resolver: AssetResolver::default(),
+        }
+    }
+}
+
+impl FieldValue for Scene {
+    const TYPE: ValueType = ValueType::Table(FIELDS);
+}
+
+impl KeyNode for Scene {
+    children! {
+        "film" => film,
+        "trace" => trace,
+        "camera" => camera,
+        "cameras" => cameras,
+        "background" => background,
+        "ambient" => ambient,
+        "light" => lights,
+        "materials" => materials,
+        "object" => objects
     }
 
-    fn to_toml(&self) -> Value {
-        written(&[
-            ("film", Some(&self.film)),
-            ("trace", Some(&self.trace)),
-            ("camera", Some(&self.camera)),
-            ("cameras", Some(&self.cameras)),
-            ("background", Some(&self.background)),
-            ("ambient", Some(&self.ambient)),
-            ("light", Some(&self.lights)),
-            ("materials", Some(&self.materials)),
-            ("object", Some(&self.objects)),
-        ])
+    fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        if key == "camera" {
+            self.camera = Camera::default();
+        }
+        self.child_mut(key)
     }
 }
 

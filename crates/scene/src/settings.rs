@@ -5,7 +5,7 @@ use crate::value::{Color, choices, description};
 
 description! {
     /// Film settings: size, pixel filter, sample limit of glossy pixels.
-    pub struct FilmSettings: Default {
+    pub struct FilmSettings {
         /// Width and height of the picture.
         size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
         /// Distribution of samples over a pixel.
@@ -27,7 +27,7 @@ choices! {
 
 description! {
     /// Integrator settings, the table `[trace]`.
-    pub struct IntegratorSettings: Default {
+    pub struct IntegratorSettings {
         /// Kinds of rays that are traced.
         ray_types: RayTypes = "full";
         /// Largest number of surfaces that a path hits after the first, or after a diffuse bounce;
@@ -73,7 +73,7 @@ choices! {
 
 description! {
     /// Radiance of rays that hit no surface.
-    pub struct Background: Default {
+    pub struct Background {
         /// Radiance of rays that hit no surface.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }
@@ -81,7 +81,7 @@ description! {
 
 description! {
     /// Ambient light: uniform, without shadows.
-    pub struct Ambient: Default {
+    pub struct Ambient {
         /// Ambient light i_a from all directions, without shadows. Materials multiply it by k_a.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
     }

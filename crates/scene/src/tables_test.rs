@@ -2,21 +2,22 @@
 
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::shape::{CsgOperand, EXAMPLES, KINDS, MAX_DEPTH, Shape};
-use crate::value::{DefaultValue, Description, Field, TomlError, TomlValue, ValueType};
+use crate::value::{DefaultValue, Description, Field, ValueType};
 use crate::*;
 
 /// Returns the valid keys of `T`. They are taken from the error message that lists the valid keys
 /// after an unknown one was found.
-fn keys_of<T: TomlValue>() -> Vec<String> {
+fn keys_of<T: TomlText>() -> Vec<String> {
     let error = match T::from_text("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
-        Err(error) => error.message().to_string(),
+        Err(errors) => errors.messages()[0].help.clone(),
     };
-    let list = error.split_once("expected").unwrap_or_else(|| panic!("{error}")).1;
-    list.split('`').skip(1).step_by(2).map(str::to_string).collect()
+    let list = error.strip_prefix("Known: ").unwrap_or_else(|| panic!("{error}"));
+    let (list, _) = list.split_once('.').unwrap_or_else(|| panic!("{error}"));
+    list.split(", ").map(str::to_string).collect()
 }
 
-fn same_keys<T: TomlValue>(what: &str, fields: &[Field]) {
+fn same_keys<T: TomlText>(what: &str, fields: &[Field]) {
     let mut read_keys = keys_of::<T>();
     let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
     read_keys.sort();
@@ -26,7 +27,7 @@ fn same_keys<T: TomlValue>(what: &str, fields: &[Field]) {
 
 /// Checks that the documented defaults of `fields` are the values that missing keys get. `needed`
 /// is a TOML table with only the required keys. `what` is the name of the table in messages.
-fn same_defaults<T: TomlValue>(what: &str, fields: &[Field], needed: &str) {
+fn same_defaults<T: TomlText>(what: &str, fields: &[Field], needed: &str) {
     let read = T::from_text(needed).unwrap_or_else(|e| panic!("{what}: {e:?}"));
     let written = read.to_table();
     let given: toml::Table = needed.parse().unwrap();
@@ -135,10 +136,10 @@ fn field_tables_match_defaults() {
 
 #[test]
 fn every_documented_choice_is_read() {
-    fn words<T: TomlValue>(fields: &[Field]) {
+    fn words<T: TomlText>(fields: &[Field]) {
         words_beside::<T>("", fields);
     }
-    fn words_beside<T: TomlValue>(needed: &str, fields: &[Field]) {
+    fn words_beside<T: TomlText>(needed: &str, fields: &[Field]) {
         for field in fields {
             if let ValueType::Choice(choices) = field.takes {
                 for choice in choices {
@@ -146,12 +147,12 @@ fn every_documented_choice_is_read() {
                     assert!(T::from_text(&line).is_ok(), "{line}");
                 }
                 let line = format!("{needed}{} = \"no such word\"", field.name);
-                let error = T::from_text(&line).err().map(|e| e.message().to_string());
+                let error = T::from_text(&line).err().map(|e| e.messages()[0].help.clone());
                 let error = error.unwrap_or_else(|| panic!("{line} was read"));
                 let documented =
-                    choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
+                    choices.iter().filter(|c| error.contains(&format!("\"{}\"", c.name)));
                 assert_eq!(documented.count(), choices.len(), "{error}");
-                assert_eq!(error.matches('`').count(), 2 * choices.len() + 2, "{error}");
+                assert_eq!(error.matches('"').count(), 2 * choices.len(), "{error}");
             }
         }
     }
@@ -170,7 +171,7 @@ fn example(kind: &Field, text: &str) -> toml::Table {
     table["shape"][kind.name].as_table().unwrap().clone()
 }
 
-fn read(kind: &Field, values: &toml::Table) -> Result<Shape, TomlError> {
+fn read(kind: &Field, values: &toml::Table) -> Result<Shape, SceneErrors> {
     let outer = toml::Table::from_iter([(kind.name.to_string(), values.clone().into())]);
     Shape::from_text(&outer.to_string())
 }

@@ -5,6 +5,7 @@ use crate::value::{ValidationError, one_of};
 use glam::DVec3;
 
 one_of! {
+    #[derive(Copy)]
     /// Aperture of the camera's lens, given by its radius or its f-number. The blur of objects
     /// outside of the plane in focus is in proportion to the radius.
     pub enum Aperture {
@@ -17,6 +18,7 @@ one_of! {
 }
 
 one_of! {
+    #[derive(Copy)]
     /// Plane in focus of the camera's lens, perpendicular to the view direction. It is given by its
     /// distance or by a point.
     pub enum Focus {
@@ -117,7 +119,7 @@ mod tests {
         let with = |view_angle, aperture| Camera {
             view_angle,
             aperture: Some(aperture),
-            ..Camera::default()
+            ..Camera::at_origin()
         };
         // A lens of 50 mm at f/2 has a radius of 12.5 mm. Both view angles below give the focal
         // length of 50 mm: across the 24 mm side and across the 36 mm side of the film.
@@ -129,7 +131,7 @@ mod tests {
             assert!((camera.lens_radius() - 0.0125).abs() < 1e-15, "{}", camera.lens_radius());
         }
         assert_eq!(with(ViewAngle::Vertical(40.0), Aperture::Radius(0.3)).lens_radius(), 0.3);
-        assert_eq!(Camera::default().lens_radius(), 0.0);
+        assert_eq!(Camera::at_origin().lens_radius(), 0.0);
         let tele = with(ViewAngle::Vertical(1e-300), Aperture::FNumber(1.0));
         assert_eq!(tele.lens_radius(), 1e9);
     }
@@ -140,7 +142,7 @@ mod tests {
             eye: [1.0, 2.0, 3.0],
             target: Some([1.0, 2.0, -1.0]),
             aperture: Some(Aperture::Radius(0.1)),
-            ..Camera::default()
+            ..Camera::at_origin()
         };
         let focused = |focus| Camera { focus: Some(focus), ..camera.clone() }.focus_depth();
         assert_eq!(camera.focus_depth(), 4.0);
@@ -153,7 +155,7 @@ mod tests {
 
     #[test]
     fn lens_ranges_are_checked() {
-        let camera = Camera { aperture: Some(Aperture::Radius(0.1)), ..Camera::default() };
+        let camera = Camera { aperture: Some(Aperture::Radius(0.1)), ..Camera::at_origin() };
         assert_eq!(errors(&camera), [""; 0]);
         let unfocused =
             Camera { target: None, direction: Some([0.0, 0.0, -1.0]), ..camera.clone() };

@@ -36,28 +36,13 @@ description! {
 }
 
 one_of! {
+    #[derive(Copy)]
     /// Opening angle of the camera in degrees, between 0 and 180.
     pub enum ViewAngle {
         /// Across the picture's height.
         Vertical(f64) = "vertical", in between(0.0, 180.0) "degrees";
         /// Across the picture's width.
         Horizontal(f64) = "horizontal", in between(0.0, 180.0) "degrees";
-    }
-}
-
-/// Camera without a `[camera]` table: directed at the origin.
-impl Default for Camera {
-    fn default() -> Self {
-        Self {
-            eye: [0.0, 1.0, 5.0],
-            target: Some([0.0; 3]),
-            direction: None,
-            up: [0.0, 1.0, 0.0],
-            view_angle: ViewAngle::Vertical(40.0),
-            near: 0.0,
-            aperture: None,
-            focus: None,
-        }
     }
 }
 
@@ -75,6 +60,11 @@ impl ViewAngle {
 }
 
 impl Camera {
+    /// Returns the camera of a scene file without a `[camera]` table.
+    pub fn at_origin() -> Self {
+        Self { target: Some([0.0; 3]), ..Self::default() }
+    }
+
     /// Returns the unit vector of the view direction; `None` if the camera does not define one.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
@@ -156,14 +146,14 @@ mod tests {
         );
         for degrees in [0.0, 180.0, -1.0, f64::NAN] {
             let view_angle = ViewAngle::Horizontal(degrees);
-            let camera = Camera { view_angle, ..Camera::default() };
+            let camera = Camera { view_angle, ..Camera::at_origin() };
             assert_eq!(keys(&camera), ["view_angle.horizontal"], "{degrees}");
         }
     }
 
     #[test]
     fn camera_needs_direction_and_up_across_it() {
-        let camera = Camera::default();
+        let camera = Camera::at_origin();
         assert!(keys(&camera).is_empty());
         assert_eq!(keys(&Camera { target: None, ..camera.clone() }), [""]);
         assert_eq!(keys(&Camera { target: Some(camera.eye), ..camera.clone() }), ["target"]);

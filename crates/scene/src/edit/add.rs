@@ -25,7 +25,7 @@ pub fn object_kinds() -> Vec<Word> {
 
 /// Returns the name and a description of each kind of light that can be added.
 pub fn light_kinds() -> Vec<Word> {
-    words(crate::light::KINDS)
+    words(LightKind::FIELDS)
 }
 
 /// Linear colours of new materials: the first that no other material has.
@@ -159,7 +159,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let placement = Placement { position, direction, radius: radius / 5.0 };
     let Some(placed) = LightKind::placed(kind, &placement) else {
         let found = format!("there is no kind of light called \"{kind}\"");
-        let kinds = names(crate::light::KINDS);
+        let kinds = names(LightKind::FIELDS);
         return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
     };
     let mut light = Light::new(placed);

@@ -10,11 +10,11 @@ use crate::edit::lens;
 use crate::edit::set::{label, replace};
 use crate::edit::{Edit, EditError, Target};
 use crate::light::{EmissiveSurface, Falloff, Light, LightKind, LightUnit, Placement};
-use crate::material::{Bump, Material, Texture};
+use crate::material::Material;
 use crate::shape::Shape;
 use crate::value::{
-    Field, KeyValue, NumberRange, ValueType, number, round_fine, round_nice, round_significant,
-    rounded_to, unit,
+    Field, KeyNode, KeyValue, NumberRange, ValueType, number, round_fine, round_nice,
+    round_significant, rounded_to, unit,
 };
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -26,7 +26,7 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
 /// Field for the kind of a light. The inspector shows it as a row, but it is not a key of scene
 /// files.
 pub(super) const KIND: Field =
-    Field::required("kind", ValueType::OneOf(crate::light::KINDS), "", "Kind of light source.");
+    Field::required("kind", ValueType::OneOf(LightKind::FIELDS), "", "Kind of light source.");
 
 /// Choice between `target` and `direction` of a camera, a row of the inspector but no key of files.
 pub(super) const AIM: Field = Field::required(
@@ -203,13 +203,12 @@ fn refit(light: &mut Light, factor: f64) -> String {
 
 /// Sets the kind of `texture` or `bump`. The placement of a texture is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
-    match (key, &material.texture, &material.bump) {
-        ("texture", None, _) => material.texture = Texture::new(name),
-        ("texture", Some(texture), _) if texture.key() != name => {
-            material.texture = texture.changed(name);
-        }
-        ("bump", _, None) => material.bump = Bump::new(name),
-        _ => {}
+    let placement = material.texture.as_ref().map(|texture| *texture.placement());
+    if let Some(node) = material.child_mut(key) {
+        node.make_child(name);
+    }
+    if let (Some(texture), Some(placement)) = (&mut material.texture, placement) {
+        *texture.placement_mut() = placement;
     }
 }
 
@@ -302,9 +301,9 @@ mod tests {
         let lamp = Target::Light(0);
         let center = DVec3::from_array(scene_bounds(&scene).center);
         let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
-        for from in crate::light::KINDS {
+        for from in LightKind::FIELDS {
             let from = set(&scene, &lamp, "kind", from.name).unwrap().scene;
-            for to in crate::light::KINDS {
+            for to in LightKind::FIELDS {
                 let edit = set(&from, &lamp, "kind", to.name).unwrap();
                 assert_eq!(edit.scene.faults(), []);
                 let light = &edit.scene.lights[0];

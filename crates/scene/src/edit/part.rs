@@ -35,27 +35,11 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     }
 }
 
-/// Expands to the part of `$scene` that `$subject` names.
-macro_rules! part {
-    ($scene:ident, $subject:ident, $get:ident, $($reference:tt)+) => {{
-        let part: Option<$($reference)+ dyn KeyNode> = match $subject {
-            Target::Camera => Some($($reference)+ $scene.camera),
-            Target::View(name) => $scene.cameras.$get(name).map(|camera| camera as _),
-            Target::Ambient => Some($($reference)+ $scene.ambient),
-            Target::Background => Some($($reference)+ $scene.background),
-            Target::Light(i) => $scene.lights.$get(*i).map(|light| light as _),
-            Target::Object(i) => $scene.objects.$get(*i).map(|object| object as _),
-            Target::Material(name) => $scene.materials.$get(name).map(|material| material as _),
-            Target::Film => Some($($reference)+ $scene.film),
-            Target::IntegratorSettings => Some($($reference)+ $scene.trace),
-        };
-        part.ok_or_else(|| EditError::gone($subject))
-    }};
-}
-
 /// Returns the part of `scene` that `subject` names.
 pub(super) fn part<'a>(scene: &'a Scene, subject: &Target) -> Result<&'a dyn KeyNode, EditError> {
-    part!(scene, subject, get, &)
+    let root: &dyn KeyNode = scene;
+    let part = subject.path().iter().try_fold(root, |node, key| node.child(key));
+    part.ok_or_else(|| EditError::gone(subject))
 }
 
 /// Returns [`part`] as a mutable reference.
@@ -63,7 +47,9 @@ pub(super) fn part_mut<'a>(
     scene: &'a mut Scene,
     subject: &Target,
 ) -> Result<&'a mut dyn KeyNode, EditError> {
-    part!(scene, subject, get_mut, &mut)
+    let root: &mut dyn KeyNode = scene;
+    let part = subject.path().iter().try_fold(root, |node, key| node.child_mut(key));
+    part.ok_or_else(|| EditError::gone(subject))
 }
 
 /// Returns the given one of the [`exclusive_keys`].

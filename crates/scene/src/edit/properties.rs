@@ -6,7 +6,7 @@ use crate::edit::parse_value::{color, parse, show};
 use crate::edit::part::{exclusive_keys, fields, given_key, part};
 use crate::edit::{EditError, Target};
 use crate::value::{
-    Choice, DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number,
+    Choice, DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number, written,
 };
 
 /// Word that a property accepts as its value.
@@ -204,6 +204,8 @@ impl PropertyWalker<'_> {
                 row.words = choices.iter().map(word).collect();
             }
             ValueType::Color(_) => row.entry = Widget::Color,
+            // Edits can only read the parts of a compound.
+            ValueType::Tables(_) => row.value = written(field.takes, node).to_string(),
             _ => {}
         }
         if is_material(self.subject, field) {

@@ -9,3 +9,5 @@ pub(crate) mod read;
 pub(crate) mod schema;
 pub(crate) mod source_map;
 pub(crate) mod suggest;
+
+pub use read::TomlText;

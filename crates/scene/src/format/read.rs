@@ -5,14 +5,14 @@ use crate::format::parts::{PART_BYTES, Part, split};
 use crate::format::schema;
 use crate::format::source_map::{line_column, locate};
 use crate::process_memory::missing_memory;
-use crate::value::{TomlError, TomlValue};
-use crate::{AssetResolver, Document, Object, Scene};
+use crate::value::{FieldValue, written};
+use crate::{AssetResolver, Document, Scene};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
+use toml::{Table, Value};
 
 /// Size of the largest scene file [bytes]: about four million objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
@@ -113,19 +113,7 @@ impl<'a> SourceScene<'a> {
                     "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
                 ));
             }
-            schema::check(&root, part, &mut errors);
-            if !errors.is_empty() {
-                continue;
-            }
-            let scene = scene_of(root).map_err(|error| {
-                let at = part.in_file(error.span().start);
-                let message = error.message().to_string();
-                SceneErrors::at(name, Some(line_column(text, at)), message, "")
-            })?;
-            match number {
-                0 => self.scene = scene,
-                _ => self.scene.objects.extend(scene.objects),
-            }
+            schema::read(&root, Scene::TYPE, &mut self.scene, part, &mut errors);
         }
         if let Some((at, message)) = syntax {
             let found = format!("this is not TOML: {message}");
@@ -146,20 +134,31 @@ impl<'a> SourceScene<'a> {
     }
 }
 
-/// Returns the scene in the table `root`.
-fn scene_of(mut root: Spanned<DeTable>) -> Result<Scene, TomlError> {
-    let objects = root.get_mut().remove("object");
-    let mut scene =
-        Scene::from_toml(&Spanned::new(root.span(), DeValue::Table(root.into_inner())))?;
-    if let Some(DeValue::Array(list)) = objects.map(Spanned::into_inner) {
-        scene.objects.reserve_exact(list.len());
-        // The memory of each object's values is freed before the next object is read.
-        for object in list {
-            scene.objects.push(Object::from_toml(&object)?);
+/// Types that are tables of scene files, as TOML.
+pub trait TomlText: FieldValue {
+    /// Parses the keys and values of one table, without a check of ranges.
+    fn from_text(text: &str) -> Result<Self, SceneErrors> {
+        let mut value = Self::default();
+        let mut errors = FirstDiagnostics::default();
+        let root = DeTable::parse(text)
+            .map_err(|error| SceneErrors::at("", None, error.message().to_string(), ""))?;
+        schema::read(&root, Self::TYPE, &mut value, &Part::whole(text), &mut errors);
+        match errors.is_empty() {
+            true => Ok(value),
+            false => Err(SceneErrors::new(errors.located(("", text)))),
         }
     }
-    Ok(scene)
+
+    /// Converts `self` to a table of a scene file.
+    fn to_table(&self) -> Table {
+        match written(Self::TYPE, self) {
+            Value::Table(table) => table,
+            _ => Table::new(),
+        }
+    }
 }
+
+impl<T: FieldValue> TomlText for T {}
 
 /// Returns the text of the scene file at `path`. `open` opens the file.
 pub(crate) fn read_text(
@@ -215,6 +214,7 @@ pub(crate) fn read_text(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Object;
     use std::fs;
 
     /// Parses the scene `text` twice: in parts of one object each, and as a whole. Returns the two

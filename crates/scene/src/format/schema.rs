@@ -1,5 +1,5 @@
-//! Schema validation of a scene file: unknown keys, values of a wrong type, missing keys, in one
-//! pass.
+//! Reading of a scene from TOML by its schema. Unknown keys, values of a wrong type and missing keys
+//! are found in the same pass.
 
 use crate::camera;
 use crate::diagnostic::{Diagnostic, FirstDiagnostics};
@@ -9,13 +9,13 @@ use crate::format::suggest::{did_you_mean, nearest};
 use crate::light;
 use crate::material;
 use crate::value::{
-    Color, DefaultValue, Description, Field, NumberRange, ValueType, names, sort_by_number,
-    truncated,
+    DefaultValue, Description, Field, KeyNode, ValueType, integer, names, read_value,
+    sort_by_number, truncated,
 };
 use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
 use std::ops;
 use toml::Spanned;
-use toml::de::{DeInteger, DeTable, DeValue};
+use toml::de::{DeTable, DeValue};
 
 /// Top-level keys of a scene file.
 pub const FIELDS: &[Field] = &[
@@ -68,10 +68,21 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Adds the schema errors of `root`, the parsed `part` of the file.
-pub(crate) fn check(root: &Spanned<DeTable>, part: &Part, errors: &mut FirstDiagnostics) {
-    let mut walk = SchemaChecker { part, root: root.get_ref(), path: Vec::new(), errors };
-    walk.table(root.get_ref(), 0..0, FIELDS);
+/// Reads `root`, the parsed `part` of the file, into `node`, which has default values and the type
+/// `takes`. Adds its schema errors; a node with an error keeps its default value.
+pub(crate) fn read(
+    root: &Spanned<DeTable>,
+    takes: ValueType,
+    node: &mut dyn KeyNode,
+    part: &Part,
+    errors: &mut FirstDiagnostics,
+) {
+    let mut reader = SchemaReader { part, root: root.get_ref(), path: Vec::new(), errors };
+    match takes {
+        ValueType::Table(fields) => reader.table(root.get_ref(), 0..0, fields, node),
+        ValueType::OneOf(fields) => reader.one_of(root.get_ref(), 0..0, fields, node),
+        other => panic!("{other} is not a table"),
+    }
 }
 
 /// Formats a path as a phrase: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
@@ -93,14 +104,14 @@ fn phrase(keys: &[String]) -> String {
     }
 }
 
-struct SchemaChecker<'a> {
+struct SchemaReader<'a> {
     part: &'a Part,
     root: &'a DeTable<'a>,
     path: Vec<String>,
     errors: &'a mut FirstDiagnostics,
 }
 
-impl SchemaChecker<'_> {
+impl SchemaReader<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
         self.errors.add(self.part.in_file(span.start), || Diagnostic {
             subject: subject_in(self.root, &self.path, self.part.first_object),
@@ -152,11 +163,17 @@ impl SchemaChecker<'_> {
         nearest(key.get_ref(), known())
     }
 
-    fn table(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+    fn table(
+        &mut self,
+        table: &DeTable,
+        span: ops::Range<usize>,
+        fields: &'static [Field],
+        node: &mut dyn KeyNode,
+    ) {
         let mut intended = Vec::new();
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
-                Some(field) => self.field(field, value),
+                Some(field) => self.field(field, value, node),
                 None => intended.extend(self.unknown(key, fields)),
             }
         }
@@ -175,7 +192,13 @@ impl SchemaChecker<'_> {
         }
     }
 
-    fn one_of(&mut self, table: &DeTable, span: ops::Range<usize>, fields: &'static [Field]) {
+    fn one_of(
+        &mut self,
+        table: &DeTable,
+        span: ops::Range<usize>,
+        fields: &'static [Field],
+        node: &mut dyn KeyNode,
+    ) {
         let mut known: Vec<_> = Vec::new();
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
@@ -187,7 +210,7 @@ impl SchemaChecker<'_> {
         }
         sort_by_number(&mut known, |(key, ..)| key.span().start as i64);
         for (_, value, field) in known.iter().take(1) {
-            self.field(field, value);
+            self.field(field, value, node);
         }
         let expected =
             || format!("Expected {}.", ValueType::OneOf(fields)).replace("a table with ", "");
@@ -216,58 +239,70 @@ impl SchemaChecker<'_> {
         }
     }
 
-    fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>) {
-        self.path.push(field.name.to_string());
-        self.value(field, value);
-        self.path.pop();
-    }
-
-    /// Validates a list of tables: calls `each` for every table, with the path of the entry.
-    fn entries(
-        &mut self,
-        list: &[Spanned<DeValue>],
-        expected: &str,
-        each: impl Fn(&mut Self, &DeTable, ops::Range<usize>),
-    ) {
-        let first = self.part.first_index(&self.path);
-        for (i, entry) in (first..).zip(list) {
-            self.path.push(i.to_string());
-            match entry.get_ref() {
-                DeValue::Table(table) => each(self, table, entry.span()),
-                other => self.wrong(entry.span(), other, expected),
-            }
+    /// Reads the value of a key into the child of `parent`.
+    fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>, parent: &mut dyn KeyNode) {
+        if let Some(node) = parent.make_child(field.name) {
+            self.path.push(field.name.to_string());
+            self.value(field, value, node);
             self.path.pop();
         }
     }
 
-    fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>) {
+    /// Reads an entry of a list, or a named table. It is a table of the type `takes`.
+    fn entry(
+        &mut self,
+        key: String,
+        value: &Spanned<DeValue>,
+        takes: ValueType,
+        list: &mut dyn KeyNode,
+    ) {
+        let Some(node) = list.make_child(&key) else { return };
+        self.path.push(key);
+        match (value.get_ref(), takes) {
+            (DeValue::Table(table), ValueType::OneOf(fields)) => {
+                self.one_of(table, value.span(), fields, node);
+            }
+            (DeValue::Table(table), ValueType::Table(fields)) => {
+                self.table(table, value.span(), fields, node);
+                if matches!(self.path.as_slice(), [list, _] if list == "light") {
+                    self.kind_of_light(table, value.span());
+                }
+            }
+            (other, ValueType::Table(_)) => self.wrong(value.span(), other, "a table"),
+            (other, takes) => self.wrong(value.span(), other, &takes.to_string()),
+        }
+        self.path.pop();
+    }
+
+    fn entries(&mut self, list: &[Spanned<DeValue>], takes: ValueType, node: &mut dyn KeyNode) {
+        let first = self.part.first_index(&self.path);
+        for (i, entry) in (first..).zip(list) {
+            self.entry(i.to_string(), entry, takes, node);
+        }
+    }
+
+    fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>, node: &mut dyn KeyNode) {
         let (value, span) = (spanned.get_ref(), spanned.span());
         match (field.takes, value) {
-            (ValueType::Table(fields), DeValue::Table(table)) => self.table(table, span, fields),
-            (ValueType::OneOf(fields), DeValue::Table(table)) => self.one_of(table, span, fields),
+            (ValueType::Table(fields), DeValue::Table(table)) => {
+                self.table(table, span, fields, node);
+            }
+            (ValueType::OneOf(fields), DeValue::Table(table)) => {
+                self.one_of(table, span, fields, node);
+            }
             (ValueType::ListOf(fields), DeValue::Array(list)) => {
-                let expected = ValueType::OneOf(fields).to_string();
-                self.entries(list, &expected, |w, t, s| w.one_of(t, s, fields));
+                self.entries(list, ValueType::OneOf(fields), node);
             }
             (ValueType::Tables(fields), DeValue::Array(list)) => {
-                self.entries(list, "a table", |w, t, s| {
-                    w.table(t, s.clone(), fields());
-                    if field.name == "light" {
-                        w.kind_of_light(t, s);
-                    }
-                });
+                self.entries(list, ValueType::Table(fields()), node);
             }
             (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {
-                    self.path.push(name.get_ref().to_string());
-                    match entry.get_ref() {
-                        DeValue::Table(table) => self.table(table, entry.span(), fields),
-                        other => self.wrong(entry.span(), other, "a table"),
-                    }
-                    self.path.pop();
+                    let name = name.get_ref().to_string();
+                    self.entry(name, entry, ValueType::Table(fields), node);
                 }
             }
-            (takes, value) if fits(takes, value) => {}
+            (takes, value) if read_value(takes, value).is_some_and(|v| node.set_value(v)) => {}
             (ValueType::Choice(choices), DeValue::String(word)) => {
                 let intended = did_you_mean(word, choices.iter().map(|c| c.name));
                 let help = format!("Expected {}.{intended}", field.takes);
@@ -284,49 +319,6 @@ impl SchemaChecker<'_> {
             (takes, _) => self.wrong(span, value, &takes.to_string()),
         }
     }
-}
-
-/// Returns `true` if a value that is not a table has the type `takes`. Whole numbers must be in
-/// range, because the fields of scenes cannot store others.
-fn fits(takes: ValueType, value: &DeValue) -> bool {
-    let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
-        DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
-        _ => false,
-    };
-    match takes {
-        ValueType::Text => value.is_str(),
-        ValueType::Switch => value.is_bool(),
-        ValueType::Choice(choices) => {
-            value.as_str().is_some_and(|word| choices.iter().any(|c| c.name == word))
-        }
-        ValueType::Whole(range) => is_whole(value, range),
-        ValueType::Wholes(n, range) => list(n, &|v| is_whole(v, range)),
-        ValueType::Number(_) => is_number(value),
-        ValueType::Numbers(n, _) => list(n, &is_number),
-        ValueType::Direction => list(3, &is_number),
-        ValueType::Factor => is_number(value) || list(3, &is_number),
-        ValueType::Color(_) => match value {
-            DeValue::String(text) => Color::from_hex(text).is_some(),
-            _ => list(3, &is_number),
-        },
-        ValueType::Table(_)
-        | ValueType::OneOf(_)
-        | ValueType::ListOf(_)
-        | ValueType::Tables(_)
-        | ValueType::Named(_) => false,
-    }
-}
-
-fn integer(digits: &DeInteger) -> Option<i64> {
-    i64::from_str_radix(digits.as_str(), digits.radix()).ok()
-}
-
-fn is_whole(value: &DeValue, range: NumberRange) -> bool {
-    value.as_integer().and_then(integer).is_some_and(|i| range.holds(i as f64))
-}
-
-fn is_number(value: &DeValue) -> bool {
-    value.is_float() || value.as_integer().and_then(integer).is_some()
 }
 
 /// Describes a TOML value in words: `the string "abc"`, `the number -2`, `a list of 2`.

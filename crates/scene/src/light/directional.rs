@@ -5,7 +5,7 @@
 //! radiance. The radiance is chosen so that this irradiance does not depend on a.
 
 use crate::light::{Handles, LightDesc, LightForm, Placement};
-use crate::value::{ValidationError, description, number, unit};
+use crate::value::{Description, ValidationError, description, number, unit};
 use glam::DVec3;
 
 /// Smallest angular diameter of a sun \[degrees\]. Rounding of directions to single precision then
@@ -50,7 +50,7 @@ impl LightDesc for Directional {
                 format!("0, or a number from {MIN_ANGLE} to 180"),
             )
         });
-        fault.into_iter().collect()
+        self.validator().and(fault).errors()
     }
 
     fn handles(&mut self) -> Handles<'_> {

@@ -7,7 +7,7 @@
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
 use crate::light::{Handles, LightDesc, LightForm, LightSample, Placement};
-use crate::value::{Color, ValidationError, description};
+use crate::value::{Color, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use zerkalo_kernel::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
@@ -17,7 +17,7 @@ const GRADIENT_ROWS: u32 = 512;
 
 description! {
     /// Light from all directions, infinitely far away: an image around the scene, or a gradient.
-    pub struct Environment: Default {
+    pub struct Environment {
         /// Name of an equirectangular image (Radiance HDR, OpenEXR, PNG, JPEG), relative to the
         /// folder of the scene file. The middle of the image is towards -z. An empty name selects
         /// the gradient.
@@ -31,7 +31,7 @@ description! {
         nadir: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Rotation of the image about the vertical, counter-clockwise seen from above.
         rotation: f64 = 0.0, in closed(-360.0, 360.0) "degrees";
-        skip map: Loaded<RadianceMap>;
+        loads map: Loaded<RadianceMap>;
     }
 }
 
@@ -67,11 +67,6 @@ impl Environment {
 impl LightDesc for Environment {
     fn form(&self) -> LightForm<'_> {
         LightForm::Environment(self)
-    }
-
-    /// Returns the error of reading the image, if there was one.
-    fn faults(&self) -> Vec<ValidationError> {
-        self.file().and_then(|_| self.map.fault()).into_iter().collect()
     }
 
     fn handles(&mut self) -> Handles<'_> {

@@ -28,27 +28,37 @@ pub use environment::{Environment, EnvironmentLight};
 pub use form::{EmissiveSurface, LightForm};
 pub use point::Point;
 pub use rectangle::RectangleLight;
-pub use registry::{Handles, KIND_KEYS, KINDS, LightDesc, LightKind, Placement, check_kinds};
+pub use registry::{Handles, KIND_KEYS, LightDesc, LightKind, Placement, check_kinds};
 pub use sample::LightSample;
 pub use sphere::SphereLight;
 pub use spot::{Spot, SpotCone, spot_factor};
 
-use crate::value::{Color, Description, Field, ValidationError, choices};
+use crate::value::{Color, Description, Field, ValidationError, choices, description};
 use glam::DVec3;
-use registry::LightTable;
 
-#[derive(Clone, Debug, PartialEq)]
-pub struct Light {
-    /// May be empty.
-    pub name: String,
-    pub kind: LightKind,
-    pub color: Color,
-    /// In the unit that depends on `kind`, `unit` and `falloff`.
-    pub intensity: f64,
-    pub unit: LightUnit,
-    pub falloff: Falloff,
-    pub visible: bool,
-    pub on: bool,
+description! {
+    /// A light: exactly one of the kinds, with a colour and an intensity.
+    pub struct Light {
+        /// Name of the light; every light has a different one.
+        name: String, or "a number";
+        /// Colour, by which the intensity is multiplied.
+        color: Color = [1.0, 1.0, 1.0], in LIGHT;
+        /// Sphere, rectangle or disk: radiance or power, as `unit` says. Environment: factor
+        /// of its radiance. Point or spot: radiant intensity [W/sr], of a spot inside its
+        /// inner cone, if `falloff` is `inverse-square`. Directional light, or point or spot
+        /// without falloff: the brightness of a white diffuse surface that faces the light.
+        intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
+        /// Unit of the intensity of a sphere, rectangle or disk.
+        unit: LightUnit = "radiance";
+        /// Falloff of a point or spot light with the distance.
+        falloff: Falloff = "none";
+        /// `false` hides a light with a size, or an environment, from the camera and from
+        /// mirrors. It still lights diffuse surfaces and makes highlights.
+        visible: bool = true;
+        /// `false` switches the light off.
+        on: bool = true;
+        flatten kind: LightKind, after 1;
+    }
 }
 
 choices! {
@@ -72,9 +82,14 @@ choices! {
 }
 
 /// Keys of a `[[light]]` table in scene files.
-pub const FIELDS: &[Field] = LightTable::FIELDS;
+pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
+    /// Creates a white light of intensity 1, without a name.
+    pub fn new(kind: impl Into<LightKind>) -> Self {
+        Self { kind: kind.into(), ..Self::default() }
+    }
+
     /// Returns the canonical form of the light, which must be valid.
     pub fn form(&self) -> LightForm<'_> {
         self.kind.form()
@@ -149,7 +164,6 @@ impl Light {
     }
 
     pub fn faults(&self) -> Vec<ValidationError> {
-        let kind_faults = self.kind.faults();
         let unused_key = if self.falloff == Falloff::InverseSquare && self.apex().is_none() {
             Some(ValidationError::new(
                 "falloff",
@@ -171,15 +185,15 @@ impl Light {
         } else {
             None
         };
-        let validator = LightTable::from(self).validator();
-        validator.and(unused_key).nested(self.kind.key(), kind_faults).errors()
+        self.validator().and(unused_key).errors()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Directional, Falloff, Light, LightKind, Point, Spot};
-    use crate::value::{Color, TomlValue};
+    use crate::Scene;
+    use crate::value::Color;
 
     fn keys(light: &Light) -> Vec<String> {
         light.faults().into_iter().map(|f| f.key).collect()
@@ -191,11 +205,14 @@ mod tests {
 
     #[test]
     fn light_has_exactly_one_kind() {
-        let read = |text: &str| Light::from_text(text).map_err(|error| error.message().to_string());
+        let read = |keys: &str| match Scene::parse(&format!("[[light]]\n{keys}"), "a.toml") {
+            Ok(mut scene) => Ok(scene.lights.remove(0)),
+            Err(errors) => Err(errors.messages()[0].found.clone()),
+        };
         assert_eq!(read("point.position = [0, 0, 0]"), Ok(point()));
         assert_eq!(read("intensity = 2.0"), Err("the light has no kind".to_string()));
         let both = "directional.direction = [0, -1, 0]\npoint.position = [0, 0, 0]";
-        assert_eq!(read(both), Err("both point and directional are given".to_string()));
+        assert_eq!(read(both), Err("both directional and point are given".to_string()));
     }
 
     #[test]
@@ -237,7 +254,7 @@ mod tests {
             intensity: -1.0,
             ..Light::new(Point { position: [f64::NAN, 0.0, 0.0] })
         };
-        assert_eq!(keys(&light), ["point.position", "color", "intensity"]);
+        assert_eq!(keys(&light), ["color", "intensity", "point.position"]);
         let light = Light::new(Directional::along([0.0; 3]));
         assert_eq!(keys(&light), ["directional.direction"]);
     }

@@ -1,7 +1,7 @@
 //! Spot light: its description, and the cone that limits its light.
 
 use crate::light::{Handles, LightDesc, LightForm, Placement};
-use crate::value::{ValidationError, description, unit};
+use crate::value::{Description, ValidationError, description, unit};
 use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
@@ -39,7 +39,7 @@ impl LightDesc for Spot {
                 "an inner_angle of at most outer_angle; both are measured from the axis",
             )
         });
-        fault.into_iter().collect()
+        self.validator().and(fault).errors()
     }
 
     fn handles(&mut self) -> Handles<'_> {

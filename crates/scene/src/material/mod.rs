@@ -29,7 +29,7 @@ use crate::value::{Color, Description, Field, ValidationError, choices, descript
 
 description! {
     /// A surface's material. Every key may be left out.
-    pub struct Material: Default {
+    pub struct Material {
         /// Body colour: multiplies the ambient and the diffuse part.
         color: Color = [0.8, 0.8, 0.8], in COEFFICIENT;
         /// Ambient coefficient k_a.
@@ -245,7 +245,8 @@ impl Material {
 #[cfg(test)]
 mod tests {
     use super::{FIELDS, Fresnel, Material, Metal};
-    use crate::value::{Color, TomlValue};
+    use crate::TomlText;
+    use crate::value::Color;
 
     #[test]
     fn documented_f0_of_metals_are_used() {

@@ -8,83 +8,70 @@
 //! ```
 
 use crate::asset::{AssetError, Image, Loaded};
-use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
-use crate::value::{choices, description, one_of};
+use crate::value::{Color, Description, choices, description, one_of};
 use std::sync::Arc;
 
-/// Texture that multiplies a material's colour.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Texture {
-    /// Image from a file: `texture.image` in scene files.
-    Image(ImageTexture),
-    /// Squares of two colours: `texture.checker` in scene files.
-    Checker(Checker),
+one_of! {
+    /// Texture that multiplies a material's colour.
+    pub enum Texture {
+        /// A PNG or JPEG image.
+        Image(ImageTexture) = "image";
+        /// Checkerboard of two colours; a repetition has two by two squares.
+        Checker(Checker) = "checker";
+    }
 }
 
 one_of! {
-    Texture { "image" => Image, "checker" => Checker }
-}
-
-/// Bump map that perturbs shading normals.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Bump {
-    /// Heights from an image: `bump.image` in scene files.
-    Image(HeightImage),
-}
-
-one_of! {
-    Bump { "image" => Image }
+    /// Bump map that perturbs shading normals.
+    pub enum Bump {
+        /// Heights from a PNG or JPEG image: black is low, white is high.
+        Image(HeightImage) = "image";
+    }
 }
 
 description! {
     /// A PNG or JPEG image.
-    pub struct ImageTexture: Default {
+    pub struct ImageTexture {
         /// Name of the file, relative to the folder of the scene file. An empty name means white.
         file: String = "";
-        /// Source of the coordinates u (to the right) and v (up).
-        mapping: Mapping = "auto";
-        /// Axis around or along which the mapping projects.
-        axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
-        /// Repetitions per unit of u and of v: larger numbers make the picture smaller.
-        scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
-        /// values move the image left and down.
-        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
         /// Interpolation between the centres of the pixels.
         filter: TextureFilter = "bilinear";
-        skip content: Loaded<Image>;
+        flatten placement: Placement, after 1;
+        loads content: Loaded<Image>;
     }
 }
 
 description! {
     /// Checkerboard of two colours; a repetition has two by two squares.
-    pub struct Checker: Default {
+    pub struct Checker {
         /// Colour of the square that begins at u = v = 0.
         even: Color = [1.0, 1.0, 1.0], in COEFFICIENT;
         /// Colour of the squares between those of the colour `even`.
         odd: Color = [0.1, 0.1, 0.1], in COEFFICIENT;
-        /// Source of the coordinates u (to the right) and v (up).
-        mapping: Mapping = "auto";
-        /// Axis around or along which the mapping projects.
-        axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
-        /// Repetitions per unit of u and of v: larger numbers make the picture smaller.
-        scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
-        /// values move the image left and down.
-        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
+        flatten placement: Placement, after 2;
     }
 }
 
 description! {
     /// Heights from a PNG or JPEG image: black is low, white is high.
-    pub struct HeightImage: Default {
+    pub struct HeightImage {
         /// Name of the file, relative to the folder of the scene file. An empty name means a flat
         /// surface.
         file: String = "";
         /// Height of white above black, before the object's transform; negative: depth below black.
         height: f64 = 0.02, in closed(-1e3, 1e3) "scene units";
+        /// Continuation of the image beyond its edges.
+        wrap: Wrap = "repeat";
+        flatten placement: Placement, after 2;
+        loads content: Loaded<Image>;
+    }
+}
+
+description! {
+    /// Placement of a texture on a shape: the keys that determine its texture coordinates.
+    pub struct Placement: Copy {
         /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
         /// Axis around or along which the mapping projects.
@@ -94,9 +81,6 @@ description! {
         /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
         /// values move the image left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
-        /// Continuation of the image beyond its edges.
-        wrap: Wrap = "repeat";
-        skip content: Loaded<Image>;
     }
 }
 
@@ -156,34 +140,6 @@ choices! {
     }
 }
 
-/// Placement of a texture on a shape: the keys that determine its texture coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placement {
-    /// Source of the texture coordinates.
-    pub mapping: Mapping,
-    /// Axis around or along which the mapping projects; `None` is its default axis.
-    pub axis: Option<Axis>,
-    /// Repetitions of the image per unit of u and of v.
-    pub scale: [f64; 2],
-    /// Offset that is added to the scaled texture coordinates, in repetitions.
-    pub offset: [f64; 2],
-}
-
-/// Implements `placement` for kinds of textures that have the keys of [`Placement`].
-macro_rules! placed {
-    ($($kind:ident),+) => {$(
-        impl $kind {
-            /// Returns the placement of the texture on shapes.
-            pub fn placement(&self) -> Placement {
-                let Self { mapping, axis, scale, offset, .. } = *self;
-                Placement { mapping, axis, scale, offset }
-            }
-        }
-    )+};
-}
-
-placed!(ImageTexture, Checker, HeightImage);
-
 impl ImageTexture {
     /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
@@ -199,42 +155,20 @@ impl HeightImage {
 }
 
 impl Texture {
-    /// Creates a texture with default parameters; `None` if there is no kind `key`.
-    pub fn new(key: &str) -> Option<Self> {
-        match key {
-            "image" => Some(Self::Image(ImageTexture::default())),
-            "checker" => Some(Self::Checker(Checker::default())),
-            _ => None,
-        }
-    }
-
-    /// Returns the key of the texture's kind in scene files.
-    pub fn key(&self) -> &'static str {
-        match self {
-            Self::Image(_) => "image",
-            Self::Checker(_) => "checker",
-        }
-    }
-
     /// Returns the placement of the texture on shapes.
-    pub fn placement(&self) -> Placement {
+    pub fn placement(&self) -> &Placement {
         match self {
-            Self::Image(image) => image.placement(),
-            Self::Checker(checker) => checker.placement(),
+            Self::Image(image) => &image.placement,
+            Self::Checker(checker) => &checker.placement,
         }
     }
 
-    /// Returns a texture of another kind with the same placement; `None` if there is no kind `key`.
-    pub fn changed(&self, key: &str) -> Option<Self> {
-        let Placement { mapping, axis, scale, offset } = self.placement();
-        Some(match Self::new(key)? {
-            Self::Image(image) => {
-                Self::Image(ImageTexture { mapping, axis, scale, offset, ..image })
-            }
-            Self::Checker(checker) => {
-                Self::Checker(Checker { mapping, axis, scale, offset, ..checker })
-            }
-        })
+    /// Returns [`Texture::placement`] as a mutable reference.
+    pub fn placement_mut(&mut self) -> &mut Placement {
+        match self {
+            Self::Image(image) => &mut image.placement,
+            Self::Checker(checker) => &mut checker.placement,
+        }
     }
 
     /// Returns `true` if the texture changes colours.
@@ -247,53 +181,16 @@ impl Texture {
 }
 
 impl Bump {
-    /// Creates a bump map with default parameters; `None` if there is no kind `key`.
-    pub fn new(key: &str) -> Option<Self> {
-        (key == "image").then(|| Self::Image(HeightImage::default()))
-    }
-
     /// Returns the placement of the bump map on shapes.
-    pub fn placement(&self) -> Placement {
+    pub fn placement(&self) -> &Placement {
         let Self::Image(image) = self;
-        image.placement()
+        &image.placement
     }
 
     /// Returns `true` if the bump map perturbs normals.
     pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
-    }
-}
-
-/// Keys of `texture` in scene files.
-const TEXTURE_KINDS: &[Field] = &[
-    Field::required("image", ImageTexture::TYPE, "", ImageTexture::DOC),
-    Field::required("checker", Checker::TYPE, "", Checker::DOC),
-];
-
-/// Keys of `bump` in scene files.
-const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
-
-impl FieldValue for Texture {
-    const TYPE: ValueType = ValueType::OneOf(TEXTURE_KINDS);
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let validator = match self {
-            Self::Image(image) => image.validator().and(image.content.fault()),
-            Self::Checker(checker) => checker.validator(),
-        };
-        let errors = validator.errors().into_iter();
-        errors.map(|error| error.prefixed(self.key()).prefixed(field.name)).collect()
-    }
-}
-
-impl FieldValue for Bump {
-    const TYPE: ValueType = ValueType::OneOf(BUMP_KINDS);
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        let Self::Image(image) = self;
-        let errors = image.validator().and(image.content.fault()).errors().into_iter();
-        errors.map(|error| error.prefixed("image").prefixed(field.name)).collect()
     }
 }
 

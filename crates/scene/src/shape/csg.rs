@@ -4,8 +4,7 @@
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, FieldValue, KeyNode, KeyValue, TomlValue, ValidationError, Validator,
-    ValueType, description,
+    Description, Field, FieldValue, ValidationError, Validator, ValueType, description,
 };
 use glam::DVec3;
 use zerkalo_kernel::primitive::{CsgSolid, CsgTree, Form};
@@ -30,14 +29,6 @@ impl FieldValue for Vec<CsgOperand> {
 
     fn errors(&self, _: &Field) -> Vec<ValidationError> {
         part_faults(self, 1)
-    }
-}
-
-/// List of parts, which edits can only read, as TOML.
-impl KeyNode for Vec<CsgOperand> {
-    fn value(&self) -> Option<KeyValue> {
-        let parts: Vec<_> = self.iter().map(|part| part.to_toml().to_string()).collect();
-        Some(KeyValue::Text(parts.join(", ")))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::asset::{AssetError, Loaded};
 use crate::shape::{Shape, ShapeDesc};
-use crate::value::{ValidationError, choices, description};
+use crate::value::{choices, description};
 use glam::{DAffine3, DVec3};
 use std::sync::{Arc, LazyLock};
 use zerkalo_kernel::primitive::{Form, Mesh, MeshForm, TriangleMesh};
@@ -11,12 +11,12 @@ description! {
     /// Triangles from a file: OBJ (with the colours of its MTL), PLY, STL, glTF or GLB. Placed by
     /// `transform`. The front of a triangle is the side from which its corners are in
     /// counter-clockwise order; the back is lit if the material is two-sided.
-    pub struct MeshDesc: Default {
+    pub struct MeshDesc {
         /// Name of the file, relative to the folder of the scene file. Empty: an icosahedron.
         file: String = "";
         /// Normals used for shading: curved triangles or flat ones.
         normals: Normals = "smooth";
-        skip content: Loaded<Mesh>;
+        loads content: Loaded<Mesh>;
     }
 }
 
@@ -95,10 +95,6 @@ impl ShapeDesc for MeshDesc {
             smooth: self.normals == Normals::Smooth,
             mesh,
         })
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.content.fault().into_iter().collect()
     }
 
     /// Creates the placeholder, because only a transform moves a mesh.

@@ -100,13 +100,6 @@ macro_rules! kinds {
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
 
         impl Shape {
-            /// Returns the key of the shape's kind.
-            pub fn key(&self) -> &'static str {
-                match self {
-                    $(Self::$kind(_) => $key,)+
-                }
-            }
-
             /// Converts the valid shape to its canonical form, without the object's transform.
             pub fn form(&self) -> Form {
                 match self {

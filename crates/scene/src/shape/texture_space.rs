@@ -81,8 +81,8 @@ pub(super) fn axes_rotated_y(degrees: f64) -> DMat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::TomlText;
     use crate::shape::{EXAMPLES, KINDS};
-    use crate::value::TomlValue;
 
     fn shape(text: &str) -> Shape {
         let table: toml::Table = text.parse().unwrap();

@@ -2,13 +2,14 @@
 
 use crate::shape::Shape;
 use crate::value::{
-    Field, FieldValue, KeyNode, KeyValue, NumberRange, ValidationError, ValueType, description,
-    one_of, sin_cos_degrees, single_value, unit,
+    Field, FieldValue, KeyValue, NumberRange, ValidationError, ValueType, description, one_of,
+    sin_cos_degrees, single_value, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::Form;
 
 one_of! {
+    #[derive(Copy)]
     /// One step of a transform. Angles are counter-clockwise for a viewer at whom the axis points.
     pub enum TransformOp {
         /// Moves by this vector.
@@ -37,11 +38,11 @@ description! {
 }
 
 /// Scaling by factors along x, y and z. In scene files one number means three equal factors.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
 single_value! {
-    [] Scale: ValueType::Factor,
+    Scale: ValueType::Factor,
         |scale| {
             let [x, y, z] = scale.0;
             KeyValue::Numbers(if x == y && y == z { vec![x] } else { vec![x, y, z] })
@@ -87,24 +88,6 @@ impl FieldValue for Vec<TransformOp> {
             step.faults().into_iter().map(move |error| error.prefixed(&key))
         };
         self.iter().enumerate().flat_map(errors).collect()
-    }
-}
-
-impl KeyNode for Vec<TransformOp> {
-    fn is_absent(&self) -> bool {
-        self.is_empty()
-    }
-
-    fn make_absent(&mut self) {
-        self.clear();
-    }
-
-    fn child(&self, index: &str) -> Option<&dyn KeyNode> {
-        Some(self.get(index.parse::<usize>().ok()?)?)
-    }
-
-    fn child_mut(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
-        Some(self.get_mut(index.parse::<usize>().ok()?)?)
     }
 }
 

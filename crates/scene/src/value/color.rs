@@ -1,7 +1,7 @@
 //! Linear RGB colours with the primaries of sRGB.
 
 /// Linear RGB colour without an upper bound.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Color(pub [f64; 3]);
 
 impl Color {

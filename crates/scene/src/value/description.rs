@@ -5,8 +5,9 @@ use crate::value::{
     Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
 };
 
-/// Table of a scene file: the keys that it has and the checks of their values.
-pub trait Description: KeyNode {
+/// Table of a scene file: the keys that it has and the checks of their values. Its `Default` has the
+/// declared defaults; required keys are 0, empty, or of the first kind.
+pub trait Description: KeyNode + Default {
     /// Help text of the table, for the dashboard and the documentation.
     const DOC: &'static str;
     /// Keys of this kind of table, in the order of their declaration.
@@ -17,7 +18,7 @@ pub trait Description: KeyNode {
 }
 
 /// Rust type to which the values of keys in scene files are converted.
-pub trait FieldValue: KeyNode {
+pub trait FieldValue: KeyNode + Default {
     /// Type of the values in scene files, without the range of a declaration.
     const TYPE: ValueType;
 
@@ -27,14 +28,6 @@ pub trait FieldValue: KeyNode {
             Some(KeyValue::Numbers(numbers)) => field.check(&numbers).into_iter().collect(),
             Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
         }
-    }
-
-    /// Converts `value`; `None` if it has another type, or if this is a table.
-    fn from_value(_value: KeyValue) -> Option<Self>
-    where
-        Self: Sized,
-    {
-        None
     }
 }
 
@@ -70,27 +63,22 @@ pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
 /// Implements the traits of values for types by their conversions to and from [`KeyValue`].
 macro_rules! single_value {
     ($(
-        [$($n:ident)?] $type:ty: $value_type:expr, $to:expr, $from:expr
+        $type:ty: $value_type:expr, $to:expr, $from:expr
         $(, absent $is_absent:expr, $make_absent:expr)?;
     )+) => {$(
-        impl $(<const $n: usize>)? $crate::value::FieldValue for $type {
+        impl $crate::value::FieldValue for $type {
             const TYPE: $crate::value::ValueType = $value_type;
-
-            fn from_value(value: $crate::value::KeyValue) -> Option<Self> {
-                let from: fn($crate::value::KeyValue) -> Option<Self> = $from;
-                from(value)
-            }
         }
 
-        impl $(<const $n: usize>)? $crate::value::KeyNode for $type {
+        impl $crate::value::KeyNode for $type {
             fn value(&self) -> Option<$crate::value::KeyValue> {
                 let to: fn(&Self) -> $crate::value::KeyValue = $to;
                 Some(to(self))
             }
 
             fn set_value(&mut self, value: $crate::value::KeyValue) -> bool {
-                let new = <Self as $crate::value::FieldValue>::from_value(value);
-                new.map(|new| *self = new).is_some()
+                let from: fn($crate::value::KeyValue) -> Option<Self> = $from;
+                from(value).map(|new| *self = new).is_some()
             }
 
             $(
@@ -105,36 +93,26 @@ macro_rules! single_value {
                 }
             )?
         }
-
-        impl $(<const $n: usize>)? $crate::value::TomlValue for $type {
-            fn from_toml(
-                value: &::toml::Spanned<::toml::de::DeValue>,
-            ) -> Result<Self, $crate::value::TomlError> {
-                $crate::value::read_single(value)
-            }
-
-            fn to_toml(&self) -> ::toml::Value {
-                $crate::value::write_single(self)
-            }
-        }
     )+};
 }
 pub(crate) use single_value;
 
 single_value! {
-    [] f64: ValueType::Number(NumberRange::FINITE),
+    f64: ValueType::Number(NumberRange::FINITE),
         |x| KeyValue::Numbers(vec![*x]), |value| value.numbers().map(|[x]| x);
-    [N] [f64; N]: ValueType::Numbers(N, NumberRange::FINITE),
+    [f64; 2]: ValueType::Numbers(2, NumberRange::FINITE),
         |list| KeyValue::Numbers(list.to_vec()), |value| value.numbers();
-    [] u32: ValueType::Whole(NumberRange::FINITE),
+    [f64; 3]: ValueType::Numbers(3, NumberRange::FINITE),
+        |list| KeyValue::Numbers(list.to_vec()), |value| value.numbers();
+    u32: ValueType::Whole(NumberRange::FINITE),
         |x| KeyValue::Numbers(vec![f64::from(*x)]), |value| value.wholes().map(|[x]| x);
-    [N] [u32; N]: ValueType::Wholes(N, NumberRange::FINITE),
+    [u32; 2]: ValueType::Wholes(2, NumberRange::FINITE),
         |list| KeyValue::Numbers(list.map(f64::from).to_vec()), |value| value.wholes();
-    [] Color: ValueType::Color(NumberRange::FINITE),
+    Color: ValueType::Color(NumberRange::FINITE),
         |color| KeyValue::Numbers(color.0.to_vec()), |value| value.numbers().map(Color);
-    [] bool: ValueType::Switch,
+    bool: ValueType::Switch,
         |on| KeyValue::Switch(*on), |value| value.switch();
-    [] String: ValueType::Text,
+    String: ValueType::Text,
         |text| KeyValue::Text(text.clone()), |value| value.text(),
         absent String::is_empty, String::clear;
 }
@@ -144,32 +122,6 @@ impl<T: FieldValue> FieldValue for Option<T> {
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         self.as_ref().map(|value| value.errors(field)).unwrap_or_default()
-    }
-}
-
-impl<T: FieldValue> KeyNode for Option<T> {
-    fn value(&self) -> Option<KeyValue> {
-        self.as_ref()?.value()
-    }
-
-    fn set_value(&mut self, value: KeyValue) -> bool {
-        T::from_value(value).map(|new| *self = Some(new)).is_some()
-    }
-
-    fn is_absent(&self) -> bool {
-        self.is_none()
-    }
-
-    fn make_absent(&mut self) {
-        *self = None;
-    }
-
-    fn child(&self, key: &str) -> Option<&dyn KeyNode> {
-        self.as_ref()?.child(key)
-    }
-
-    fn child_mut(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
-        self.as_mut()?.child_mut(key)
     }
 }
 
@@ -220,6 +172,12 @@ macro_rules! choices {
             pub const ALL: [Self; Self::CHOICES.len()] = [$(Self::$variant),+];
         }
 
+        impl Default for $name {
+            fn default() -> Self {
+                Self::ALL[0]
+            }
+        }
+
         impl $crate::value::FromWritten<&'static str> for $name {
             fn from_written(written: &'static str) -> Self {
                 match written {
@@ -230,7 +188,7 @@ macro_rules! choices {
         }
 
         $crate::value::single_value! {
-            [] $name: $crate::value::ValueType::Choice(Self::CHOICES),
+            $name: $crate::value::ValueType::Choice(Self::CHOICES),
                 |choice| $crate::value::KeyValue::Text(Self::CHOICES[*choice as usize].name.into()),
                 |value| match value.text()?.as_str() {
                     $($word => Some(Self::$variant),)+
@@ -242,7 +200,7 @@ macro_rules! choices {
 
 pub(crate) use choices;
 
-/// Declares a table of a scene file: struct, conversion, defaults, table of fields, range checks.
+/// Declares a table of a scene file: struct, defaults, table of fields, range checks, access by key.
 ///
 /// ```ignore
 /// description! {
@@ -256,34 +214,30 @@ pub(crate) use choices;
 ///         alpha: Option<f64>, or "roughness / (2 √2)", in SHARE;
 ///         /// A value type other than that of the Rust type.
 ///         normal: [f64; 3], as Direction;
-///         // A private field that files do not have.
-///         skip content: Option<Content>;
+///         // The keys of another table, as if they were declared here after the first three.
+///         flatten placement: Placement, after 3;
+///         // A private field for the content of the key `file`.
+///         loads content: Loaded<Image>;
 ///     }
 /// }
 /// ```
 ///
-/// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default`, and its `Default` consists of the declared defaults. A default whose Rust
-/// expression is not TOML is declared as `=> expression, written "TOML"`.
+/// Ranges are those of [`NumberRange`]. A default whose Rust expression is not TOML is declared as
+/// `=> expression, written "TOML"`.
 macro_rules! description {
-    ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [$($doc)+] [] $name $($fields)+);
-        $crate::value::description!(@default $name $($fields)+);
-    };
-    ($(#[doc = $doc:literal])+ pub struct $name:ident $(: $derived:ident)? { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct [$($doc)+] [$($derived)?] $name $($fields)+);
-    };
-
     (
-        @struct [$($doc:literal)+] [$($derived:ident)?] $name:ident
-        $(
-            $(#[doc = $help:literal])+
-            $key:ident: $type:ty $(= $default:expr)? $(=> $value:expr, written $toml:literal)?
-            $(, or $absent:literal)?
-            $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
-            $(, as $value_type:ident)?;
-        )+
-        $(skip $hidden:ident: $hidden_type:ty;)?
+        $(#[doc = $doc:literal])+
+        pub struct $name:ident $(: $derived:ident)? {
+            $(
+                $(#[doc = $help:literal])+
+                $key:ident: $type:ty $(= $default:expr)? $(=> $value:expr, written $toml:literal)?
+                $(, or $absent:literal)?
+                $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
+                $(, as $value_type:ident)?;
+            )+
+            $(flatten $flat:ident: $flat_type:ty, after $position:literal;)?
+            $(loads $hidden:ident: $hidden_type:ty;)?
+        }
     ) => {
         $(#[doc = $doc])+
         #[derive(Clone, Debug, PartialEq)]
@@ -296,117 +250,94 @@ macro_rules! description {
                 $(#[doc = concat!("\n\nDefault: none (", $absent, ").")])?
                 pub $key: $type,
             )+
+            $(
+                #[doc = concat!("Keys of [`", stringify!($flat_type), "`].")]
+                pub $flat: $flat_type,
+            )?
             $($hidden: $hidden_type,)?
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self {
+                    $($key: $crate::value::description!(
+                        @default
+                        $($crate::value::FromWritten::from_written($default))? $($value)?
+                    ),)+
+                    $($flat: Default::default(),)?
+                    $($hidden: Default::default(),)?
+                }
+            }
         }
 
         impl $crate::value::Description for $name {
             const DOC: &'static str = $crate::value::doc_text(concat!($($doc),+));
-            const FIELDS: &'static [$crate::value::Field] = &[$(
-                $crate::value::Field::required(
-                    stringify!($key),
-                    <$type as $crate::value::FieldValue>::TYPE
-                        $(.within($crate::value::NumberRange::$range $(($($bound),+))?))?
-                        $(.replaced($crate::value::ValueType::$value_type))?,
-                    concat!("" $($(, $unit)?)?),
-                    $crate::value::doc_text(concat!($($help),+)),
-                )
-                $(.with_default(stringify!($default)))?
-                $(.with_default($toml))?
-                $(.or($absent))?,
-            )+];
+            const FIELDS: &'static [$crate::value::Field] = {
+                const OWN: &[$crate::value::Field] = &[$(
+                    $crate::value::Field::required(
+                        stringify!($key),
+                        <$type as $crate::value::FieldValue>::TYPE
+                            $(.within($crate::value::NumberRange::$range $(($($bound),+))?))?
+                            $(.replaced($crate::value::ValueType::$value_type))?,
+                        concat!("" $($(, $unit)?)?),
+                        $crate::value::doc_text(concat!($($help),+)),
+                    )
+                    $(.with_default(stringify!($default)))?
+                    $(.with_default($toml))?
+                    $(.or($absent))?,
+                )+];
+                $crate::value::description!(@fields OWN $(, <$flat_type>::FIELDS, $position)?)
+            };
 
             fn validator(&self) -> $crate::value::Validator {
                 $crate::value::Validator::new(Self::FIELDS)
                     $(.field(stringify!($key), &self.$key))+
+                    $(.flattened(&self.$flat))?
+                    $(.and(self.$hidden.fault()))?
             }
         }
 
         impl $crate::value::KeyNode for $name {
-            fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
-                match key {
-                    $(stringify!($key) => Some(&self.$key),)+
-                    _ => None,
-                }
-            }
-
-            fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
-                match key {
-                    $(stringify!($key) => Some(&mut self.$key),)+
-                    _ => None,
-                }
-            }
-        }
-
-        impl $crate::value::TomlValue for $name {
-            fn from_toml(
-                value: &::toml::Spanned<::toml::de::DeValue>,
-            ) -> Result<Self, $crate::value::TomlError> {
-                let fields = <Self as $crate::value::Description>::FIELDS;
-                let table = $crate::value::TableReader::new(value, fields)?;
-                Ok(Self {
-                    $(
-                        $key: $crate::value::description!(
-                            @read table $key
-                            $(, $crate::value::FromWritten::from_written($default))?
-                            $(, $value)?
-                            $(, { let _ = $absent; Default::default() })?
-                        ),
-                    )+
-                    $($hidden: Default::default(),)?
-                })
-            }
-
-            fn to_toml(&self) -> ::toml::Value {
-                $crate::value::written(&[$(
-                    (
-                        stringify!($key),
-                        $crate::value::description!(@write (&self.$key) $($absent)?),
-                    ),
-                )+])
-            }
+            $crate::value::children! { $(stringify!($key) => $key),+ $(; $flat: $flat_type)? }
         }
     };
 
-    (@read $table:ident $key:ident) => {
-        $table.required(stringify!($key))?
-    };
-    (@read $table:ident $key:ident, $default:expr) => {
-        $table.optional(stringify!($key))?.unwrap_or_else(|| $default)
-    };
+    (@default) => { Default::default() };
+    (@default $default:expr) => { $default };
 
-    // Keys with `or` are written only if they are present.
-    (@write ($value:expr)) => {
-        Some($value as &dyn $crate::value::TomlValue)
-    };
-    (@write ($value:expr) $absent:literal) => {
-        (!$crate::value::KeyNode::is_absent($value))
-            .then_some($value as &dyn $crate::value::TomlValue)
-    };
-
-    (
-        @default $name:ident
-        $(
-            $(#[doc = $help:literal])+
-            $key:ident: $type:ty $(= $default:expr)? $(, or $absent:literal)?
-            $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
-            $(, as $value_type:ident)?;
-        )+
-        $(skip $hidden:ident: $hidden_type:ty;)?
-    ) => {
-        impl Default for $name {
-            fn default() -> Self {
-                Self {
-                    $($key: $crate::value::description!(@value $type $(= $default)?),)+
-                    $($hidden: Default::default(),)?
-                }
-            }
-        }
-    };
-    (@value $type:ty = $default:expr) => {
-        <$type as $crate::value::FromWritten<_>>::from_written($default)
-    };
-    (@value $type:ty) => {
-        <$type as Default>::default()
+    (@fields $own:ident) => { $own };
+    (@fields $own:ident, $flat:expr, $position:literal) => {
+        &$crate::value::inserted::<{ $own.len() + $flat.len() }>($own, $flat, $position)
     };
 }
 pub(crate) use description;
+
+/// Defines `child` and `child_mut` of a struct by the field of each key. The other keys are those of
+/// the field after the semicolon.
+macro_rules! children {
+    ($($key:pat => $field:ident),+ $(; $flat:ident: $flat_type:ty)?) => {
+        fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {
+            match key {
+                $($key => Some(&self.$field),)+
+                _ => None$(.or(self.$flat.child(key)))?,
+            }
+        }
+
+        fn child_mut(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+            match key {
+                $($key => Some(&mut self.$field),)+
+                _ => None$(.or(self.$flat.child_mut(key)))?,
+            }
+        }
+
+        $(
+            fn make_child(&mut self, key: &str) -> Option<&mut dyn $crate::value::KeyNode> {
+                match <$flat_type>::FIELDS.iter().any(|field| field.name == key) {
+                    true => self.$flat.make_child(key),
+                    false => self.child_mut(key),
+                }
+            }
+        )?
+    };
+}
+pub(crate) use children;

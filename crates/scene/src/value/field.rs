@@ -150,6 +150,27 @@ impl ValueType {
     }
 }
 
+/// Returns the fields `own` with the fields `inner` after the first `position` of them.
+pub(crate) const fn inserted<const N: usize>(
+    own: &[Field],
+    inner: &[Field],
+    position: usize,
+) -> [Field; N] {
+    let mut all = [own[0]; N];
+    let mut i = 0;
+    while i < N {
+        all[i] = if i < position {
+            own[i]
+        } else if i < position + inner.len() {
+            inner[i - position]
+        } else {
+            own[i - inner.len()]
+        };
+        i += 1;
+    }
+    all
+}
+
 const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
 
 /// Formats the type as a phrase that continues "Expected", such as `a number from 0 to 1`.

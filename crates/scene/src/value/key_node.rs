@@ -1,5 +1,7 @@
 //! Access to the values of a description by key path, such as `shape.sphere.radius`.
 
+use std::collections::BTreeMap;
+
 /// Value of a key as edits read and write it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyValue {
@@ -63,6 +65,99 @@ pub trait KeyNode {
     /// Returns [`KeyNode::child`] as a mutable reference.
     fn child_mut(&mut self, _key: &str) -> Option<&mut dyn KeyNode> {
         None
+    }
+
+    /// Returns [`KeyNode::child_mut`], which is created if it does not exist: the kind `key`, a new
+    /// entry of a list, or a table with this name.
+    fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        self.child_mut(key)
+    }
+
+    /// Returns the names of named tables.
+    fn names(&self) -> Vec<&str> {
+        Vec::new()
+    }
+}
+
+/// Optional value.
+impl<T: KeyNode + Default> KeyNode for Option<T> {
+    fn value(&self) -> Option<KeyValue> {
+        self.as_ref()?.value()
+    }
+
+    fn set_value(&mut self, value: KeyValue) -> bool {
+        let mut new = T::default();
+        let is_set = new.set_value(value);
+        if is_set {
+            *self = Some(new);
+        }
+        is_set
+    }
+
+    fn is_absent(&self) -> bool {
+        self.is_none()
+    }
+
+    fn make_absent(&mut self) {
+        *self = None;
+    }
+
+    fn child(&self, key: &str) -> Option<&dyn KeyNode> {
+        self.as_ref()?.child(key)
+    }
+
+    fn child_mut(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        self.as_mut()?.child_mut(key)
+    }
+
+    fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
+        self.get_or_insert_default().make_child(key)
+    }
+}
+
+/// List of tables.
+impl<T: KeyNode + Default> KeyNode for Vec<T> {
+    fn is_absent(&self) -> bool {
+        self.is_empty()
+    }
+
+    fn make_absent(&mut self) {
+        self.clear();
+    }
+
+    fn child(&self, index: &str) -> Option<&dyn KeyNode> {
+        Some(self.get(index.parse::<usize>().ok()?)?)
+    }
+
+    fn child_mut(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.get_mut(index.parse::<usize>().ok()?)?)
+    }
+
+    fn make_child(&mut self, index: &str) -> Option<&mut dyn KeyNode> {
+        if index.parse::<usize>().ok()? < self.len() {
+            return self.child_mut(index);
+        }
+        self.push(T::default());
+        Some(self.last_mut()?)
+    }
+}
+
+/// Named tables.
+impl<T: KeyNode + Default> KeyNode for BTreeMap<String, T> {
+    fn child(&self, name: &str) -> Option<&dyn KeyNode> {
+        Some(self.get(name)?)
+    }
+
+    fn child_mut(&mut self, name: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.get_mut(name)?)
+    }
+
+    fn make_child(&mut self, name: &str) -> Option<&mut dyn KeyNode> {
+        Some(self.entry(name.to_string()).or_default())
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.keys().map(String::as_str).collect()
     }
 }
 

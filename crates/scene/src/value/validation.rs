@@ -1,6 +1,6 @@
 //! Validation errors of a table in a scene file, without their position in the file.
 
-use crate::value::{Field, FieldValue, number};
+use crate::value::{Field, FieldValue, ValueType, number};
 
 /// Validation error of a table, without file, line and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,17 +19,19 @@ impl ValidationError {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// Returns the error with `outer.` before its key.
+    /// Returns the error with `outer.` before its key, unless one of the two is empty.
     pub fn prefixed(mut self, outer: &str) -> Self {
-        self.key =
-            if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
+        let parts = [outer, &self.key].into_iter().filter(|part| !part.is_empty());
+        self.key = parts.collect::<Vec<_>>().join(".");
         self
     }
 
-    /// Returns the error with `outer.` before its key and its phrase, such as `focus.distance is
-    /// -1`.
+    /// Returns the error with `outer.` before its key, and before its phrase if the key is not in an
+    /// inner table: `focus.distance is -1`.
     pub fn inside(mut self, outer: &str) -> Self {
-        self.found = format!("{outer}.{}", self.found);
+        if !self.key.contains('.') {
+            self.found = format!("{outer}.{}", self.found);
+        }
         self.prefixed(outer)
     }
 }
@@ -88,6 +90,12 @@ impl Validator {
                 "sizes and coordinates within a factor of 1e12 of each other",
             ));
         }
+        self
+    }
+
+    /// Adds the validation errors of `value`, whose keys are keys of this table.
+    pub fn flattened(mut self, value: &impl FieldValue) -> Self {
+        self.errors.extend(value.errors(&Field::required("", ValueType::Text, "", "")));
         self
     }
 
