@@ -160,7 +160,7 @@ impl Assets {
         let read = |key: &Key| {
             let needed = key.bytes.saturating_mul(mesh::parse_bytes(path));
             check_memory(path, "the file", needed)?;
-            let triangles = mesh::parse(self.read(path, key, MAX_BYTES)?)?;
+            let triangles = mesh::parse(&self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
             let tree = format!("the BVH of {count} triangles");
             check_memory(path, &tree, (count as u64).saturating_mul(BUILD_BYTES))?;

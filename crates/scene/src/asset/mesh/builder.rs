@@ -5,12 +5,11 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES};
 use glam::DVec3;
-use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
 use zerkalo_kernel::primitive::mesh::smooth;
 
 /// Largest absolute value of a mesh coordinate.
-const MAX_COORDINATE: f64 = 1e9;
+pub const MAX_COORDINATE: f64 = 1e9;
 
 /// Smallest valid extent of a mesh (length of the longest side of its bounding box). Products of
 /// three coordinates of this magnitude are not subnormal in single precision.
@@ -332,24 +331,5 @@ impl<'a> Builder<'a> {
         }
         uvs.resize(vertices, [0.0; 2]);
         Ok(Some(uvs))
-    }
-}
-
-/// Merges vertices with equal positions, for file formats that repeat the vertices of each
-/// triangle.
-#[derive(Default)]
-pub struct Welder {
-    known: HashMap<[u32; 3], u32>,
-}
-
-impl Welder {
-    /// Returns the index of the vertex at `position`. Adds the vertex to `builder` if it is new.
-    pub fn index(&mut self, position: [f32; 3], builder: &mut Builder) -> u32 {
-        // +0 and -0 are the same position.
-        let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
-        *self.known.entry(key).or_insert_with(|| {
-            builder.vertex(position.map(f64::from));
-            (builder.vertices() - 1) as u32
-        })
     }
 }

@@ -25,13 +25,13 @@ pub(super) fn parse_bytes(path: &Path) -> u64 {
 }
 
 /// Parses a mesh file in memory. The format is determined by the extension of the file name.
-pub(super) fn parse(source: FileContents) -> Result<TriangleMesh, AssetError> {
+pub(super) fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
     match extension.to_ascii_lowercase().as_str() {
-        "obj" => obj::parse(&source),
-        "ply" => ply::parse(&source),
+        "obj" => obj::parse(source),
+        "ply" => ply::parse(source),
         "stl" => stl::parse(source),
-        "gltf" | "glb" => gltf::parse(&source),
+        "gltf" | "glb" => gltf::parse(source),
         _ => {
             let found = format!("\"{extension}\" is not a kind of mesh file");
             Err(source.fault(found, "a name that ends in .obj, .ply, .stl, .gltf or .glb"))

@@ -1,17 +1,11 @@
 //! Wavefront OBJ files, with the diffuse colours of their MTL files.
-//!
-//! The `tobj` library parses the file. Before this, a first pass counts the vertices and checks the
-//! indices of faces, because the library reports no line numbers and computes with indices before
-//! it checks them.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::builder::Builder;
+use crate::asset::mesh::builder::{Builder, MAX_COORDINATE};
 use crate::value::truncated;
-use std::cell::RefCell;
-use std::io::{BufRead, Read};
-use std::path::{Path, PathBuf};
-use tobj::{LoadError, LoadOptions, MTLLoadResult};
+use std::collections::HashMap;
+use std::path::PathBuf;
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Largest size of an MTL file in bytes: 16 MiB.
@@ -25,281 +19,207 @@ const UNCOLORED: [f32; 3] = [1.0; 3];
 
 /// Parses an OBJ file.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
-    let mut builder = Builder::new(source);
-    builder.check_limits(check_faces(source)?, 0)?;
-    let libraries = RefCell::new(Libraries::default());
-    let options = LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
+    let mut parser = Parser {
+        source,
+        line: 0,
+        builder: Builder::new(source),
+        positions: Vec::new(),
+        uvs: Vec::new(),
+        normals: Vec::new(),
+        vertices: HashMap::new(),
+        libraries: Vec::new(),
+        colors: HashMap::new(),
+        material: None,
     };
-    let mut lines = Lines { rest: &source.bytes, line: 0, current: b"" };
-    let load = |path: &Path| libraries.borrow_mut().load(source, path);
-    let loaded = tobj::load_obj_buf(&mut lines, &options, load);
-    let (models, materials) = loaded.map_err(|error| {
-        let place = FileLocation::Line(lines.line);
-        source.error(place, describe(error), "a line of the OBJ format")
-    })?;
-    let libraries = libraries.into_inner();
-    if let Some(error) = libraries.error {
-        return Err(error);
+    for line in source.bytes.split(|byte| *byte == b'\n') {
+        parser.line += 1;
+        parser.parse_line(&String::from_utf8_lossy(line))?;
     }
-    libraries.notes.into_iter().for_each(|note| builder.note(note));
-    let materials = materials.unwrap_or_default();
-    for model in models {
-        let mesh = model.mesh;
-        if !materials.is_empty() {
-            let diffuse = mesh.material_id.and_then(|i| materials.get(i)?.diffuse);
-            builder.color(diffuse.map_or(UNCOLORED, |c| c.map(|x| x as f32)))?;
-        }
-        let base = builder.vertices();
-        let vertices = mesh.positions.len() / 3;
-        builder.reserve(vertices, mesh.indices.len() / 3)?;
-        // If only some corners of a model have normals, the list of normals is shorter than that of
-        // the vertices, and the library does not report which corners they belong to. Such a list
-        // is ignored. The same holds for texture coordinates.
-        let normals = (mesh.normals.len() == mesh.positions.len()).then_some(&mesh.normals);
-        let uvs = (mesh.texcoords.len() == 2 * vertices).then_some(&mesh.texcoords);
-        for (i, p) in mesh.positions.chunks_exact(3).enumerate() {
-            builder.vertex([p[0], p[1], p[2]]);
-            if let Some(n) = normals {
-                builder.normal([n[3 * i] as f32, n[3 * i + 1] as f32, n[3 * i + 2] as f32]);
-            }
-            if let Some(uv) = uvs {
-                builder.uv([uv[2 * i] as f32, uv[2 * i + 1] as f32]);
-            }
-        }
-        for t in mesh.indices.chunks_exact(3) {
-            let corners = [t[0], t[1], t[2]].map(|i| i + base as u32);
-            builder.triangle(corners, || FileLocation::Part(truncated(&model.name)))?;
-        }
-    }
-    builder.finish().map_err(|error| locate_vertex(source, error))
+    parser.builder.finish()
 }
 
-/// Returns a phrase that describes an error of the OBJ parser library.
-fn describe(error: LoadError) -> &'static str {
-    match error {
-        LoadError::ReadError => "this is not UTF-8 text",
-        LoadError::PositionParseError => "this vertex is not three numbers",
-        LoadError::ScalingByZeroError => "this vertex has the weight 0",
-        LoadError::NormalParseError => "this normal is not three numbers",
-        LoadError::TexcoordParseError => "these texture coordinates are not two numbers",
-        LoadError::FaceParseError => "this face is not a list of indices",
-        LoadError::InvalidPolygon => "a face above has fewer than three corners",
-        LoadError::MaterialParseError => "usemtl names no material",
-        LoadError::FaceVertexOutOfBounds => "a face above names a vertex that comes only below",
-        LoadError::FaceTexCoordOutOfBounds => {
-            "a face above names texture coordinates that come only below"
-        }
-        LoadError::FaceNormalOutOfBounds => "a face above names a normal that comes only below",
-        _ => "this line cannot be read",
-    }
-}
+/// Indices of the position, the texture coordinates and the normal of a vertex.
+type Corner = (usize, Option<usize>, Option<usize>);
 
-/// Returns the lines of a text with their numbers, counted from 1.
-fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    bytes.split(|b| *b == b'\n').zip(1..).map(|(line, n)| (n, line))
-}
-
-/// Returns the words of a line, separated by ASCII whitespace.
-fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
-}
-
-/// Checks that every index of a face in an OBJ file is valid, and that the number of triangles is
-/// within the limit. Returns the number of vertices.
-fn check_faces(source: &FileContents) -> Result<usize, AssetError> {
-    let list = |line: &[u8]| match words(line).next() {
-        Some(b"v") => Some(0),
-        Some(b"vt") => Some(1),
-        Some(b"vn") => Some(2),
-        _ => None,
-    };
-    let mut totals = [0usize; 3];
-    for (_, line) in numbered(&source.bytes) {
-        if let Some(list) = list(line) {
-            totals[list] += 1;
-        }
-    }
-    let mut so_far = [0usize; 3];
-    let mut triangles = 0usize;
-    let builder = Builder::new(source);
-    for (n, line) in numbered(&source.bytes) {
-        if let Some(list) = list(line) {
-            so_far[list] += 1;
-        }
-        let mut words = words(line);
-        if !matches!(words.next(), Some(b"f" | b"l")) {
-            continue;
-        }
-        let mut corners = 0usize;
-        for word in words {
-            corners += 1;
-            for (list, index) in word.split(|b| *b == b'/').take(3).enumerate() {
-                let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i128>().ok());
-                // Two cases need no check here. The library itself reports a word that is not a
-                // number. It ignores an index into an empty list of texture coordinates or normals.
-                let Some(index) = index.filter(|_| list == 0 || totals[list] > 0) else { continue };
-                let (from, to) = (-(so_far[list] as i128), totals[list] as i128);
-                if index == 0 || index < from || index > to {
-                    let what = ["vertex", "texture coordinate", "normal"][list];
-                    let found = format!("the face names {what} {index}");
-                    let expected = match to {
-                        0 => format!("a {what} that the file has; it has none"),
-                        _ => format!(
-                            "a {what} from 1 to {to}, or from {from} to -1 counted backwards"
-                        ),
-                    };
-                    return Err(source.error(FileLocation::Line(n), found, &expected));
-                }
-            }
-        }
-        triangles += corners.saturating_sub(2);
-        builder.check_limits(0, triangles)?;
-    }
-    Ok(totals[0])
-}
-
-/// Adds the line number to an error about the coordinates of a vertex in an OBJ file.
-fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
-    let bad = |line: &[u8]| {
-        let mut words = words(line);
-        words.next() == Some(b"v")
-            && words.take(3).any(|w| {
-                let x = std::str::from_utf8(w).ok().and_then(|w| w.parse::<f64>().ok());
-                x.is_some_and(|x| !(-1e9..=1e9).contains(&x))
-            })
-    };
-    let part = matches!(error.place, FileLocation::Part(_));
-    match numbered(&source.bytes).find(|(_, line)| part && bad(line)) {
-        Some((n, _)) => AssetError { place: FileLocation::Line(n), ..error },
-        None => error,
-    }
-}
-
-/// Reader of an OBJ file that passes one line at a time to the parser library and counts the lines.
-/// It removes vertex colours at the end of lines, because the library requires that either all
-/// vertices have colours or none.
-struct Lines<'a> {
-    rest: &'a [u8],
+struct Parser<'a> {
+    source: &'a FileContents,
+    /// Number of the present line, counted from 1.
     line: usize,
-    current: &'a [u8],
+    builder: Builder<'a>,
+    positions: Vec<[f64; 3]>,
+    uvs: Vec<[f64; 2]>,
+    normals: Vec<[f64; 3]>,
+    /// Vertices of the present object, group and material.
+    vertices: HashMap<Corner, u32>,
+    /// MTL files that have been read.
+    libraries: Vec<PathBuf>,
+    /// Diffuse colours of the materials, by name.
+    colors: HashMap<String, [f32; 3]>,
+    /// Name of the present material, if its MTL file has been read.
+    material: Option<String>,
 }
 
-impl Read for Lines<'_> {
-    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
-        let n = self.fill_buf()?.read(out)?;
-        self.consume(n);
-        Ok(n)
-    }
-}
-
-impl BufRead for Lines<'_> {
-    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
-        if self.current.is_empty() && !self.rest.is_empty() {
-            let end = self.rest.iter().position(|b| *b == b'\n');
-            let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |e| e + 1));
-            self.rest = rest;
-            self.line += 1;
-            // The colour at the end of the line is removed together with the newline. `consume`
-            // then passes the newline separately.
-            let colored = words(line).next() == Some(b"v") && words(line).count() > 5;
-            self.current = if colored { without_color(line) } else { line };
-        }
-        Ok(self.current)
-    }
-
-    fn consume(&mut self, n: usize) {
-        let cut = self.current.len() == n && self.current.last().is_some_and(|b| *b != b'\n');
-        self.current = &self.current[n..];
-        if cut && !self.rest.is_empty() {
-            self.current = b"\n";
-        }
-    }
-}
-
-/// Returns the beginning of an OBJ line, up to and including its fourth word. For a vertex these
-/// words are `v` and three coordinates.
-fn without_color(line: &[u8]) -> &[u8] {
-    let fourth = words(line).nth(3).unwrap_or_default();
-    let end = fourth.as_ptr() as usize - line.as_ptr() as usize + fourth.len();
-    &line[..end]
-}
-
-/// Results of loading the MTL files of an OBJ file: the paths of the files loaded so far, notes for
-/// the user, and the first error.
-#[derive(Default)]
-struct Libraries {
-    seen: Vec<PathBuf>,
-    notes: Vec<String>,
-    error: Option<AssetError>,
-}
-
-impl Libraries {
-    /// Returns the materials of the MTL file `name`, which the OBJ file `source` names. Returns no
-    /// materials in four cases:
-    ///
-    /// - `name` leads out of the folder; this is recorded as an error
-    /// - the file cannot be read; this is recorded as a note
-    /// - the file was loaded before
-    /// - [`MAX_MTL_FILES`] other files were loaded before
-    fn load(&mut self, source: &FileContents, name: &Path) -> MTLLoadResult {
-        let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
-        let name = name.to_string_lossy();
-        let Some(path) = source.resolve_relative(&name) else {
-            let error = source.fault(
-                format!("mtllib names \"{}\"", truncated(&name)),
-                "a relative path without \"..\", to a file in the same folder or below",
-            );
-            self.error.get_or_insert(error);
-            return nothing();
-        };
-        if self.seen.contains(&path) || self.seen.len() >= MAX_MTL_FILES {
-            return nothing();
-        }
-        self.seen.push(path.clone());
-        match FileContents::read(&path, MAX_MTL_BYTES) {
-            Ok(library) => tobj::load_mtl_buf(&mut diffuse_colors(&library.bytes).as_bytes()),
-            Err(error) => {
-                self.notes.push(format!("no colours: {}", error.what()));
-                nothing()
+impl Parser<'_> {
+    fn parse_line(&mut self, line: &str) -> Result<(), AssetError> {
+        let (keyword, rest) = keyword(line);
+        match keyword {
+            "v" => {
+                let position = position(rest);
+                let position = position.ok_or_else(|| self.wrong("vertex is not three numbers"))?;
+                if !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
+                    let found = format!("a vertex lies at {position:?}");
+                    return Err(self.error(found, "coordinates from -1e9 to 1e9"));
+                }
+                self.positions.push(position);
             }
-        }
-    }
-}
-
-/// Returns the content of an MTL file reduced to the names and diffuse colours of materials, with
-/// three finite numbers per colour. The parser library panics on some of the other lines, which are
-/// not used.
-fn diffuse_colors(bytes: &[u8]) -> String {
-    let mut out = String::new();
-    for (_, line) in numbered(bytes) {
-        let line = String::from_utf8_lossy(line);
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("newmtl") if words.next().is_some() => {
-                out += line.trim();
-                out.push('\n');
+            "vt" => {
+                let wrong = || self.wrong("texture coordinate is not two numbers");
+                self.uvs.push(numbers(rest).ok_or_else(wrong)?);
             }
-            Some("Kd") => {
-                let numbers: Vec<f64> = words
-                    .map_while(|w| w.parse().ok())
-                    .filter(|x: &f64| (0.0..=1e6).contains(x))
-                    .take(3)
-                    .collect();
-                let color = match numbers[..] {
-                    [r, g, b] => [r, g, b],
-                    [grey] => [grey; 3],
-                    _ => continue,
-                };
-                out += &format!("Kd {} {} {}\n", color[0], color[1], color[2]);
+            "vn" => {
+                let wrong = || self.wrong("normal is not three numbers");
+                self.normals.push(numbers(rest).ok_or_else(wrong)?);
             }
+            "f" => self.add_face(rest)?,
+            "o" | "g" => self.vertices.clear(),
+            "usemtl" => {
+                let material = self.colors.contains_key(rest).then(|| rest.to_string());
+                if material != self.material {
+                    self.vertices.clear();
+                }
+                self.material = material;
+            }
+            "mtllib" => self.read_library(rest)?,
             _ => {}
         }
+        Ok(())
     }
-    out
+
+    fn error(&self, found: String, expected: &str) -> AssetError {
+        self.source.error(FileLocation::Line(self.line), found, expected)
+    }
+
+    fn wrong(&self, found: &str) -> AssetError {
+        self.error(format!("this {found}"), "a line of the OBJ format")
+    }
+
+    /// Adds a polygon. Each word names a corner by one to three indices: `1`, `1/2`, `1//3` or
+    /// `1/2/3`.
+    fn add_face(&mut self, words: &str) -> Result<(), AssetError> {
+        if !self.colors.is_empty() {
+            let color = self.material.as_ref().and_then(|name| self.colors.get(name));
+            self.builder.color(*color.unwrap_or(&UNCOLORED))?;
+        }
+        let mut corners = Vec::new();
+        for word in words.split_whitespace() {
+            let mut indices = word.split('/');
+            let mut next = |what, count| self.index(indices.next().unwrap_or(""), what, count);
+            let position = next("vertex", self.positions.len())?;
+            let uv = next("texture coordinate", self.uvs.len())?;
+            let normal = next("normal", self.normals.len())?;
+            let position = position.ok_or_else(|| self.wrong("face is not a list of indices"))?;
+            corners.push(self.vertex((position, uv, normal)));
+        }
+        self.builder.polygon(&corners, || FileLocation::Line(self.line))
+    }
+
+    /// Parses the index of one of the `count` entries so far: from 1, or from -1 backwards. Returns
+    /// `None` if `word` is empty, or if there are none of these entries.
+    fn index(&self, word: &str, what: &str, count: usize) -> Result<Option<usize>, AssetError> {
+        if word.is_empty() || count == 0 && what != "vertex" {
+            return Ok(None);
+        }
+        let index: i64 = word.parse().map_err(|_| self.wrong("face is not a list of indices"))?;
+        let from_0 = if index > 0 { index - 1 } else { index.saturating_add(count as i64) };
+        match usize::try_from(from_0).ok().filter(|i| *i < count) {
+            Some(index) => Ok(Some(index)),
+            None => {
+                let found = format!("the face names {what} {index}");
+                let expected = format!("a {what} above: 1 to {count}, or -{count} to -1 backwards");
+                Err(self.error(found, &expected))
+            }
+        }
+    }
+
+    /// Returns the index of a vertex of the mesh, which is added if it is new.
+    fn vertex(&mut self, corner: Corner) -> u32 {
+        *self.vertices.entry(corner).or_insert_with(|| {
+            let (position, uv, normal) = corner;
+            self.builder.vertex(self.positions[position]);
+            if let Some(i) = normal {
+                self.builder.normal(self.normals[i].map(|x| x as f32));
+            }
+            if let Some(i) = uv {
+                self.builder.uv(self.uvs[i].map(|x| x as f32));
+            }
+            (self.builder.vertices() - 1) as u32
+        })
+    }
+
+    /// Reads the diffuse colours of the MTL file `name`. If the file cannot be read, this is noted.
+    /// Fails if the name leads out of the folder.
+    fn read_library(&mut self, name: &str) -> Result<(), AssetError> {
+        let Some(path) = self.source.resolve_relative(name) else {
+            return Err(self.error(
+                format!("mtllib names \"{}\"", truncated(name)),
+                "a relative path without \"..\", to a file in the same folder or below",
+            ));
+        };
+        if self.libraries.contains(&path) || self.libraries.len() >= MAX_MTL_FILES {
+            return Ok(());
+        }
+        match FileContents::read(&path, MAX_MTL_BYTES) {
+            Ok(library) => self.add_colors(&String::from_utf8_lossy(&library.bytes)),
+            Err(error) => self.builder.note(format!("no colours: {}", error.what())),
+        }
+        self.libraries.push(path);
+        Ok(())
+    }
+
+    fn add_colors(&mut self, library: &str) {
+        let mut name = "";
+        for line in library.lines() {
+            match keyword(line) {
+                ("newmtl", new) => {
+                    name = new;
+                    self.colors.insert(name.to_string(), UNCOLORED);
+                }
+                ("Kd", words) => {
+                    let grey = || numbers(words).map(|[grey]| [grey; 3]);
+                    let color: Option<[f64; 3]> = numbers(words).or_else(grey);
+                    let color = color.filter(|c| c.iter().all(|x| (0.0..=1e6).contains(x)));
+                    if let (Some(color), Some(known)) = (color, self.colors.get_mut(name)) {
+                        *known = color.map(|x| x as f32);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Returns the first word of a line, and the rest without the spaces around it.
+fn keyword(line: &str) -> (&str, &str) {
+    let line = line.trim();
+    let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    (keyword, rest.trim())
+}
+
+/// Parses the first `N` words as numbers.
+fn numbers<const N: usize>(words: &str) -> Option<[f64; N]> {
+    let numbers = words.split_whitespace().take(N).map(|word| word.parse().ok());
+    numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
+}
+
+/// Parses three coordinates, which are divided by the weight of the vertex if one follows. Further
+/// numbers are a colour, which is ignored.
+fn position(words: &str) -> Option<[f64; 3]> {
+    let position: [f64; 3] = numbers(words)?;
+    let weight = match words.split_whitespace().count() {
+        4 => numbers::<4>(words)?[3],
+        _ => 1.0,
+    };
+    (weight != 0.0).then(|| position.map(|x| x / weight))
 }
 
 #[cfg(test)]

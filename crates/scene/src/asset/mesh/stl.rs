@@ -4,8 +4,8 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::mesh::builder::{Builder, Welder};
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use crate::asset::mesh::builder::Builder;
+use std::collections::HashMap;
 use zerkalo_kernel::primitive::TriangleMesh;
 
 /// Number of bytes of the header of a binary STL file.
@@ -14,103 +14,101 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Parses an STL file.
-pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
-    let (text, announced) = normalise(&mut source)?;
-    let mut builder = Builder::new(&source);
-    builder.check_limits(0, announced)?;
-    let mut welder = Welder::default();
-    let mut reader = ByLine { cursor: Cursor::new(&source.bytes), line: 0, text };
-    let wrong = |error: std::io::Error, place| {
-        source.error(place, format!("the file cannot be read: {error}"), "an STL file")
-    };
-    let triangles = stl_io::create_stl_reader(&mut reader)
-        .map_err(|error| wrong(error, FileLocation::Whole))?;
-    let mut failure = None;
-    for (n, triangle) in triangles.enumerate() {
-        let triangle = match triangle {
-            Ok(triangle) => triangle,
-            Err(error) => {
-                failure = Some((error, n));
-                break;
-            }
-        };
-        let place = || FileLocation::Part(format!("triangle {n} (from 0)"));
-        let corners = triangle.vertices.map(|v| v.0);
-        if corners.iter().flatten().any(|x| !x.is_finite()) {
-            return Err(source.error(place(), "a corner is not finite", "finite coordinates"));
-        }
-        builder.check_limits(3, 1)?;
-        let corners = corners.map(|c| welder.index(c, &mut builder));
-        builder.triangle(corners, place)?;
+pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
+    let mut parser = Parser { source, builder: Builder::new(source), known: HashMap::new() };
+    let announced =
+        source.bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let size = announced.map(|count| HEADER as u64 + TRIANGLE as u64 * u64::from(count));
+    let length = source.bytes.len() as u64;
+    // Some binary files begin with `solid` like a text file.
+    let has_zeros = source.bytes.iter().take(HEADER).any(|byte| *byte == 0);
+    if source.bytes.starts_with(b"solid") && size != Some(length) && !has_zeros {
+        parser.parse_text()?;
+        return parser.builder.finish();
     }
-    if let Some((error, n)) = failure {
-        let line = FileLocation::Line(reader.line);
-        return Err(wrong(
-            error,
-            if text { line } else { FileLocation::Byte(HEADER + TRIANGLE * n) },
-        ));
-    }
-    drop(welder);
-    builder.finish()
-}
-
-/// Changes the beginning of the file so that `stl_io` takes text for text and binary for binary. Returns whether it
-/// is a text file, and the number of triangles in the header of a binary one.
-fn normalise(source: &mut FileContents) -> Result<(bool, usize), AssetError> {
-    let bytes = &mut source.bytes;
-    let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let fits = announced
-        .is_some_and(|n| bytes.len() as u64 >= HEADER as u64 + TRIANGLE as u64 * u64::from(n));
-    let exact = fits && announced.is_some_and(|n| bytes.len() == HEADER + TRIANGLE * n as usize);
-    let zeros = bytes.iter().take(HEADER).any(|b| *b == 0);
-    let text = bytes.starts_with(b"solid") && !exact && !zeros;
-    if text {
-        // The library requires a space after `solid`; the format does not.
-        if bytes.get(5) != Some(&b' ') {
-            bytes.insert(5, b' ');
-        }
-        return Ok((true, 0));
-    }
-    let Some(announced) = announced else {
-        let found = format!("the file has {} bytes and does not begin with \"solid\"", bytes.len());
+    let (Some(announced), Some(size)) = (announced, size) else {
+        let found = format!("the file has {length} bytes and does not begin with \"solid\"");
         return Err(source.fault(found, "an STL file"));
     };
-    if !fits {
+    if size > length {
         let found = format!("the header declares {announced} triangles, more than the file holds");
-        let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
+        let expected = format!("at most {}", (source.bytes.len() - HEADER) / TRIANGLE);
         return Err(source.error(FileLocation::Byte(80), found, &expected));
     }
-    // Some binary files start with `solid` like a text file. The first byte is overwritten, so that
-    // the library does not read such a file as text.
-    bytes[0] = b' ';
-    Ok((false, announced as usize))
+    parser.parse_binary(announced as usize)?;
+    parser.builder.finish()
 }
 
-/// Reader of an STL file that counts lines. Each read of a text file returns at most one line.
-struct ByLine<'a> {
-    cursor: Cursor<&'a Vec<u8>>,
-    line: usize,
-    text: bool,
+struct Parser<'a> {
+    source: &'a FileContents,
+    builder: Builder<'a>,
+    /// Vertices by the bits of their coordinates.
+    known: HashMap<[u32; 3], u32>,
 }
 
-impl Read for ByLine<'_> {
-    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
-        if !self.text {
-            return self.cursor.read(out);
+impl Parser<'_> {
+    fn parse_text(&mut self) -> Result<(), AssetError> {
+        let mut corners: Vec<[f32; 3]> = Vec::new();
+        for (line, number) in self.source.bytes.split(|byte| *byte == b'\n').zip(1..) {
+            let line = String::from_utf8_lossy(line);
+            let mut words = line.split_whitespace();
+            let wrong = |found: &str| {
+                self.source.error(FileLocation::Line(number), found, "a line of the STL format")
+            };
+            match words.next() {
+                Some("vertex") => {
+                    let numbers = words.map(|word| word.parse().ok()).collect::<Option<Vec<_>>>();
+                    let corner = numbers.and_then(|numbers| numbers.try_into().ok());
+                    let wrong = || wrong("this vertex is not three numbers");
+                    corners.push(corner.ok_or_else(wrong)?);
+                }
+                Some("endfacet") => {
+                    let Ok(triangle) = std::mem::take(&mut corners).try_into() else {
+                        return Err(wrong("this facet does not have three corners"));
+                    };
+                    self.add(triangle, || FileLocation::Line(number))?;
+                }
+                Some("solid" | "facet" | "outer" | "endloop" | "endsolid") | None => {}
+                Some(_) => return Err(wrong("this line cannot be read")),
+            }
         }
-        let bytes = self.cursor.get_ref();
-        let remaining = &bytes[(self.cursor.position() as usize).min(bytes.len())..];
-        let end = remaining.iter().take(out.len()).position(|b| *b == b'\n').map(|e| e + 1);
-        self.line += usize::from(end.is_some() || remaining.len() <= out.len());
-        let n = end.unwrap_or(out.len().min(remaining.len()));
-        self.cursor.read(&mut out[..n])
+        match corners.is_empty() {
+            true => Ok(()),
+            false => Err(self.source.fault("the file ends in a facet", "a whole file")),
+        }
     }
-}
 
-impl Seek for ByLine<'_> {
-    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-        self.line = 0;
-        self.cursor.seek(to)
+    fn parse_binary(&mut self, count: usize) -> Result<(), AssetError> {
+        self.builder.check_limits(0, count)?;
+        let triangles = self.source.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
+        for (n, bytes) in triangles.enumerate() {
+            // The first three numbers are the normal.
+            let numbers = bytes[12..48].as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
+            let numbers: Vec<f32> = numbers.collect();
+            let corners = [0, 3, 6].map(|i| [numbers[i], numbers[i + 1], numbers[i + 2]]);
+            self.add(corners, || FileLocation::Part(format!("triangle {n} (from 0)")))?;
+        }
+        Ok(())
+    }
+
+    fn add(
+        &mut self,
+        corners: [[f32; 3]; 3],
+        place: impl Fn() -> FileLocation,
+    ) -> Result<(), AssetError> {
+        if corners.iter().flatten().any(|x| !x.is_finite()) {
+            return Err(self.source.error(place(), "a corner is not finite", "finite coordinates"));
+        }
+        self.builder.check_limits(3, 1)?;
+        let corners = corners.map(|position| {
+            // +0 and -0 are the same position.
+            let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
+            *self.known.entry(key).or_insert_with(|| {
+                self.builder.vertex(position.map(f64::from));
+                (self.builder.vertices() - 1) as u32
+            })
+        });
+        self.builder.triangle(corners, place)
     }
 }
 
@@ -120,7 +118,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn read(bytes: &[u8]) -> Result<TriangleMesh, AssetError> {
-        parse(FileContents { path: PathBuf::from("a.stl"), bytes: bytes.to_vec() })
+        parse(&FileContents { path: PathBuf::from("a.stl"), bytes: bytes.to_vec() })
     }
 
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
