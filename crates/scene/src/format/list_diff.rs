@@ -1,7 +1,8 @@
 //! Alignment of a list of a scene file before and after an edit.
 
+use crate::value::fnv1a64;
 use std::collections::{BTreeSet, HashMap};
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::Range;
 use toml::Value;
 
 /// Returns for each entry of `new` the index of its origin in `old`, or `None` for an added entry.
@@ -12,13 +13,12 @@ use toml::Value;
 /// - the first old entry, between the origins of the neighbours, that differs only in the name, or
 ///   that has no name either.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
+    let all = 0..old.len();
     let mut free = Free::of(old);
-    let mut from = vec![None; new.len()];
-    for (origin, entry) in from.iter_mut().zip(new) {
-        *origin = free.take_named(entry);
-    }
-    for (origin, entry) in from.iter_mut().zip(new).filter(|(origin, _)| origin.is_none()) {
-        *origin = free.take_equal(entry);
+    let new: Vec<Entry> = new.iter().map(Entry::of).collect();
+    let mut from: Vec<_> = new.iter().map(|entry| free.take(&[entry.name()], &all)).collect();
+    for (origin, entry) in from.iter_mut().zip(&new).filter(|(origin, _)| origin.is_none()) {
+        *origin = free.take(&[entry.nameless_content()], &all);
     }
     // Origin of the first later entry that has one, or the length of `old`.
     let mut next = vec![old.len(); new.len()];
@@ -28,132 +28,91 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut after = 0;
     for (j, entry) in new.iter().enumerate() {
         if from[j].is_none() && after < next[j] {
-            from[j] = free.take_edited(entry, after, next[j]);
+            from[j] = free.take(&[entry.content(), entry.nameless()], &(after..next[j]));
         }
         after = from[j].map_or(after, |i| i + 1);
     }
     from
 }
 
-/// Old entries that are not an origin yet.
-struct Free<'a> {
-    entries: &'a [Value],
-    named: HashMap<&'a str, BTreeSet<usize>>,
-    nameless: BTreeSet<usize>,
-    /// Indices of the unmatched old entries, by the hash of the whole entry.
-    equal: HashMap<u64, BTreeSet<usize>>,
-    /// Indices of the unmatched old entries, by the hash of the entry without its name.
-    equal_but_name: HashMap<u64, BTreeSet<usize>>,
+/// Entry of a list: its name, and the hash of the text of its other keys.
+struct Entry {
+    name: Option<String>,
+    content: u64,
 }
 
-impl<'a> Free<'a> {
-    fn of(entries: &'a [Value]) -> Self {
-        let mut free = Self {
-            entries,
-            named: HashMap::new(),
-            nameless: BTreeSet::new(),
-            equal: HashMap::new(),
-            equal_but_name: HashMap::new(),
-        };
-        for (i, entry) in entries.iter().enumerate() {
-            match name(entry) {
-                Some(name) => free.named.entry(name).or_default().insert(i),
-                None => free.nameless.insert(i),
-            };
-            free.equal.entry(hash(entry, true)).or_default().insert(i);
-            free.equal_but_name.entry(hash(entry, false)).or_default().insert(i);
-        }
-        free
-    }
-
-    /// Takes the first old entry with the name of `entry`.
-    fn take_named(&mut self, entry: &Value) -> Option<usize> {
-        let first = *self.named.get(name(entry)?)?.first()?;
-        Some(self.take(first))
-    }
-
-    /// Takes the first old entry that is equal to `entry`.
-    fn take_equal(&mut self, entry: &Value) -> Option<usize> {
-        let alike = self.equal.get(&hash(entry, true))?;
-        let first = alike.iter().copied().find(|i| self.entries[*i] == *entry)?;
-        Some(self.take(first))
-    }
-
-    /// Takes the first old entry in `after..before` that differs only in its name, or has none
-    /// either.
-    fn take_edited(&mut self, entry: &Value, after: usize, before: usize) -> Option<usize> {
-        let renamed = self.equal_but_name.get(&hash(entry, false)).and_then(|alike| {
-            let mut between = alike.range(after..before).copied();
-            between.find(|i| is_equal_but_name(&self.entries[*i], entry))
-        });
-        let nameless = match name(entry) {
-            None => self.nameless.range(after..before).next().copied(),
-            Some(_) => None,
-        };
-        let first = renamed.into_iter().chain(nameless).min()?;
-        Some(self.take(first))
-    }
-
-    fn take(&mut self, i: usize) -> usize {
-        let entry = &self.entries[i];
-        self.nameless.remove(&i);
-        let named = name(entry).and_then(|name| self.named.get_mut(name));
-        let equal = self.equal.get_mut(&hash(entry, true));
-        let equal_but_name = self.equal_but_name.get_mut(&hash(entry, false));
-        for set in [named, equal, equal_but_name].into_iter().flatten() {
-            set.remove(&i);
-        }
-        i
-    }
+/// Property by which an origin is found.
+#[derive(PartialEq, Eq, Hash)]
+enum Property {
+    Name(String),
+    Nameless,
+    Content(u64),
+    NamelessContent(u64),
 }
 
-fn name(entry: &Value) -> Option<&str> {
-    entry.get("name").and_then(Value::as_str)
-}
-
-fn is_equal_but_name(a: &Value, b: &Value) -> bool {
-    let without_name = |entry: &Value| {
+impl Entry {
+    fn of(entry: &Value) -> Self {
         let mut table = entry.as_table().cloned().unwrap_or_default();
-        table.remove("name");
-        table
-    };
-    without_name(a) == without_name(b)
-}
-
-/// Returns the hash of a list entry, with or without its name. Equal entries have the same hash.
-fn hash(entry: &Value, with_name: bool) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    let name = if with_name { name(entry) } else { None };
-    name.hash(&mut hasher);
-    for (key, value) in entry.as_table().into_iter().flatten().filter(|(key, _)| *key != "name") {
-        key.hash(&mut hasher);
-        hash_value(value, &mut hasher);
+        let name = table.remove("name").and_then(|name| name.as_str().map(str::to_string));
+        Self { name, content: fnv1a64(table.to_string().as_bytes()) }
     }
-    hasher.finish()
+
+    fn name(&self) -> Option<Property> {
+        self.name.clone().map(Property::Name)
+    }
+
+    fn nameless(&self) -> Option<Property> {
+        self.name.is_none().then_some(Property::Nameless)
+    }
+
+    fn content(&self) -> Option<Property> {
+        Some(Property::Content(self.content))
+    }
+
+    fn nameless_content(&self) -> Option<Property> {
+        self.name.is_none().then_some(Property::NamelessContent(self.content))
+    }
+
+    fn properties(&self) -> impl Iterator<Item = Property> {
+        [self.name(), self.nameless(), self.content(), self.nameless_content()]
+            .into_iter()
+            .flatten()
+    }
 }
 
-fn hash_value(value: &Value, hasher: &mut DefaultHasher) {
-    match value {
-        Value::String(text) => text.hash(hasher),
-        Value::Integer(number) => number.hash(hasher),
-        // Because -0 equals 0, both must have the same hash. Adding 0 converts -0 to 0.
-        Value::Float(number) => (number + 0.0).to_bits().hash(hasher),
-        Value::Boolean(is_set) => is_set.hash(hasher),
-        Value::Datetime(time) => time.to_string().hash(hasher),
-        Value::Array(values) => values.iter().for_each(|value| hash_value(value, hasher)),
-        Value::Table(table) => {
-            for (key, value) in table {
-                key.hash(hasher);
-                hash_value(value, hasher);
-            }
+/// Old entries that are not an origin yet.
+struct Free {
+    entries: Vec<Entry>,
+    /// Indices of the entries with each property.
+    indices: HashMap<Property, BTreeSet<usize>>,
+}
+
+impl Free {
+    fn of(entries: &[Value]) -> Self {
+        let entries: Vec<_> = entries.iter().map(Entry::of).collect();
+        let mut indices: HashMap<_, BTreeSet<_>> = HashMap::new();
+        for (i, entry) in entries.iter().enumerate() {
+            entry
+                .properties()
+                .for_each(|property| drop(indices.entry(property).or_default().insert(i)));
         }
+        Self { entries, indices }
+    }
+
+    /// Takes the first old entry in `range` that has one of the properties.
+    fn take(&mut self, wanted: &[Option<Property>], range: &Range<usize>) -> Option<usize> {
+        let sets = wanted.iter().flatten().filter_map(|property| self.indices.get(property));
+        let first = sets.filter_map(|set| set.range(range.clone()).next().copied()).min()?;
+        for property in self.entries[first].properties() {
+            self.indices.entry(property).or_default().remove(&first);
+        }
+        Some(first)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::ops::Range;
 
     /// Returns a list of tables, one for each word of `text`. A word is `name/value`; the name may
     /// be empty.
@@ -192,6 +151,10 @@ mod tests {
         }
     }
 
+    fn name(entry: &Value) -> Option<&str> {
+        entry.get("name")?.as_str()
+    }
+
     /// Returns, for each entry of `new`, the index of its origin in `old`, by the rule of
     /// [`align`]. Searches the list of old entries for each new one, in quadratic time.
     fn align_by_search(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
@@ -213,7 +176,7 @@ mod tests {
             let before = from[j..].iter().find_map(|i| *i).unwrap_or(old.len());
             from[j] = find(&from, after..before.max(after), &|i| {
                 let is_nameless = name(&old[i]).is_none() && name(&new[j]).is_none();
-                is_nameless || is_equal_but_name(&old[i], &new[j])
+                is_nameless || Entry::of(&old[i]).content == Entry::of(&new[j]).content
             });
         }
         from
