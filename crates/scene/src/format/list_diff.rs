@@ -92,9 +92,9 @@ impl Free {
         let entries: Vec<_> = entries.iter().map(Entry::of).collect();
         let mut indices: HashMap<_, BTreeSet<_>> = HashMap::new();
         for (i, entry) in entries.iter().enumerate() {
-            entry
-                .properties()
-                .for_each(|property| drop(indices.entry(property).or_default().insert(i)));
+            for property in entry.properties() {
+                indices.entry(property).or_default().insert(i);
+            }
         }
         Self { entries, indices }
     }

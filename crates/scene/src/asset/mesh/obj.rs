@@ -67,7 +67,8 @@ impl Parser<'_> {
                 let position = position(rest);
                 let position = position.ok_or_else(|| self.wrong("vertex is not three numbers"))?;
                 if !position.iter().all(|x| x.abs() <= MAX_COORDINATE) {
-                    let found = format!("a vertex lies at {position:?}");
+                    let [x, y, z] = position;
+                    let found = format!("a vertex lies at [{x}, {y}, {z}]");
                     return Err(self.error(found, "coordinates from -1e9 to 1e9"));
                 }
                 self.positions.push(position);
