@@ -62,10 +62,10 @@ impl Part {
 }
 
 /// Divides a file into parts: everything except the objects, then consecutive objects of at least
-/// `part_bytes` bytes. A file has a single part if it is short, or if a table of an object follows
-/// a section of another kind.
+/// `part_bytes` bytes. A file has a single part if it is short, if a table of an object follows a
+/// section of another kind, or if a line may only look like the beginning of a section.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
-    let sections = sections(text);
+    let sections = sections(text).unwrap_or_default();
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
     if text.len() <= part_bytes || objects == 0 {
         return vec![Part::whole(text)];
@@ -99,87 +99,41 @@ pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     parts
 }
 
-/// Returns the first byte and the kind of header of each section of a TOML document.
-fn sections(text: &str) -> Vec<(usize, Header)> {
-    let bytes = text.as_bytes();
+/// Returns the first byte and the kind of header of each section of a TOML document. `None` if a
+/// line that begins with a bracket may be part of a string or a list.
+fn sections(text: &str) -> Option<Vec<(usize, Header)>> {
+    if text.contains("\"\"\"") || text.contains("'''") {
+        return None;
+    }
     let mut sections = vec![(0, Header::Other)];
-    let (mut at, mut depth, mut line) = (0, 0usize, 0);
-    // `true` while a line has only spaces so far.
-    let mut is_indent = true;
-    while let Some(byte) = bytes.get(at) {
-        match byte {
-            b'[' if is_indent && depth == 0 => {
-                sections.push((line, header(&text[at..])));
-                at = end_of_line(bytes, at);
-                continue;
-            }
-            b'#' => {
-                at = end_of_line(bytes, at);
-                continue;
-            }
-            b'"' | b'\'' => {
-                at = end_of_string(bytes, at);
-                is_indent = false;
-                continue;
-            }
-            b'[' | b'{' => depth += 1,
-            b']' | b'}' => depth = depth.saturating_sub(1),
-            b'\n' => (line, is_indent) = (at + 1, true),
-            _ => {}
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        if line.trim_start().starts_with('[') {
+            sections.push((start, header(line)?));
         }
-        is_indent &= matches!(byte, b' ' | b'\t' | b'\n' | b'\r');
-        at += 1;
+        start += line.len();
     }
     if sections.get(1).is_some_and(|(start, _)| *start == 0) {
         sections.remove(0);
     }
-    sections
+    Some(sections)
 }
 
-/// Returns the kind of the TOML header that `text` begins with.
-fn header(text: &str) -> Header {
-    let is_list = text.starts_with("[[");
-    let name = text.trim_start_matches('[').trim_start_matches([' ', '\t']);
-    let Some(after) = name.strip_prefix("object") else { return Header::Other };
-    match after.trim_start_matches([' ', '\t']).as_bytes().first() {
-        Some(b']') if is_list => Header::Object,
-        Some(b'.') => Header::InObject,
+/// Returns the kind of header in `line`; `None` if it is not certainly a header.
+fn header(line: &str) -> Option<Header> {
+    let line = line.split('#').next().unwrap_or(line).trim();
+    let list = line.strip_prefix("[[").and_then(|line| line.strip_suffix("]]"));
+    let table = || line.strip_prefix('[')?.strip_suffix(']');
+    let name = list.or_else(table)?.trim();
+    if name.contains(['[', ']', '{', '}', ',', '=']) {
+        return None;
+    }
+    let inner = name.strip_prefix("object").map(str::trim_start);
+    Some(match inner {
+        Some("") if list.is_some() => Header::Object,
+        Some(inner) if inner.starts_with('.') => Header::InObject,
         _ => Header::Other,
-    }
-}
-
-/// Returns the byte offset of the line end at or after `at`.
-fn end_of_line(bytes: &[u8], at: usize) -> usize {
-    bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length)
-}
-
-/// Returns the byte offset after the TOML string at `at`. A single-line string ends with its line.
-fn end_of_string(bytes: &[u8], at: usize) -> usize {
-    let quote = bytes[at];
-    let is_quoted = |at: usize, marks: usize| {
-        bytes[at..].len() >= marks && bytes[at..at + marks].iter().all(|b| *b == quote)
-    };
-    let marks = if is_quoted(at, 3) { 3 } else { 1 };
-    let mut at = at + marks;
-    while at < bytes.len() {
-        match bytes[at] {
-            b'\\' if quote == b'"' => at += 1,
-            b'\n' if marks == 1 => return at,
-            _ if is_quoted(at, marks) => {
-                // A multi-line string may end with one or two quotation marks before the three that
-                // close it.
-                let more = if marks == 3 {
-                    (3..5).take_while(|n| is_quoted(at, n + 1)).count()
-                } else {
-                    0
-                };
-                return at + marks + more;
-            }
-            _ => {}
-        }
-        at += 1;
-    }
-    bytes.len()
+    })
 }
 
 #[cfg(test)]
@@ -188,13 +142,9 @@ mod tests {
 
     const TEXT: &str = r##"# [[object]] in a comment
 film.size = [
-[8], 8] # [[object]]
+8, 8] # [[object]]
 s = "\"[[object]]" # "
-t = """
-[[object]]
-""" # """"
-u = '''
-[[object]] ''''
+[materials."b"] # [[object]]
 [[object]]
 name = "a"
 [object.shape]
@@ -243,7 +193,10 @@ name = '[[object]]'
             "[[object]]\n[b]\n[object.shape]\n",
             "[object.shape]\n[[object]]\n",
             "x = \"\"\"\n[[object]]\n",
-            "x = [\n[[object]]\n",
+            "x = '''\n[[object]]\n'''\n[[object]]\n",
+            "[[object]]\nx = [\n[1, 2],\n]\n",
+            "[[object]]\nx = [\n[[1, 2]]\n]\n",
+            "[materials.\"a, b\"]\n[[object]]\n",
         ] {
             assert_eq!(split(text, 0), [Part::whole(text)], "{text}");
         }
