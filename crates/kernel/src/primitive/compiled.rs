@@ -1,6 +1,6 @@
 //! Primitives compiled for the kernels of one SIMD type: what every kind implements.
 
-use crate::bvh::Ray;
+use crate::bvh::{Hit, Ray};
 use crate::lanes::{SimdFloat, Vec3};
 
 /// Point on the surface of a primitive in each lane.
@@ -35,6 +35,23 @@ impl<L: SimdFloat> SurfacePoint<L> {
 
 /// Primitive compiled for the kernels of one SIMD type.
 pub trait Primitive<L: SimdFloat> {
+    /// Replaces `hit` in the lanes whose ray hits the primitive nearer than `hit`. `id` is the id of
+    /// the primitive.
+    fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>);
+
+    /// Returns the lanes whose ray hits the primitive at a distance between 0 and `limit`; `None` if
+    /// there are none. Lanes outside `wanted` are undefined.
+    fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask>;
+
+    /// See [`Aggregate::surface`](crate::primitive::Aggregate::surface).
+    fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L>;
+
+    /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
+    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>>;
+}
+
+/// Primitive whose intersections are computed by a formula, without a search.
+pub trait AnalyticPrimitive<L: SimdFloat> {
     /// Returns the smallest distance at which each ray hits the primitive, and the lanes that hit
     /// it; `None` if no lane hits. Only distances greater than 0 are hits.
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;

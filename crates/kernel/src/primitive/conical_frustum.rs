@@ -8,7 +8,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
     normals_of_solid, rows, segment_distance,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use crate::primitive::form::Form;
@@ -320,7 +320,7 @@ fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3
     (transposed_times(&s.unit_from_scene, normal), rho)
 }
 
-impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for ConicalFrustum<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let chord = chord(self, ray)?;

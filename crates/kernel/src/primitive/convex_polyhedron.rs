@@ -7,7 +7,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
     extent_of_points, normals_of_solid,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
@@ -174,7 +174,7 @@ impl<S: Float> ConvexPolyhedron<S> {
     }
 }
 
-impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (enter, leave, meets) = self.chord(ray)?;

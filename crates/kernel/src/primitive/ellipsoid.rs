@@ -7,7 +7,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
     rows,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::sphere::intersections;
 use glam::{DAffine3, DMat3, DVec3};
@@ -155,7 +155,7 @@ fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, 
     Some((near * scale, far * scale, meets))
 }
 
-impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for Ellipsoid<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let (near, far, meets) = chord(self, ray)?;

@@ -7,7 +7,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
     extent_of_points, segment_distance,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use glam::{DAffine3, DVec3};
 
 /// Flat parallelogram of the points `corner + a u + b v`, with a and b in 0..=1. Its front is the
@@ -123,7 +123,7 @@ impl<S: Float> Parallelogram<S> {
     }
 }
 
-impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for Parallelogram<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);

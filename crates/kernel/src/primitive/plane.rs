@@ -5,7 +5,7 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
@@ -85,7 +85,7 @@ impl<S: Float> Plane<S> {
     }
 }
 
-impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for Plane<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);

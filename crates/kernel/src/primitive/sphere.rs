@@ -6,7 +6,7 @@ use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, ProxyFace, normals_of_solid, similarity,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{Solid, SolidPrimitive, Span};
 use crate::primitive::ellipsoid::EllipsoidForm;
 use glam::{DAffine3, DVec3};
@@ -122,7 +122,7 @@ pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option
     Some((L::select(behind, q, other), L::select(behind, other, q), meets))
 }
 
-impl<L: SimdFloat> Primitive<L> for Sphere<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for Sphere<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let f = ray.origin - Vec3::splat(self.center);

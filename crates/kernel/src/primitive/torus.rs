@@ -20,7 +20,7 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
     rows, similarity, sphere_around_box,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use glam::{DAffine3, DVec3};
@@ -377,7 +377,7 @@ impl<L: SimdFloat> UnitLine<L> {
     }
 }
 
-impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
+impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
     #[inline(never)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let line = UnitLine::new(self, ray)?;

@@ -2,13 +2,13 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, Primitive, SurfacePoint, UvGradients};
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
-use crate::primitive::csg::Compounds;
+use crate::primitive::csg::CompoundPart;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
-use crate::primitive::mesh::instance::Meshes;
+use crate::primitive::mesh::instance::MeshInstance;
 use crate::primitive::parallelogram::Parallelogram;
 use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;
@@ -16,23 +16,45 @@ use crate::primitive::torus::Torus;
 use std::ops::Range;
 
 macro_rules! batches {
-    ($($kind:ident),+ $(,)?) => {
+    ($($kind:ident),+; parts: $($whole:ident($part:ident)),+) => {
         /// Batch: all primitives of one kind, compiled for one SIMD type.
         pub enum PrimitiveBatch<L: SimdFloat> {
             $($kind(Vec<$kind<L::Scalar>>),)+
-            /// Each part of a compound counts as a primitive.
-            Csg(Compounds<L::Scalar>),
-            Mesh(Meshes<L::Scalar>),
+            $($whole(Vec<$part<L::Scalar>>),)+
         }
 
-        /// Evaluates one of three expressions: for an array of primitives, compounds or meshes.
+        $(
+            impl<L: SimdFloat> Primitive<L> for $kind<L::Scalar> {
+                #[inline(always)]
+                fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+                    if let Some((t, meets)) = self.intersect(ray) {
+                        hit.keep_closer(meets, t, id);
+                    }
+                }
+
+                #[inline(always)]
+                fn occluded(&self, ray: &Ray<L>, limit: L, _wanted: L::Mask) -> Option<L::Mask> {
+                    let (t, meets) = self.intersect(ray)?;
+                    Some(meets & t.gt(L::zero()) & t.lt(limit))
+                }
+
+                #[inline(always)]
+                fn surface(&self, _triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
+                    AnalyticPrimitive::surface(self, point)
+                }
+
+                fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+                    AnalyticPrimitive::uv(self, point)
+                }
+            }
+        )+
+
+        /// Evaluates an expression for the array of primitives in a batch.
         macro_rules! each {
-            ($batch:expr, $primitives:ident => $value:expr, $compounds:ident => $other:expr,
-                $meshes:ident => $third:expr) => {
+            ($batch:expr, $primitives:ident => $value:expr) => {
                 match $batch {
                     $(PrimitiveBatch::$kind($primitives) => $value,)+
-                    PrimitiveBatch::Csg($compounds) => $other,
-                    PrimitiveBatch::Mesh($meshes) => $third,
+                    $(PrimitiveBatch::$whole($primitives) => $value,)+
                 }
             };
         }
@@ -41,44 +63,42 @@ macro_rules! batches {
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
-                let all = forms.iter().enumerate().filter_map(|(form, f)| {
-                    let Form::$kind(f) = f else { return None };
-                    Some((PrimitiveId { form, part: 0 }, $kind::new(f)))
-                });
-                let (sources, primitives): (Vec<_>, Vec<_>) = all.unzip();
-                out.extend(LabelledBatch::new(PrimitiveBatch::$kind(primitives), sources, forms));
-            )+
-            let sources_of = |wanted: fn(&Form) -> bool| -> Vec<_> {
-                let matching = forms.iter().enumerate().filter(|(_, f)| wanted(f));
-                let parts = |(form, f): (usize, &Form)| {
-                    (0..f.parts()).map(move |part| PrimitiveId { form, part })
+                let compile = |form: &Form| {
+                    let Form::$kind(form) = form else { return None };
+                    Some([$kind::new(form)])
                 };
-                matching.flat_map(parts).collect()
-            };
-            let sources = sources_of(|f| matches!(f, Form::Csg(_)));
-            let compounds = PrimitiveBatch::Csg(Compounds::new(forms));
-            out.extend(LabelledBatch::new(compounds, sources, forms));
-            let sources = sources_of(|f| matches!(f, Form::Mesh(_)));
-            let meshes = PrimitiveBatch::Mesh(Meshes::new(forms));
-            out.extend(LabelledBatch::new(meshes, sources, forms));
+                out.extend(LabelledBatch::new(forms, compile, PrimitiveBatch::$kind));
+            )+
+            $(
+                let compile = |form: &Form| {
+                    let Form::$whole(form) = form else { return None };
+                    Some($part::of(form))
+                };
+                out.extend(LabelledBatch::new(forms, compile, PrimitiveBatch::$whole));
+            )+
             out
         }
     };
 }
 
-// Kinds of compiled primitives other than compounds and meshes, in the order in which primitives
-// are numbered. A new kind needs a word here.
-batches!(Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus);
+// Kinds of compiled primitives, in the order in which primitives are numbered. Forms of the last
+// kinds become several primitives, or none. A new kind needs a word here.
+batches! {
+    Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus;
+    parts: Csg(CompoundPart), Mesh(MeshInstance)
+}
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
     /// Replaces `hit` in the lanes whose ray hits a primitive with a number in `range` nearer than
     /// `hit`. The id of a primitive is `base` plus its number in the batch.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
-        each!(self,
-            primitives => closest(&primitives[range.clone()], base + range.start as u32, ray, hit),
-            compounds => compounds.closest(range, base, ray, hit),
-            meshes => meshes.closest(range, base, ray, hit));
+        let first = base + range.start as u32;
+        each!(self, primitives => {
+            for (id, primitive) in (first..).zip(&primitives[range]) {
+                primitive.closest(id, ray, hit);
+            }
+        });
     }
 
     /// Returns the lanes whose ray hits a primitive with a number in `range` at a distance between
@@ -91,61 +111,30 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
         limit: L,
         wanted: L::Mask,
     ) -> L::Mask {
-        each!(self,
-            primitives => occluded(&primitives[range], ray, limit, wanted),
-            compounds => compounds.occluded(range, ray, limit, wanted),
-            meshes => meshes.occluded(range, ray, limit, wanted))
+        let mut occluded = L::mask(false);
+        each!(self, primitives => {
+            for primitive in &primitives[range] {
+                if let Some(hits) = primitive.occluded(ray, limit, wanted.and_not(occluded)) {
+                    occluded = occluded | hits;
+                    if wanted.and_not(occluded).none() {
+                        break;
+                    }
+                }
+            }
+        });
+        occluded
     }
 
     /// See [`Aggregate::surface`](super::Aggregate::surface).
     #[inline(always)]
-    pub fn surface(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
-        each!(self,
-            primitives => primitives[primitive].surface(point),
-            compounds => compounds.surface(primitive, point),
-            meshes => meshes.surface(primitive, triangle_tag, point))
+    pub fn surface(&self, primitive: usize, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
+        each!(self, primitives => Primitive::surface(&primitives[primitive], triangle, point))
     }
 
     /// See [`Aggregate::uv`](super::Aggregate::uv).
-    pub fn uv(&self, primitive: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        each!(self,
-            primitives => primitives[primitive].uv(point),
-            compounds => compounds.uv(primitive, point),
-            meshes => meshes.uv(primitive, triangle_tag, point))
+    pub fn uv(&self, primitive: usize, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        each!(self, primitives => Primitive::uv(&primitives[primitive], triangle, point))
     }
-}
-
-#[inline(always)]
-fn closest<L: SimdFloat>(
-    primitives: &[impl Primitive<L>],
-    first: u32,
-    ray: &Ray<L>,
-    hit: &mut Hit<L>,
-) {
-    for (tag, primitive) in (first..).zip(primitives) {
-        if let Some((t, meets)) = primitive.intersect(ray) {
-            hit.keep_closer(meets, t, tag);
-        }
-    }
-}
-
-#[inline(always)]
-fn occluded<L: SimdFloat>(
-    primitives: &[impl Primitive<L>],
-    ray: &Ray<L>,
-    limit: L,
-    wanted: L::Mask,
-) -> L::Mask {
-    let mut occluded = L::mask(false);
-    for primitive in primitives {
-        if let Some((t, meets)) = primitive.intersect(ray) {
-            occluded = occluded | (meets & t.gt(L::zero()) & t.lt(limit));
-            if wanted.and_not(occluded).none() {
-                break;
-            }
-        }
-    }
-    occluded
 }
 
 /// Origin of a compiled primitive.
@@ -169,8 +158,18 @@ pub struct LabelledBatch<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Returns `None` if `sources` is empty.
-    fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
+    /// Compiles those of `forms` for which `compile` returns primitives; `None` if there are none.
+    fn new<P, I: IntoIterator<Item = P>>(
+        forms: &[Form],
+        compile: impl Fn(&Form) -> Option<I>,
+        batch: impl Fn(Vec<P>) -> PrimitiveBatch<L>,
+    ) -> Option<Self> {
+        let parts_of = |(form, f): (usize, &Form)| {
+            let id = move |(part, primitive)| (PrimitiveId { form, part }, primitive);
+            compile(f).into_iter().flatten().enumerate().map(id)
+        };
+        let (sources, primitives): (Vec<PrimitiveId>, Vec<P>) =
+            forms.iter().enumerate().flat_map(parts_of).unzip();
         let (one, several) = forms[sources.first()?.form].noun();
         let count = sources.iter().filter(|s| s.part == 0).count();
         let noun = if count == 1 { one } else { several };
@@ -180,7 +179,8 @@ impl<L: SimdFloat> LabelledBatch<L> {
             n => format!(" of {} triangles", with_thousands_separators(n)),
         };
         let infinite = sources.iter().any(|s| forms[s.form].bounds().is_none());
-        Some(Self { batch, sources, label: format!("{count} {noun}{detail}"), infinite })
+        let label = format!("{count} {noun}{detail}");
+        Some(Self { batch: batch(primitives), sources, label, infinite })
     }
 }
 

@@ -14,7 +14,7 @@ use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::aggregate::scene_bvh::SceneBvh;
 use crate::primitive::compiled::{SurfacePoint, UvGradients};
 use crate::primitive::form::Form;
-use crate::primitive::mesh::instance::Meshes;
+use crate::primitive::mesh::instance::MeshInstance;
 use std::fmt;
 use std::ops::Range;
 
@@ -383,36 +383,43 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the projection of `point` onto the surface of `primitive`, with the normal there.
-    /// `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
+    /// `point` is the computed hit point of a ray, with rounding errors. `triangle` is
     /// [`Hit::triangle`].
     #[inline(always)]
-    pub fn surface(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
+    pub fn surface(&self, primitive: u32, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         for batch in &self.batches {
             if primitive < batch.end {
                 let i = (primitive - batch.base) as usize;
-                return batch.batch.surface(i, triangle_tag, point);
+                return batch.batch.surface(i, triangle, point);
             }
         }
         unreachable!("every primitive belongs to a batch")
     }
 
-    /// Returns the meshes and the number of the first one; the others have the following numbers, the
-    /// highest of the aggregate.
-    fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
-        let BatchRange { batch, base, .. } = self.batches.last()?;
-        let PrimitiveBatch::Mesh(meshes) = batch else { return None };
-        Some((meshes, *base))
+    /// Returns the meshes, which have the highest numbers of the aggregate.
+    fn meshes(&self) -> &[MeshInstance<L::Scalar>] {
+        match self.batches.last() {
+            Some(BatchRange { batch: PrimitiveBatch::Mesh(meshes), .. }) => meshes,
+            Some(_) | None => &[],
+        }
+    }
+
+    /// Returns the mesh with the number `primitive`; `None` if the primitive is not a mesh.
+    fn mesh(&self, primitive: u32) -> Option<&MeshInstance<L::Scalar>> {
+        let meshes = self.meshes();
+        let first = self.sources.len() - meshes.len();
+        meshes.get((primitive as usize).checked_sub(first)?)
     }
 
     /// Returns `true` if some primitive has interpolated normals; see
     /// [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
-        self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
+        self.meshes().iter().any(|mesh| mesh.smooth)
     }
 
     /// Returns `true` if some primitive has vertex or face colours; see [`Aggregate::color`].
     pub fn is_colored(&self) -> bool {
-        self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
+        self.meshes().iter().any(MeshInstance::is_colored)
     }
 
     /// Returns the shading normal of `primitive` at a hit point. `at` is the hit point, and the
@@ -420,29 +427,23 @@ impl<L: SimdFloat> Aggregate<L> {
     /// the result to the geometric normal and to the direction of the viewer are below 90 degrees.
     pub fn shading_normal(
         &self,
-        (primitive, triangle_tag): (u32, L),
+        (primitive, triangle): (u32, L),
         at: (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
-        match self.meshes() {
-            Some((meshes, base)) if primitive >= base => {
-                meshes.shading_normal((primitive - base) as usize, triangle_tag, at, direction)
-            }
-            _ => at.1,
-        }
+        self.mesh(primitive).map_or(at.1, |mesh| mesh.shading_normal(triangle, at, direction))
     }
 
-    /// Returns the colour that the mesh file of `primitive` gives to the triangle `triangle_tag`.
-    /// Returns `None` if the primitive is not a mesh, or if the file has no colours.
-    pub fn color(&self, primitive: u32, triangle_tag: L) -> Option<Vec3<L>> {
-        let (meshes, base) = self.meshes()?;
-        (primitive >= base).then(|| meshes.color((primitive - base) as usize, triangle_tag))?
+    /// Returns the colour that the mesh file of `primitive` gives to `triangle`. Returns `None` if the
+    /// primitive is not a mesh, or if the file has no colours.
+    pub fn color(&self, primitive: u32, triangle: L) -> Option<Vec3<L>> {
+        self.mesh(primitive)?.color(triangle)
     }
 
     /// Returns the texture coordinates that the geometry of `primitive` defines at `point`, if any.
-    pub fn uv(&self, primitive: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    pub fn uv(&self, primitive: u32, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let batch = &self.batches[self.batch_index(primitive)];
-        batch.batch.uv((primitive - batch.base) as usize, triangle_tag, point)
+        batch.batch.uv((primitive - batch.base) as usize, triangle, point)
     }
 }
 

@@ -20,11 +20,11 @@ pub use tree::{CsgSolid, CsgTree};
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::CanonicalShape;
-use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::interval::{Event, Interval, Transition, events, insert, with_scratch};
 use crate::primitive::csg::solid::CompiledSolid;
-use crate::primitive::form::Form;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Distance within which surfaces of a compound's parts count as coincident. The unit is the
 /// rounding error of the largest coordinate. The distance covers two faces whose coordinates differ
@@ -53,74 +53,69 @@ struct Part<S> {
     spans: Range<usize>,
 }
 
-/// Compound compiled for ray intersection: a bounding sphere, and the ranges of its parts and
-/// instructions in the lists of [`Compounds`].
+/// Compound compiled for ray intersection.
 struct Compound<S> {
+    /// Centre of the bounding sphere.
     center: [S; 3],
+    /// Squared radius of the bounding sphere.
     radius2: S,
     reach: S,
-    parts: Range<usize>,
-    ops: Range<usize>,
+    parts: Vec<Part<S>>,
+    ops: Vec<Op>,
     /// Largest number of spans of one line in all parts.
     spans: usize,
     /// Largest number of entries on the stack of the instructions.
     depth: usize,
 }
 
-/// All compounds of a scene, compiled for ray intersection. Every part counts as a primitive, so
-/// that a hit identifies the part.
-pub struct Compounds<S> {
-    compounds: Vec<Compound<S>>,
-    parts: Vec<Part<S>>,
-    ops: Vec<Op>,
-    /// For each part: the index of the compound that begins with it; `None` for later parts.
-    first: Vec<Option<u32>>,
+/// Part of a compound. Every part counts as a primitive, so that a hit identifies the part. Rays are
+/// intersected with the first part only, which stands for the whole compound.
+pub struct CompoundPart<S> {
+    compound: Arc<Compound<S>>,
+    part: usize,
 }
 
-impl<S: Float> Compounds<S> {
-    /// Compiles the compounds among `forms`.
-    pub fn new(forms: &[Form]) -> Self {
-        let mut out =
-            Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
-        for form in forms {
-            if let Form::Csg(compound) = form {
-                out.add(compound);
-            }
-        }
-        out
+impl<S: Float> CompoundPart<S> {
+    /// Compiles the parts of a compound.
+    pub fn of(form: &CsgSolid) -> Vec<Self> {
+        let compound = Arc::new(Compound::new(form));
+        let part = |part| Self { compound: Arc::clone(&compound), part };
+        (0..form.parts.len()).map(part).collect()
     }
+}
 
-    fn add(&mut self, compound: &CsgSolid) {
-        let (first_part, first_op) = (self.parts.len(), self.ops.len());
+impl<S: Float> Compound<S> {
+    fn new(form: &CsgSolid) -> Self {
         let mut spans = 0;
-        for (i, part) in compound.parts.iter().enumerate() {
+        let part = |part| {
             let solid = CompiledSolid::new(part);
             let first = spans;
             spans += solid.max_spans();
-            self.parts.push(Part { solid, reversed: false, spans: first..spans });
-            self.first.push((i == 0).then_some(self.compounds.len() as u32));
-        }
-        let depth = self.build(&compound.tree, first_part, false);
-        let (low, high) = compound.bounds().unwrap_or_default();
+            Part { solid, reversed: false, spans: first..spans }
+        };
+        let parts = form.parts.iter().map(part).collect();
+        let (low, high) = form.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
-        let bounded = compound.parts.iter().filter(|part| part.bounds().is_some());
-        self.compounds.push(Compound {
+        let bounded = form.parts.iter().filter(|part| part.bounds().is_some());
+        let mut compound = Self {
             center: (0.5 * (low + high)).to_array().map(S::from_f64),
             radius2: S::from_f64(radius * radius),
             reach: S::from_f64(bounded.map(|part| part.max_coordinate()).fold(0.0, f64::max)),
-            parts: first_part..self.parts.len(),
-            ops: first_op..self.ops.len(),
+            parts,
+            ops: Vec::new(),
             spans,
-            depth,
-        });
+            depth: 0,
+        };
+        compound.depth = compound.build(&form.tree, false);
+        compound
     }
 
     /// Appends the instructions that evaluate `tree` and returns the depth of the stack that they
     /// need. `reversed` is `true` if the tree is subtracted from the compound.
-    fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
+    fn build(&mut self, tree: &CsgTree, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
-                self.parts[first_part + i].reversed = reversed;
+                self.parts[*i].reversed = reversed;
                 self.ops.push(Op::Part(*i as u32));
                 return 1;
             }
@@ -131,7 +126,7 @@ impl<S: Float> Compounds<S> {
         let mut depth = 1;
         for (n, inner) in list.iter().enumerate() {
             let cuts = matches!(op, Op::Minus) && n > 0;
-            let above = self.build(inner, first_part, reversed ^ cuts);
+            let above = self.build(inner, reversed ^ cuts);
             depth = depth.max(above + usize::from(n > 0));
             if n > 0 {
                 self.ops.push(op);
@@ -140,20 +135,19 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Replaces `hit` in the lanes of `wanted` whose ray hits `compound` nearer than `hit`. The id
-    /// of a part in `hit` is `base` plus the number of the part.
+    /// Replaces `hit` in the lanes of `wanted` whose ray hits the compound nearer than `hit`. The ids
+    /// of its parts begin with `first_id`.
     fn intersect<L: SimdFloat<Scalar = S>>(
         &self,
-        compound: &Compound<S>,
-        base: u32,
+        first_id: u32,
         ray: &Ray<L>,
         wanted: L::Mask,
         hit: &mut Hit<L>,
     ) {
-        let from_center = ray.origin - Vec3::splat(compound.center);
+        let from_center = ray.origin - Vec3::splat(self.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
-        let radius2 = L::splat(compound.radius2);
+        let radius2 = L::splat(self.radius2);
         // The bounding sphere is in front of the origin of the ray or contains it.
         let ahead = along.le(L::zero()) | from_center.length_squared().le(radius2);
         let near = wanted & across.length_squared().le(radius2) & ahead;
@@ -163,15 +157,12 @@ impl<S: Float> Compounds<S> {
         let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
-        let parts = &self.parts[compound.parts.clone()];
-        let ops = &self.ops[compound.ops.clone()];
-        let first_id = base + compound.parts.start as u32;
-        with_scratch::<8, _, _>(compound.spans, outside, |spans| {
-            with_scratch::<16, _, _>(2 * compound.spans, end, |ends| {
-                let tie = ray.origin.max_abs().max(L::splat(compound.reach))
-                    * L::from_f64(TIE * L::EPSILON);
+        with_scratch::<8, _, _>(self.spans, outside, |spans| {
+            with_scratch::<16, _, _>(2 * self.spans, end, |ends| {
+                let tie =
+                    ray.origin.max_abs().max(L::splat(self.reach)) * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
-                for part in parts {
+                for part in &self.parts {
                     let mut slots = spans[part.spans.clone()].iter_mut();
                     part.solid.for_each_span(ray, |found| {
                         let Some(span) = slots.next() else { return };
@@ -185,79 +176,47 @@ impl<S: Float> Compounds<S> {
                         }
                     });
                 }
-                let lines = Lines { parts, ops, depth: compound.depth, first_id, spans };
-                lines.sweep(&ends[..count], near, hit);
+                Lines { compound: self, first_id, spans }.sweep(&ends[..count], near, hit);
             });
         });
     }
+}
 
-    /// Replaces `hit` in the lanes whose ray hits a compound nearer than `hit`. Only compounds
-    /// whose first part is in `range` are tested. The id of a part is `base` plus its number.
+impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
     #[inline(never)]
-    pub fn closest<L: SimdFloat<Scalar = S>>(
-        &self,
-        range: Range<usize>,
-        base: u32,
-        ray: &Ray<L>,
-        hit: &mut Hit<L>,
-    ) {
-        for compound in self.first[range].iter().flatten() {
-            self.intersect(&self.compounds[*compound as usize], base, ray, L::mask(true), hit);
+    fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+        if self.part == 0 {
+            self.compound.intersect(id, ray, L::mask(true), hit);
         }
     }
 
-    /// Returns the lanes of `wanted` whose ray hits a compound at a distance between 0 and `limit`.
-    /// Only compounds whose first part is in `range` are tested.
     #[inline(never)]
-    pub fn occluded<L: SimdFloat<Scalar = S>>(
-        &self,
-        range: Range<usize>,
-        ray: &Ray<L>,
-        limit: L,
-        wanted: L::Mask,
-    ) -> L::Mask {
-        let mut occluded = L::mask(false);
-        for compound in self.first[range].iter().flatten() {
-            let open = wanted.and_not(occluded);
-            if open.none() {
-                break;
-            }
-            let mut hit = Hit::with_t_max(limit);
-            self.intersect(&self.compounds[*compound as usize], 0, ray, open, &mut hit);
-            occluded = occluded | hit.t.lt(limit);
+    fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask> {
+        if self.part > 0 || wanted.none() {
+            return None;
         }
-        occluded
+        let mut hit = Hit::with_t_max(limit);
+        self.compound.intersect(0, ray, wanted, &mut hit);
+        Some(hit.t.lt(limit))
     }
 
-    /// Returns the projection of `point` onto the surface of a part. The normal points out of the
-    /// compound.
+    /// The normal points out of the compound.
     #[inline(never)]
-    pub fn surface<L: SimdFloat<Scalar = S>>(
-        &self,
-        part: usize,
-        point: Vec3<L>,
-    ) -> SurfacePoint<L> {
-        let part = &self.parts[part];
+    fn surface(&self, _triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
+        let part = &self.compound.parts[self.part];
         let surface = part.solid.surface(point);
         let normal = if part.reversed { -surface.normal } else { surface.normal };
         SurfacePoint { normal, ..surface }
     }
 
-    /// Returns the texture coordinates of a part at `point`; `None` if the part has none.
-    pub fn uv<L: SimdFloat<Scalar = S>>(
-        &self,
-        part: usize,
-        point: Vec3<L>,
-    ) -> Option<UvGradients<L>> {
-        self.parts[part].solid.uv(point)
+    fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        self.compound.parts[self.part].solid.uv(point)
     }
 }
 
 /// Lines of a ray packet through one compound.
 struct Lines<'a, L: SimdFloat> {
-    parts: &'a [Part<L::Scalar>],
-    ops: &'a [Op],
-    depth: usize,
+    compound: &'a Compound<L::Scalar>,
     /// Id of the compound's first part.
     first_id: u32,
     /// Spans of all parts.
@@ -267,7 +226,7 @@ struct Lines<'a, L: SimdFloat> {
 impl<L: SimdFloat> Lines<'_, L> {
     #[inline(always)]
     fn spans_of(&self, part: u32) -> &[Interval<L>] {
-        &self.spans[self.parts[part as usize].spans.clone()]
+        &self.spans[self.compound.parts[part as usize].spans.clone()]
     }
 
     /// Executes the instructions on a stack of values: `part` returns the value of a part, and
@@ -279,9 +238,9 @@ impl<L: SimdFloat> Lines<'_, L> {
         part: impl Fn(u32) -> T,
         join: impl Fn(Op, T, T) -> T,
     ) -> T {
-        with_scratch::<8, _, _>(self.depth, empty, |stack| {
+        with_scratch::<8, _, _>(self.compound.depth, empty, |stack| {
             let mut top = 0;
-            for op in self.ops {
+            for op in &self.compound.ops {
                 if let Op::Part(i) = op {
                     stack[top] = part(*i);
                     top += 1;

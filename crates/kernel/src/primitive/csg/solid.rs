@@ -3,7 +3,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::CanonicalShape;
-use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, UvGradients};
 use crate::primitive::conical_frustum::{ConicalFrustum, ConicalFrustumForm};
 use crate::primitive::convex_polyhedron::{ConvexPolyhedron, ConvexPolyhedronForm};
 use crate::primitive::ellipsoid::{Ellipsoid, EllipsoidForm};
@@ -29,7 +29,7 @@ pub struct Span<L: SimdFloat> {
 }
 
 /// Compiled primitive that encloses a volume.
-pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
+pub trait SolidPrimitive<L: SimdFloat>: AnalyticPrimitive<L> {
     /// Spans in ascending order and without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
@@ -98,7 +98,7 @@ macro_rules! solids {
                 }
             }
 
-            /// See [`Primitive::surface`].
+            /// See [`AnalyticPrimitive::surface`].
             #[inline(always)]
             pub fn surface<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> SurfacePoint<L> {
                 match self {
@@ -106,7 +106,7 @@ macro_rules! solids {
                 }
             }
 
-            /// See [`Primitive::uv`].
+            /// See [`AnalyticPrimitive::uv`].
             pub fn uv<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> Option<UvGradients<L>> {
                 match self {
                     $(Self::$kind(solid) => solid.uv(point),)+

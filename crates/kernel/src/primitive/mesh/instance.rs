@@ -9,12 +9,10 @@ use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, rows,
     segment_distance,
 };
-use crate::primitive::compiled::{SurfacePoint, UvGradients};
-use crate::primitive::form::Form;
+use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::keep_visible;
 use crate::primitive::mesh::{Mesh, intersection};
 use glam::{DAffine3, DVec3};
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single or
@@ -152,7 +150,7 @@ fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f6
 }
 
 /// Mesh placed in the scene, compiled for ray intersection.
-struct MeshInstance<S> {
+pub struct MeshInstance<S> {
     mesh: Arc<Mesh>,
     /// Rays that miss this box are not transformed.
     extent: PrimitiveBox<S>,
@@ -164,12 +162,8 @@ struct MeshInstance<S> {
     center: [S; 3],
     mesh_center: [S; 3],
     reach: S,
-    smooth: bool,
-}
-
-/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive.
-pub struct Meshes<S> {
-    meshes: Vec<MeshInstance<S>>,
+    /// `true` if shading normals are interpolated between vertices.
+    pub smooth: bool,
 }
 
 /// Corners of one mesh triangle per lane, in the space of the mesh.
@@ -178,8 +172,8 @@ struct Triangle<L> {
 }
 
 impl<S: Float> MeshInstance<S> {
-    fn new(form: &Form) -> Option<Self> {
-        let Form::Mesh(form) = form else { return None };
+    /// Compiles a placed mesh; none without finite bounds.
+    pub fn of(form: &MeshForm) -> Option<Self> {
         let MeshForm { mesh, scene_from_mesh, smooth } = form;
         let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
@@ -307,126 +301,62 @@ impl<L: SimdFloat> Triangle<L> {
     }
 }
 
-impl<S: Float> Meshes<S> {
-    /// Compiles the meshes among `forms`.
-    pub fn new(forms: &[Form]) -> Self {
-        Self { meshes: forms.iter().filter_map(MeshInstance::new).collect() }
-    }
-
-    /// Replaces `hit` in the lanes whose ray hits a mesh with a number in `range` nearer than `hit`.
-    /// The id of a mesh is `base` plus its number.
+impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
     #[inline(never)]
-    pub fn closest<L: SimdFloat<Scalar = S>>(
-        &self,
-        range: Range<usize>,
-        base: u32,
-        ray: &Ray<L>,
-        hit: &mut Hit<L>,
-    ) {
-        for (tag, instance) in (base + range.start as u32..).zip(&self.meshes[range]) {
-            let near = instance.extent.meets(ray, hit.t);
-            if near.none() {
-                continue;
-            }
-            let (inner, length) = instance.ray(ray);
-            // The distance limit in mesh space is enlarged by the rounding error of the transform.
-            // Whether a hit is closer than earlier hits is decided below by distances in the scene,
-            // so that the result does not depend on the order of the primitives.
-            let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
-            let limit = L::select(near, limit, L::from_f64(-1.0));
-            let found = intersection::closest(&instance.mesh, &inner, limit);
-            let hit_mask = found.t.lt(limit);
-            let before = hit.t;
-            hit.keep_closer(hit_mask, found.t / length, tag);
-            hit.triangle = L::select(hit.t.lt(before), found.triangle, hit.triangle);
+    fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
+        let near = self.extent.meets(ray, hit.t);
+        if near.none() {
+            return;
         }
+        let (inner, length) = self.ray(ray);
+        // The distance limit in mesh space is enlarged by the rounding error of the transform.
+        // Whether a hit is closer than earlier hits is decided below by distances in the scene, so
+        // that the result does not depend on the order of the primitives.
+        let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
+        let limit = L::select(near, limit, L::from_f64(-1.0));
+        let found = intersection::closest(&self.mesh, &inner, limit);
+        let hit_mask = found.t.lt(limit);
+        let before = hit.t;
+        hit.keep_closer(hit_mask, found.t / length, id);
+        hit.triangle = L::select(hit.t.lt(before), found.triangle, hit.triangle);
     }
 
-    /// Returns the lanes of `wanted` whose ray hits a mesh with a number in `range` at a distance
-    /// between 0 and `limit`.
     #[inline(never)]
-    pub fn occluded<L: SimdFloat<Scalar = S>>(
-        &self,
-        range: Range<usize>,
-        ray: &Ray<L>,
-        limit: L,
-        wanted: L::Mask,
-    ) -> L::Mask {
-        let mut occluded = L::mask(false);
-        for instance in &self.meshes[range] {
-            let open = wanted.and_not(occluded);
-            if open.none() {
-                break;
-            }
-            let open = open & instance.extent.meets(ray, limit);
-            if open.none() {
-                continue;
-            }
-            let (inner, length) = instance.ray(ray);
-            let limit = L::select(open, limit * length, L::from_f64(-1.0));
-            occluded = occluded | intersection::occluded(&instance.mesh, &inner, limit);
+    fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask> {
+        if wanted.none() {
+            return None;
         }
-        occluded
+        let open = wanted & self.extent.meets(ray, limit);
+        if open.none() {
+            return None;
+        }
+        let (inner, length) = self.ray(ray);
+        let limit = L::select(open, limit * length, L::from_f64(-1.0));
+        Some(intersection::occluded(&self.mesh, &inner, limit))
     }
 
-    /// Returns the projection of `point` onto the plane of the triangle `triangle_tag`, with the
-    /// normal there.
+    /// Projects `point` onto the plane of `triangle`.
     #[inline(never)]
-    pub fn surface<L: SimdFloat<Scalar = S>>(
-        &self,
-        number: usize,
-        triangle_tag: L,
-        point: Vec3<L>,
-    ) -> SurfacePoint<L> {
-        let instance = &self.meshes[number];
-        let triangle = instance.triangle(triangle_tag);
+    fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
+        let triangle = self.triangle(triangle);
         // Divided by its largest component, the squared length neither overflows nor underflows.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
         let flat = Vec3::select(sound, flat * (L::one() / largest), Vec3::of([0.0, 0.0, 1.0]));
-        let height = flat.dot(instance.point(point) - triangle.corners[0]);
-        let normal = instance.normal(flat);
+        let height = flat.dot(self.point(point) - triangle.corners[0]);
+        let normal = self.normal(flat);
         let inverse = L::one() / normal.length_squared().sqrt();
         let normal = normal * inverse;
         let point = normal.mul_add(-height * inverse, point);
-        SurfacePoint { point, normal, max_coordinate: L::splat(instance.reach) }
+        SurfacePoint { point, normal, max_coordinate: L::splat(self.reach) }
     }
 
-    /// See [`Aggregate::shading_normal`](crate::primitive::Aggregate::shading_normal).
     #[inline(never)]
-    pub fn shading_normal<L: SimdFloat<Scalar = S>>(
-        &self,
-        number: usize,
-        triangle_tag: L,
-        (point, normal): (Vec3<L>, Vec3<L>),
-        direction: Vec3<L>,
-    ) -> Vec3<L> {
-        let instance = &self.meshes[number];
-        if !instance.smooth {
-            return normal;
-        }
-        let weights = instance.triangle(triangle_tag).weights(instance.point(point));
-        let [a, b, c] = instance.vectors(triangle_tag, instance.mesh.smooth_normals());
-        let smooth = instance.normal(a * weights[0] + b * weights[1] + c * weights[2]);
-        let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
-        // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
-        // replaces it by `normal`.
-        keep_visible(smooth, normal, direction)
-    }
-
-    /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
-    #[inline(never)]
-    pub fn uv<L: SimdFloat<Scalar = S>>(
-        &self,
-        number: usize,
-        triangle_tag: L,
-        point: Vec3<L>,
-    ) -> Option<UvGradients<L>> {
-        let instance = &self.meshes[number];
-        let triangle = instance.triangle(triangle_tag);
-        let corners = instance.attribute(triangle_tag, instance.mesh.mesh().uvs.as_deref()?);
-        let weights = triangle.weights(instance.point(point));
+    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        let corners = self.attribute(triangle, self.mesh.mesh().uvs.as_deref()?);
+        let triangle = self.triangle(triangle);
+        let weights = triangle.weights(self.point(point));
         let gradient = triangle.gradients();
         let along = |k: usize| {
             let [a, b, c] = corners.map(|pair| pair[k]);
@@ -436,31 +366,44 @@ impl<S: Float> Meshes<S> {
         let ((u, du), (v, dv)) = (along(0), along(1));
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
+}
+
+impl<S: Float> MeshInstance<S> {
+    /// See [`Aggregate::shading_normal`](crate::primitive::Aggregate::shading_normal).
+    #[inline(never)]
+    pub fn shading_normal<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle: L,
+        (point, normal): (Vec3<L>, Vec3<L>),
+        direction: Vec3<L>,
+    ) -> Vec3<L> {
+        if !self.smooth {
+            return normal;
+        }
+        let weights = self.triangle(triangle).weights(self.point(point));
+        let [a, b, c] = self.vectors(triangle, self.mesh.smooth_normals());
+        let smooth = self.normal(a * weights[0] + b * weights[1] + c * weights[2]);
+        let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
+        // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
+        // replaces it by `normal`.
+        keep_visible(smooth, normal, direction)
+    }
 
     /// See [`Aggregate::color`](crate::primitive::Aggregate::color).
     #[inline(never)]
-    pub fn color<L: SimdFloat<Scalar = S>>(
-        &self,
-        number: usize,
-        triangle_tag: L,
-    ) -> Option<Vec3<L>> {
-        let mesh = self.meshes[number].mesh.mesh();
+    pub fn color<L: SimdFloat<Scalar = S>>(&self, triangle: L) -> Option<Vec3<L>> {
+        let mesh = self.mesh.mesh();
         mesh.color(0)?;
-        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
+        let number = |lane| (triangle.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
         Some(Vec3::from_fn(|lane| {
             mesh.color(number(lane)).unwrap_or(white).map(|x| S::from_f64(f64::from(x)))
         }))
     }
 
-    /// Returns `true` if some mesh has interpolated normals.
-    pub fn is_smooth(&self) -> bool {
-        self.meshes.iter().any(|instance| instance.smooth)
-    }
-
-    /// Returns `true` if some mesh has vertex or face colours.
+    /// Returns `true` if the mesh has vertex or face colours.
     pub fn is_colored(&self) -> bool {
-        self.meshes.iter().any(|instance| instance.mesh.mesh().color(0).is_some())
+        self.mesh.mesh().color(0).is_some()
     }
 }
 
