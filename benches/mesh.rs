@@ -115,12 +115,12 @@ fn main() {
         let clock = Instant::now();
         let begin = common::seconds(clock);
         let mesh = Mesh::new(triangles);
-        let count = mesh.mesh().triangles.len();
+        let count = mesh.mesh.triangles.len();
         println!(
             "{count} triangles: BVH in {:.3} s, {:.1} bytes a triangle, depth {}",
             common::seconds(clock) - begin,
             mesh.bytes() as f64 / count as f64,
-            mesh.boxes().depth()
+            mesh.boxes.depth
         );
         single.push(rays::<Single>(&mesh));
         rays::<Double>(&mesh);

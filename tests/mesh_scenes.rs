@@ -97,9 +97,9 @@ fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
         let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/meshes").join(name);
         let mesh = Assets::default().mesh(&path).unwrap();
-        let corner = |i: &u32| DVec3::from(mesh.mesh().positions[*i as usize].map(f64::from));
+        let corner = |i: &u32| DVec3::from(mesh.mesh.positions[*i as usize].map(f64::from));
         let cone = |t: &[u32; 3]| corner(&t[0]).dot(corner(&t[1]).cross(corner(&t[2]))) / 6.0;
-        let inside: f64 = mesh.mesh().triangles.iter().map(cone).sum();
+        let inside: f64 = mesh.mesh.triangles.iter().map(cone).sum();
         assert!(volume.contains(&inside), "{name}: {inside}");
     }
 }
@@ -247,7 +247,7 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
         Form::Mesh(MeshForm { mesh, .. }) => mesh,
         other => panic!("{other:?}"),
     };
-    let triangles = mesh(&named).mesh().triangles.len();
+    let triangles = mesh(&named).mesh.triangles.len();
     assert_eq!(triangles, 2 * 9 * 5);
     // The loaded mesh remains after the file is removed and the scene is edited.
     fs::remove_file(ball_file).unwrap();

@@ -127,7 +127,7 @@ fn coincident_faces_show_the_first_part() {
         let line = (from, (at - from).normalize());
         let (ray, _) = packets::<Single>(&[line]).next().unwrap();
         let hit = geometry.closest(&ray, geometry.all());
-        let primitive = geometry.sources()[hit.primitive.id_lane(0) as usize];
+        let primitive = geometry.sources[hit.primitive.id_lane(0) as usize];
         assert_eq!((primitive.form, primitive.part), (0, 0), "{line:?}");
     }
 }

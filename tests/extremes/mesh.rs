@@ -74,8 +74,8 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
     let geometry = Aggregate::<L>::new(&[form]);
-    let triangles = &mesh.mesh().triangles;
-    let corner = |i: u32| DVec3::from(mesh.mesh().positions[i as usize].map(f64::from));
+    let triangles = &mesh.mesh.triangles;
+    let corner = |i: u32| DVec3::from(mesh.mesh.positions[i as usize].map(f64::from));
     let block = |block: usize| {
         let mut numbers = Numbers::new(14_000 + block as u64);
         let lines: Vec<Line> = (0..BLOCK)
@@ -132,7 +132,7 @@ fn check(rays: usize) {
     ] {
         let (mesh, left_to_double) = icosphere(times, axes);
         assert_eq!(left_to_double, axes != round, "{name}");
-        assert_eq!(mesh.mesh().triangles.len(), 20 << (2 * times), "{name}");
+        assert_eq!(mesh.mesh.triangles.len(), 20 << (2 * times), "{name}");
         let double = missed::<Double>(&mesh, place, axes, rays);
         assert_eq!(double, 0, "{name}: of {rays} rays in double precision");
         let single = missed::<Single>(&mesh, place, axes, rays);

@@ -9,9 +9,9 @@ use crate::reference::*;
 fn is_closed(file: &str, count: usize) -> Verdict {
     let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/meshes").join(file);
     let mesh = Assets::default().mesh(&path).map_err(|error| error.to_string())?;
-    let triangles = &mesh.mesh().triangles;
+    let triangles = &mesh.mesh.triangles;
     ensure(triangles.len() == count, || format!("{} triangles in {file}", triangles.len()))?;
-    let corner = |i: u32| mesh.mesh().positions[i as usize].map(f32::to_bits);
+    let corner = |i: u32| mesh.mesh.positions[i as usize].map(f32::to_bits);
     let edges = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]].map(|e| e.map(corner));
     let all: HashSet<_> = triangles.iter().flat_map(edges).collect();
     ensure(all.len() == 3 * count, || format!("an edge occurs twice in {file}"))?;

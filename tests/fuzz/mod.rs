@@ -90,7 +90,7 @@ fn mesh(path: &Path, bytes: &[u8]) -> bool {
 fn accepts_mesh(path: &Path) -> bool {
     match Assets::default().mesh(path) {
         Ok(mesh) => {
-            let mesh = mesh.mesh();
+            let mesh = &mesh.mesh;
             let count = mesh.positions.len();
             assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < count));
             assert!(mesh.positions.iter().flatten().all(|x| x.is_finite()));

@@ -65,7 +65,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
         out.extend((0..count).map(|i| {
             hit_mask.lane(i).then(|| LineHit {
                 t: hit.t.lane(i).to_f64(),
-                form: geometry.sources()[hit.primitive.id_lane(i) as usize].form,
+                form: geometry.sources[hit.primitive.id_lane(i) as usize].form,
                 point: to_dvec3(surface.point, i),
                 normal: to_dvec3(surface.normal, i),
             })

@@ -59,7 +59,7 @@ impl Triangles {
         let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
             unreachable!("a mesh description has a mesh form")
         };
-        let mesh = mesh.mesh();
+        let mesh = &mesh.mesh;
         let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
         let place = |i: u32| scene_from_mesh.transform_point3(vector(mesh.positions[i as usize]));
         let corners: Vec<_> = mesh.triangles.iter().map(|t| t.map(place)).collect();

@@ -196,7 +196,7 @@ fn texture_files_match_generators() {
 #[test]
 fn vase_faces_outwards_and_has_coordinates() {
     let mesh = Assets::default().mesh(&shipped("meshes/vase.ply")).unwrap();
-    let mesh = mesh.mesh();
+    let mesh = &mesh.mesh;
     let uvs = mesh.uvs.as_ref().unwrap();
     assert!(uvs.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
     let corner = |i: &u32| DVec3::from(mesh.positions[*i as usize].map(f64::from));

@@ -26,7 +26,7 @@ impl Scene {
         let mut hash = Fnv1a64::default();
         let meshes = objects.iter().filter_map(|object| object.shape.mesh());
         add_each(&mut hash, meshes, |mesh, hash| {
-            mesh.mesh().hash_contents(|bytes| hash.update(bytes))
+            mesh.mesh.hash_contents(|bytes| hash.update(bytes))
         });
         let images = materials.values().flat_map(|material| material.images());
         add_each(&mut hash, images, |image, hash| image.hash_contents(hash));

@@ -320,7 +320,7 @@ impl<S: Float> CompiledCulling<S> {
         let mut all_candidates = TileCandidates::all(geometry, lights.count());
         let mut light_buffers = Vec::new();
         let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
-        let forms = || geometry.sources().iter().map(form_of);
+        let forms = || geometry.sources.iter().map(form_of);
         let mode = match scene.trace.acceleration {
             Acceleration::Auto => {
                 let light_targets = (lights.targets(), lights.max_end_offset());
@@ -333,7 +333,7 @@ impl<S: Float> CompiledCulling<S> {
                         light_buffers = culler.light_buffers(geometry);
                     }
                     let project = |primitive: u32| {
-                        let form = form_of(&geometry.sources()[primitive as usize]);
+                        let form = form_of(&geometry.sources[primitive as usize]);
                         (primitive, ScreenBounds::project(form, camera))
                     };
                     let bounds = geometry.in_tree().into_iter().map(project);
@@ -405,7 +405,7 @@ impl<L: SimdFloat> World<L> {
         let recentered = moved.as_ref().unwrap_or(recentered);
         let structure = structure_of(scene, &recentered.forms);
         let geometry = Aggregate::with_structure(&recentered.forms, structure);
-        let primitives = geometry.sources();
+        let primitives = &geometry.sources;
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let material_of = |id: &PrimitiveId| materials.material(id);
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);

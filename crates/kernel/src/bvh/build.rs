@@ -45,8 +45,10 @@ impl Bvh8Node {
 /// Eight-wide bounding volume hierarchy.
 #[derive(Debug)]
 pub struct Bvh8 {
-    nodes: Vec<Bvh8Node>,
-    depth: usize,
+    /// Inner nodes; the first one is the root.
+    pub nodes: Vec<Bvh8Node>,
+    /// Largest number of inner nodes on a path from the root to a leaf.
+    pub depth: usize,
 }
 
 /// Effort of a BVH build.
@@ -118,16 +120,6 @@ impl Bvh8 {
         built.collapse(&binary);
         built.order = binary.order;
         built
-    }
-
-    /// Returns the inner nodes; the first one is the root.
-    pub fn nodes(&self) -> &[Bvh8Node] {
-        &self.nodes
-    }
-
-    /// Returns the largest number of inner nodes on a path from the root to a leaf.
-    pub fn depth(&self) -> usize {
-        self.depth
     }
 
     /// Returns the memory of the inner nodes in bytes.
@@ -272,7 +264,7 @@ mod tests {
         let mut deepest = 0;
         while let Some((node, depth, ancestors)) = todo.pop() {
             deepest = depth.max(deepest);
-            let node = &bvh.nodes()[node as usize];
+            let node = &bvh.nodes[node as usize];
             for slot in node.children() {
                 let mut boxes: Vec<[f32; 6]> = ancestors.clone();
                 boxes.push(node.bounds.map(|side| side[slot]));
@@ -293,7 +285,7 @@ mod tests {
             }
         }
         assert!(visits.iter().all(|n| *n == 1), "{count}, {in_leaf} a leaf: {visits:?}");
-        assert_eq!(deepest, bvh.depth());
+        assert_eq!(deepest, bvh.depth);
     }
 
     #[test]

@@ -179,7 +179,7 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     bvh: &Bvh8,
     traverse: impl FnOnce(&mut [T]) -> R,
 ) -> R {
-    let entries = per_level * bvh.depth();
+    let entries = per_level * bvh.depth;
     if entries <= SMALL {
         traverse(&mut [T::default(); SMALL])
     } else if entries <= LARGE {
@@ -226,7 +226,7 @@ pub fn traverse_packet<L: SimdFloat>(
             limit = leaf((child & !LEAF_FLAG) as usize, limit);
             farthest = limit.min_max().1;
         } else {
-            let node = &bvh.nodes()[child as usize];
+            let node = &bvh.nodes[child as usize];
             let base = top;
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let side = |k: usize| load_wide(&node.bounds[k], part);

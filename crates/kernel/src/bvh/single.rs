@@ -52,7 +52,7 @@ pub fn traverse_rays<L: SimdFloat>(
     prefetch_leaf: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,
 ) {
-    let levels = bvh.depth();
+    let levels = bvh.depth;
     let mut rays = RayTraversal::each(packet, limit);
     // Bits of the lanes whose next child is a node (`at_node`) or a leaf (`at_leaf`).
     let (mut at_node, mut at_leaf) = (limit.gt(L::zero()).bits(), 0u32);
@@ -65,7 +65,7 @@ pub fn traverse_rays<L: SimdFloat>(
                 prefetch_leaf((child & !LEAF_FLAG) as usize);
             } else {
                 at_node |= 1 << lane;
-                prefetch_node(&bvh.nodes()[child as usize]);
+                prefetch_node(&bvh.nodes[child as usize]);
             }
         };
         while node_lanes != 0 {
@@ -137,7 +137,7 @@ impl<S: Float> RayTraversal<S> {
     /// frame with the others. Returns `false` if the ray enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
-        let node = &bvh.nodes()[self.child as usize];
+        let node = &bvh.nodes[self.child as usize];
         let (mut keys, mut entered) = ([NO_KEY; BVH_WIDTH], 0);
         for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
             let side = |k: usize| load_wide::<L>(&node.bounds[k], part);
@@ -176,7 +176,7 @@ impl<S: Float> RayTraversal<S> {
             if S::from_f64(f64::from(f32::from_bits(least & !SLOT_MASK))) <= self.limit {
                 frame.remaining -= 1;
                 self.frames -= usize::from(frame.remaining == 0);
-                let node = &bvh.nodes()[frame.node as usize];
+                let node = &bvh.nodes[frame.node as usize];
                 self.child = node.child[(least & SLOT_MASK) as usize];
                 return true;
             }

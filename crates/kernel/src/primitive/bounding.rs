@@ -1,7 +1,7 @@
 //! Bounding volumes, which exclude primitives that rays cannot hit, in double precision, with a
 //! margin for the rounding errors of single precision.
 
-use crate::primitive::canonical::HalfSpace;
+use crate::primitive::canonical::{Bounds, HalfSpace};
 use crate::primitive::form::Form;
 use glam::{DVec2, DVec3};
 
@@ -106,6 +106,14 @@ pub struct BoundingVolume {
 }
 
 impl BoundingSphere {
+    /// Returns the sphere through the corners of a box; `None` is an infinite box.
+    pub fn around_box(bounds: Option<Bounds>) -> Self {
+        let Some((low, high)) = bounds else {
+            return Self { center: DVec3::ZERO, radius: f64::INFINITY };
+        };
+        Self { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+    }
+
     /// Returns a sphere around the mean of `points` that contains them.
     pub fn around(points: &[DVec3]) -> Self {
         let center = points.iter().sum::<DVec3>() / points.len() as f64;

@@ -112,7 +112,10 @@ pub trait CanonicalShape {
 
     /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds.
     fn bounding_sphere(&self) -> BoundingSphere {
-        sphere_around_box(self.bounds())
+        match &self.corners()[..] {
+            [] => BoundingSphere::around_box(self.bounds()),
+            corners => BoundingSphere::around(corners),
+        }
     }
 
     /// Returns the map from the object space of the geometry to the scene, and the bounding box in
@@ -142,21 +145,31 @@ pub trait CanonicalShape {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
     /// See [`DefaultMapping`].
-    fn default_mapping(&self) -> DefaultMapping;
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Box
+    }
 
     /// Returns the proxies; none for geometry with too many details.
-    fn proxies(&self) -> Vec<Proxy>;
+    fn proxies(&self) -> Vec<Proxy> {
+        self.bounds().map(Proxy::around).into_iter().collect()
+    }
 
     /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry; `None` if
-    /// it is unbounded along the unit vector `axis`. The default is the extent of the bounding box.
+    /// it is unbounded along the unit vector `axis`. The default is the extent of the corners or of
+    /// the bounding box.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        let heights = self.corners().into_iter().map(|corner| axis.dot(corner));
+        if let Some(low) = heights.clone().reduce(f64::min) {
+            return Some((low, heights.fold(low, f64::max)));
+        }
         let (low, high) = self.bounds()?;
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let (center, reach) = (axis.dot(middle), axis.abs().dot(half));
         Some((center - reach, center + reach))
     }
 
-    /// Returns the corners on which the object can stand when it is snapped to the ground.
+    /// Returns the corners of the convex hull of geometry with flat faces, on which the object can
+    /// stand when it is snapped to the ground; none for other geometry.
     fn corners(&self) -> Vec<DVec3> {
         Vec::new()
     }
@@ -172,23 +185,6 @@ pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     let low = points.iter().copied().reduce(DVec3::min)?;
     let high = points.iter().copied().reduce(DVec3::max)?;
     Some((low, high))
-}
-
-/// Returns the sphere through the corners of a box; `None` is an infinite box.
-pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
-    match bounds {
-        Some((low, high)) => {
-            BoundingSphere { center: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
-        }
-        None => BoundingSphere { center: DVec3::ZERO, radius: f64::INFINITY },
-    }
-}
-
-/// Implements [`CanonicalShape::extent_along`] for the convex hull of `points`.
-pub fn extent_of_points(points: &[DVec3], axis: DVec3) -> Option<(f64, f64)> {
-    let heights = points.iter().map(|p| axis.dot(*p));
-    let low = heights.clone().fold(f64::INFINITY, f64::min);
-    Some((low, heights.fold(f64::NEG_INFINITY, f64::max)))
 }
 
 /// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, the

@@ -5,8 +5,8 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
-    normals_of_solid, rows, segment_distance,
+    Bounds, CanonicalShape, DefaultMapping, bounds_of_points, box_distance, normals_of_solid, rows,
+    segment_distance,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -109,10 +109,6 @@ impl CanonicalShape for ConicalFrustumForm {
 
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Cylindrical
-    }
-
-    fn proxies(&self) -> Vec<Proxy> {
-        self.bounds().map(Proxy::around).into_iter().collect()
     }
 }
 

@@ -2,10 +2,8 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
-    extent_of_points, normals_of_solid,
+    Bounds, CanonicalShape, HalfSpace, Proxy, ProxyFace, bounds_of_points, normals_of_solid,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -34,10 +32,6 @@ impl CanonicalShape for ConvexPolyhedronForm {
         bounds_of_points(&self.corners)
     }
 
-    fn bounding_sphere(&self) -> BoundingSphere {
-        BoundingSphere::around(&self.corners)
-    }
-
     fn thickness(&self) -> f64 {
         let behind = |face: &HalfSpace| {
             self.corners.iter().map(|corner| -face.height(*corner)).fold(0.0, f64::max)
@@ -55,17 +49,9 @@ impl CanonicalShape for ConvexPolyhedronForm {
         normals_of_solid(self.faces.iter().map(side).collect(), slack)
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Box
-    }
-
     fn proxies(&self) -> Vec<Proxy> {
         let faces = self.faces.iter().copied().map(ProxyFace::Flat).collect();
         vec![Proxy::new(faces, self.bounds())]
-    }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_points(&self.corners, axis)
     }
 
     fn corners(&self) -> Vec<DVec3> {

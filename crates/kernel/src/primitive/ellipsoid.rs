@@ -4,8 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
-    rows,
+    Bounds, CanonicalShape, DefaultMapping, box_distance, frobenius_norm, normals_of_solid, rows,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -65,10 +64,6 @@ impl CanonicalShape for EllipsoidForm {
 
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Spherical
-    }
-
-    fn proxies(&self) -> Vec<Proxy> {
-        self.bounds().map(Proxy::around).into_iter().collect()
     }
 }
 

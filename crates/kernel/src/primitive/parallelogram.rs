@@ -2,10 +2,9 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
-    extent_of_points, segment_distance,
+    segment_distance,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use glam::{DAffine3, DVec3};
@@ -36,10 +35,6 @@ impl ParallelogramForm {
 impl CanonicalShape for ParallelogramForm {
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners())
-    }
-
-    fn bounding_sphere(&self) -> BoundingSphere {
-        BoundingSphere::around(&self.corners())
     }
 
     fn plane(&self) -> Option<HalfSpace> {
@@ -84,10 +79,6 @@ impl CanonicalShape for ParallelogramForm {
     fn proxies(&self) -> Vec<Proxy> {
         let faces = self.plane().into_iter().map(ProxyFace::Flat).collect();
         vec![Proxy::new(faces, self.bounds())]
-    }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_points(&self.corners(), axis)
     }
 
     fn corners(&self) -> Vec<DVec3> {

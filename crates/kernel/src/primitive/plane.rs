@@ -7,27 +7,11 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
-/// Canonical form of an infinite plane. Its front is the side to which `normal` points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlaneForm {
-    /// Unit normal of the plane, on its front.
-    pub normal: DVec3,
-    /// Value of `normal . p` for all points p of the plane.
-    pub offset: f64,
-}
-
-impl PlaneForm {
-    pub(super) fn transformed(self, map: &DAffine3) -> Self {
-        let HalfSpace { normal, offset } = self.half_space().transformed(map);
-        Self { normal, offset }
-    }
-
-    fn half_space(&self) -> HalfSpace {
-        HalfSpace { normal: self.normal, offset: self.offset }
-    }
-}
+/// Canonical form of an infinite plane: the half-space behind it. Its front is the side to which
+/// `normal` points.
+pub type PlaneForm = HalfSpace;
 
 impl CanonicalShape for PlaneForm {
     fn bounds(&self) -> Option<Bounds> {
@@ -40,7 +24,7 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn plane(&self) -> Option<HalfSpace> {
-        Some(self.half_space())
+        Some(*self)
     }
 
     fn thickness(&self) -> f64 {
@@ -48,11 +32,11 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        Some(self.half_space().height(point).abs())
+        Some(self.height(point).abs())
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
-        let on = self.half_space().height(point).abs() <= slack;
+        let on = self.height(point).abs() <= slack;
         if on { vec![vec![self.normal]] } else { Vec::new() }
     }
 
@@ -61,7 +45,7 @@ impl CanonicalShape for PlaneForm {
     }
 
     fn proxies(&self) -> Vec<Proxy> {
-        vec![Proxy::new(vec![ProxyFace::Flat(self.half_space())], None)]
+        vec![Proxy::new(vec![ProxyFace::Flat(*self)], None)]
     }
 
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {

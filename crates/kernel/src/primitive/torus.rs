@@ -17,8 +17,8 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, normals_of_solid,
-    rows, similarity, sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, box_distance, frobenius_norm, normals_of_solid, rows,
+    similarity,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, UvGradients};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -72,7 +72,7 @@ impl CanonicalShape for TorusForm {
                 center: self.scene_from_torus.translation,
                 radius: (self.ring + self.tube) * scale,
             },
-            None => sphere_around_box(self.bounds()),
+            None => BoundingSphere::around_box(self.bounds()),
         }
     }
 
@@ -115,10 +115,6 @@ impl CanonicalShape for TorusForm {
     /// to 1.
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Uv
-    }
-
-    fn proxies(&self) -> Vec<Proxy> {
-        self.bounds().map(Proxy::around).into_iter().collect()
     }
 }
 

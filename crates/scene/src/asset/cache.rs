@@ -255,7 +255,7 @@ mod tests {
         let other = folder.path().join(".").join("a.obj");
         assert!(Arc::ptr_eq(&assets.mesh(&other).unwrap(), &meshes[0]));
         std::fs::write(&path, format!("{TRIANGLE}f 3 2 1\n")).unwrap();
-        assert_eq!(assets.mesh(&path).unwrap().mesh().triangles.len(), 2);
+        assert_eq!(assets.mesh(&path).unwrap().mesh.triangles.len(), 2);
         assert_eq!(reads.load(Ordering::SeqCst), 2);
         assert_eq!(locked(&assets.meshes).files.len(), 1);
     }

@@ -91,7 +91,7 @@ impl ShapeDesc for MeshDesc {
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
         Form::Mesh(MeshForm {
-            scene_from_mesh: DAffine3::from_translation(mesh.mesh().center.into()),
+            scene_from_mesh: DAffine3::from_translation(mesh.mesh.center.into()),
             smooth: self.normals == Normals::Smooth,
             mesh,
         })
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn placeholder_is_icosahedron_on_origin() {
-        let mesh = PLACEHOLDER.mesh();
+        let mesh = &PLACEHOLDER.mesh;
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
         let form = MeshDesc::fitted_to(DVec3::ZERO, DVec3::ONE).form();
         let (low, high) = form.bounds().unwrap();

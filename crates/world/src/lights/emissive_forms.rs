@@ -15,7 +15,7 @@ const MAX_TRIANGLES: usize = 1 << 16;
 pub(crate) fn is_sampled(form: &Form) -> bool {
     match form {
         Form::Sphere(_) | Form::Parallelogram(_) | Form::ConvexPolyhedron(_) => true,
-        Form::Mesh(form) => form.mesh.mesh().triangles.len() <= MAX_TRIANGLES,
+        Form::Mesh(form) => form.mesh.mesh.triangles.len() <= MAX_TRIANGLES,
         Form::Ellipsoid(_)
         | Form::ConicalFrustum(_)
         | Form::Csg(_)
@@ -92,7 +92,7 @@ pub(crate) fn triangles_of_mesh(
     form: &MeshForm,
     step: usize,
 ) -> impl Iterator<Item = [DVec3; 3]> + '_ {
-    let mesh = form.mesh.mesh();
+    let mesh = &form.mesh.mesh;
     let mirrored = form.scene_from_mesh.matrix3.determinant() < 0.0;
     let corner = |i: u32| {
         let position = mesh.positions[i as usize].map(f64::from);

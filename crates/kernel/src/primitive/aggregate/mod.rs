@@ -69,7 +69,8 @@ pub struct Aggregate<L: SimdFloat> {
     /// Bounding box of each primitive; `None` for an infinite primitive. Empty if no boxes are
     /// used.
     boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
-    sources: Vec<PrimitiveId>,
+    /// Origin of each primitive.
+    pub sources: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
@@ -202,11 +203,6 @@ impl<L: SimdFloat> Aggregate<L> {
     /// Returns `true` if there are no primitives.
     pub fn is_empty(&self) -> bool {
         self.sources.is_empty()
-    }
-
-    /// Returns the origin of each primitive.
-    pub fn sources(&self) -> &[PrimitiveId] {
-        &self.sources
     }
 
     fn batch_index(&self, primitive: u32) -> usize {

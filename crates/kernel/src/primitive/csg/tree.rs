@@ -1,6 +1,6 @@
 //! Canonical form of compounds: their parts, and the tree of set operations that combines them.
 
-use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
+use crate::primitive::canonical::{Bounds, CanonicalShape, Proxy};
 use crate::primitive::csg::solid::Solid;
 use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
@@ -60,10 +60,6 @@ impl CanonicalShape for CsgSolid {
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         self.parts.iter().flat_map(|part| part.normals_at(point, slack)).collect()
-    }
-
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Box
     }
 
     fn proxies(&self) -> Vec<Proxy> {

@@ -19,11 +19,14 @@ pub struct TriangleBlock {
 /// Triangle mesh with its BVH. Memory: about 58 bytes per triangle for the BVH, 12 per triangle for
 /// vertex indices, and 12 to 32 per vertex.
 pub struct Mesh {
-    mesh: TriangleMesh,
-    boxes: Bvh8,
-    leaves: Vec<TriangleBlock>,
+    /// Triangles of the mesh, in the order of the BVH's leaves.
+    pub mesh: TriangleMesh,
+    /// Inner nodes of the mesh's BVH.
+    pub boxes: Bvh8,
+    /// Leaves of the mesh's BVH.
+    pub leaves: Vec<TriangleBlock>,
     /// Index of the first triangle of each leaf.
-    firsts: Vec<u32>,
+    pub firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
@@ -79,26 +82,6 @@ impl Mesh {
         Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
     }
 
-    /// Returns the triangles of the mesh, in the order of the BVH's leaves.
-    pub fn mesh(&self) -> &TriangleMesh {
-        &self.mesh
-    }
-
-    /// Returns the inner nodes of the mesh's BVH, without its leaves.
-    pub fn boxes(&self) -> &Bvh8 {
-        &self.boxes
-    }
-
-    /// Returns the leaves of the mesh's BVH, as blocks of triangles.
-    pub fn leaves(&self) -> &[TriangleBlock] {
-        &self.leaves
-    }
-
-    /// Returns the index of the first triangle of a leaf.
-    pub fn first_triangle(&self, leaf: usize) -> u32 {
-        self.firsts[leaf]
-    }
-
     /// Returns a unit normal per vertex: those of the file, or else the mean normal of the adjacent
     /// triangles, which the first call computes.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
@@ -130,7 +113,7 @@ impl Mesh {
             if bound >= least {
                 continue;
             }
-            let node = &self.boxes.nodes()[index as usize];
+            let node = &self.boxes.nodes[index as usize];
             let first = stack.len();
             for i in node.children() {
                 let corner = |from: usize| {

@@ -46,12 +46,12 @@ impl CanonicalShape for MeshForm {
     }
 
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
-        let [low, high] = self.mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        let [low, high] = self.mesh.mesh.bounds.map(|c| DVec3::from(c.map(f64::from)));
         Some((self.scene_from_mesh, (low, high)))
     }
 
     fn thickness(&self) -> f64 {
-        let [low, high] = self.mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
+        let [low, high] = self.mesh.mesh.bounds.map(|corner| DVec3::from(corner.map(f64::from)));
         let m = self.scene_from_mesh.matrix3;
         let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
         let size = ((high - low) * DVec3::from(stretched)).to_array();
@@ -73,7 +73,7 @@ impl CanonicalShape for MeshForm {
         if point.cmplt(low - slack).any() || point.cmpgt(high + slack).any() {
             return Vec::new();
         }
-        let mesh = self.mesh.mesh();
+        let mesh = &self.mesh.mesh;
         let corner = |i: u32| {
             let position = mesh.positions[i as usize].map(f64::from);
             self.scene_from_mesh.transform_point3(DVec3::from(position))
@@ -91,7 +91,7 @@ impl CanonicalShape for MeshForm {
     }
 
     fn default_mapping(&self) -> DefaultMapping {
-        match self.mesh.mesh().uvs {
+        match self.mesh.mesh.uvs {
             Some(_) => DefaultMapping::Uv,
             None => DefaultMapping::Box,
         }
@@ -103,7 +103,7 @@ impl CanonicalShape for MeshForm {
     }
 
     fn triangles(&self) -> usize {
-        self.mesh.mesh().triangles.len()
+        self.mesh.mesh.triangles.len()
     }
 }
 
@@ -175,7 +175,7 @@ impl<S: Float> MeshInstance<S> {
     /// Compiles a placed mesh; none without finite bounds.
     pub fn of(form: &MeshForm) -> Option<Self> {
         let MeshForm { mesh, scene_from_mesh, smooth } = form;
-        let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        let [low, high] = mesh.mesh.bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
         let inverse = scene_from_mesh.matrix3.inverse();
         let columns = [inverse.x_axis, inverse.y_axis, inverse.z_axis];
@@ -252,7 +252,7 @@ impl<S: Float> MeshInstance<S> {
     /// any triangle id; it is clamped to a valid one.
     #[inline(always)]
     fn vertices<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L, lane: usize) -> [u32; 3] {
-        let triangles = &self.mesh.mesh().triangles;
+        let triangles = &self.mesh.mesh.triangles;
         triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)]
     }
 
@@ -267,7 +267,7 @@ impl<S: Float> MeshInstance<S> {
 
     #[inline(always)]
     fn triangle<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L) -> Triangle<L> {
-        Triangle { corners: self.vectors(triangle_tag, &self.mesh.mesh().positions) }
+        Triangle { corners: self.vectors(triangle_tag, &self.mesh.mesh.positions) }
     }
 }
 
@@ -354,7 +354,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
 
     #[inline(never)]
     fn uv(&self, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        let corners = self.attribute(triangle, self.mesh.mesh().uvs.as_deref()?);
+        let corners = self.attribute(triangle, self.mesh.mesh.uvs.as_deref()?);
         let triangle = self.triangle(triangle);
         let weights = triangle.weights(self.point(point));
         let gradient = triangle.gradients();
@@ -392,7 +392,7 @@ impl<S: Float> MeshInstance<S> {
     /// See [`Aggregate::color`](crate::primitive::Aggregate::color).
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(&self, triangle: L) -> Option<Vec3<L>> {
-        let mesh = self.mesh.mesh();
+        let mesh = &self.mesh.mesh;
         mesh.color(0)?;
         let number = |lane| (triangle.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
@@ -403,7 +403,7 @@ impl<S: Float> MeshInstance<S> {
 
     /// Returns `true` if the mesh has vertex or face colours.
     pub fn is_colored(&self) -> bool {
-        self.mesh.mesh().color(0).is_some()
+        self.mesh.mesh.color(0).is_some()
     }
 }
 

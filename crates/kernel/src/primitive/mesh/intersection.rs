@@ -46,7 +46,7 @@ struct ShearedRay<L> {
 /// tests.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
-    let [low, high] = mesh.mesh().bounds;
+    let [low, high] = mesh.mesh.bounds;
     let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
     let pad = (ray.origin.max_abs() + broadcast(reach)) * L::from_f64(8.0 * L::EPSILON);
     SlabPacket::new(ray, Vec3::new(pad, pad, pad))
@@ -130,10 +130,10 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             return found;
         }
         let bounds = PacketBounds::around(packet, wanted);
-        let boxes = self.mesh.boxes();
+        let boxes = &self.mesh.boxes;
         let leaf = |number: usize, _| {
-            let leaf = &self.mesh.leaves()[number];
-            let first = self.mesh.first_triangle(number);
+            let leaf = &self.mesh.leaves[number];
+            let first = self.mesh.firsts[number];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
                 // Bounding boxes of the triangles, one per lane. A triangle is tested only if the
@@ -177,9 +177,9 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     #[inline(always)]
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let packet = slab_packet(ray, self.mesh);
-        let [low, high] = self.mesh.mesh().bounds;
+        let [low, high] = self.mesh.mesh.bounds;
         let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
-        let turn = COHERENCE_LIMIT / (self.mesh.mesh().triangles.len() as f64).sqrt();
+        let turn = COHERENCE_LIMIT / (self.mesh.mesh.triangles.len() as f64).sqrt();
         let turn = turn.min(MAX_COHERENT_SPREAD);
         if ray.is_coherent(limit.gt(L::zero()).bits(), turn, turn * size) {
             return self.traverse_as_packet((ray, &packet), limit);
@@ -200,7 +200,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             *found = (limit.lane(lane), 0);
         }
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
-            let leaf = &self.mesh.leaves()[number];
+            let leaf = &self.mesh.leaves[number];
             let sheared_ray = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
@@ -210,7 +210,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                     let lane = bits.trailing_zeros();
                     bits &= bits - 1;
                     let t = t.lane(lane as usize);
-                    let number = self.mesh.first_triangle(number) + (part * L::WIDTH) as u32 + lane;
+                    let number = self.mesh.firsts[number] + (part * L::WIDTH) as u32 + lane;
                     if t < *best || t == *best && number < *triangle {
                         (*best, *triangle) = (t, number);
                     }
@@ -219,10 +219,10 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             if ANY && *best < limit { L::Scalar::from_f64(-1.0) } else { *best }
         };
         let soon = |number: usize| {
-            let rows = self.mesh.leaves()[number].corners.as_flattened();
+            let rows = self.mesh.leaves[number].corners.as_flattened();
             rows.iter().step_by(2).for_each(prefetch);
         };
-        let boxes = self.mesh.boxes();
+        let boxes = &self.mesh.boxes;
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
             traverse_rays(boxes, (packet, limit), stack, soon, leaf)
         });
