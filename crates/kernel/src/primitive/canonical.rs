@@ -36,18 +36,20 @@ impl HalfSpace {
     }
 }
 
-/// Texture mapping that is used if a material does not choose one.
+/// Formula of texture coordinates (u, v) in texture space: x to the right, y up, z to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DefaultMapping {
-    /// For flat geometry.
+pub enum Projection {
+    /// Planar projection: u = x, v = y.
     Planar,
-    /// For geometry that is round on all sides.
+    /// Spherical projection: u is the angle around y in turns, 1/2 at the front; v the angle from
+    /// the lower pole in half turns.
     Spherical,
-    /// For geometry that is round about an axis.
+    /// Cylindrical projection: u is the angle around y in turns, 1/2 at the front; v the height
+    /// above the shape's lower end divided by the shape's height.
     Cylindrical,
-    /// For geometry with flat sides and for all other geometry.
+    /// Planar projection of each side of a box, seen from outside.
     Box,
-    /// Texture coordinates that the geometry itself has.
+    /// No projection: the shape's own texture coordinates.
     Uv,
 }
 
@@ -144,9 +146,10 @@ pub trait CanonicalShape {
     /// list for each solid of a compound, or of other geometry, with such a surface.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// See [`DefaultMapping`].
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Box
+    /// Returns the projection that is used if a material does not choose one: planar for flat
+    /// geometry, and one of a box for geometry that is not round.
+    fn default_mapping(&self) -> Projection {
+        Projection::Box
     }
 
     /// Returns the proxies; none for geometry with too many details.

@@ -15,13 +15,18 @@ pub struct SurfacePoint<L> {
     pub max_coordinate: L,
 }
 
-/// Texture coordinates at one point of a primitive, with their gradients.
+/// Texture coordinates of a point, in repetitions of the image, and their gradients with respect to
+/// the position in texture space.
 #[derive(Clone, Copy, Debug)]
-pub struct UvGradients<L> {
-    /// u to the right, v up.
-    pub uv: [L; 2],
-    /// Gradients of u and v along the surface, per unit of length in the space of the shape.
-    pub gradients: [Vec3<L>; 2],
+pub struct TexCoord<L> {
+    /// Coordinate to the right in the image.
+    pub u: L,
+    /// Coordinate upwards in the image.
+    pub v: L,
+    /// Gradient of u.
+    pub grad_u: Vec3<L>,
+    /// Gradient of v.
+    pub grad_v: Vec3<L>,
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
@@ -47,7 +52,7 @@ pub trait Primitive<L: SimdFloat> {
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L>;
 
     /// See [`Aggregate::uv`](crate::primitive::Aggregate::uv).
-    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>>;
+    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>>;
 }
 
 /// Primitive whose intersections are computed by a formula, without a search.
@@ -61,7 +66,7 @@ pub trait AnalyticPrimitive<L: SimdFloat> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 
     /// Returns the texture coordinates of the primitive's own parametrisation; `None` without one.
-    fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
+    fn uv(&self, _point: Vec3<L>) -> Option<TexCoord<L>> {
         None
     }
 }

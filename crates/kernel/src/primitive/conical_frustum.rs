@@ -5,7 +5,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, bounds_of_points, box_distance, normals_of_solid, rows,
+    Bounds, CanonicalShape, Projection, bounds_of_points, box_distance, normals_of_solid, rows,
     segment_distance,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
@@ -107,8 +107,8 @@ impl CanonicalShape for ConicalFrustumForm {
         normals_of_solid(sides, slack)
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Cylindrical
+    fn default_mapping(&self) -> Projection {
+        Projection::Cylindrical
     }
 }
 

@@ -4,7 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, box_distance, frobenius_norm, normals_of_solid, rows,
+    Bounds, CanonicalShape, Projection, box_distance, frobenius_norm, normals_of_solid, rows,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -62,8 +62,8 @@ impl CanonicalShape for EllipsoidForm {
         normals_of_solid(vec![(height, steepness.normalize())], slack)
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Spherical
+    fn default_mapping(&self) -> Projection {
+        Projection::Spherical
     }
 }
 

@@ -26,9 +26,9 @@ pub use aggregate::{
 };
 pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
 pub use canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, box_distance,
+    Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace, box_distance,
 };
-pub use compiled::{SurfacePoint, UvGradients};
+pub use compiled::{SurfacePoint, TexCoord};
 pub use conical_frustum::{AROUND_TIP, ConicalFrustumForm};
 pub use convex_polyhedron::ConvexPolyhedronForm;
 pub use csg::{CsgSolid, CsgTree, Solid};

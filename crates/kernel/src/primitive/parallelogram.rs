@@ -3,7 +3,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
+    Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace, bounds_of_points,
     segment_distance,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
@@ -72,8 +72,8 @@ impl CanonicalShape for ParallelogramForm {
         if on { vec![vec![normal]] } else { Vec::new() }
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Planar
+    fn default_mapping(&self) -> Projection {
+        Projection::Planar
     }
 
     fn proxies(&self) -> Vec<Proxy> {

@@ -3,7 +3,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace,
+    Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
@@ -40,8 +40,8 @@ impl CanonicalShape for PlaneForm {
         if on { vec![vec![self.normal]] } else { Vec::new() }
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Planar
+    fn default_mapping(&self) -> Projection {
+        Projection::Planar
     }
 
     fn proxies(&self) -> Vec<Proxy> {

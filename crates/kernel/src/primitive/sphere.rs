@@ -4,7 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, ProxyFace, normals_of_solid, similarity,
+    Bounds, CanonicalShape, Projection, Proxy, ProxyFace, normals_of_solid, similarity,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{Solid, SolidPrimitive, Span};
@@ -61,8 +61,8 @@ impl CanonicalShape for SphereForm {
         normals_of_solid(vec![(distance - self.radius, from_center / distance)], slack)
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Spherical
+    fn default_mapping(&self) -> Projection {
+        Projection::Spherical
     }
 
     fn proxies(&self) -> Vec<Proxy> {

@@ -17,10 +17,10 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, box_distance, frobenius_norm, normals_of_solid, rows,
+    Bounds, CanonicalShape, Projection, box_distance, frobenius_norm, normals_of_solid, rows,
     similarity,
 };
-use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, TexCoord};
 use crate::primitive::csg::{SolidPrimitive, Span};
 use crate::primitive::ellipsoid::{rounded_rows, times, transposed_times};
 use glam::{DAffine3, DVec3};
@@ -113,8 +113,8 @@ impl CanonicalShape for TorusForm {
 
     /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from 0
     /// to 1.
-    fn default_mapping(&self) -> DefaultMapping {
-        DefaultMapping::Uv
+    fn default_mapping(&self) -> Projection {
+        Projection::Uv
     }
 }
 
@@ -418,7 +418,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
         }
     }
 
-    fn uv(&self, point: Vec3<L>) -> Option<UvGradients<L>> {
+    fn uv(&self, point: Vec3<L>) -> Option<TexCoord<L>> {
         let p = times(&self.unit_from_scene, point - Vec3::splat(self.center));
         let rho2 = p.x.mul_add(p.x, p.z * p.z).max(L::from_f64(1e-12));
         let rho = rho2.sqrt();
@@ -429,12 +429,11 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for Torus<L::Scalar> {
         let across2 = beyond.mul_add(beyond, p.y * p.y);
         let around_tube = per / across2.max(L::from_f64(1e-30));
         let inward = -(p.y * around_tube) / rho;
-        Some(UvGradients {
-            uv: [p.x.atan2(p.z).mul_add(turn, half), p.y.atan2(beyond).mul_add(turn, half)],
-            gradients: [
-                Vec3::new(p.z * around_ring, L::zero(), -(p.x * around_ring)),
-                Vec3::new(p.x * inward, beyond * around_tube, p.z * inward),
-            ],
+        Some(TexCoord {
+            u: p.x.atan2(p.z).mul_add(turn, half),
+            v: p.y.atan2(beyond).mul_add(turn, half),
+            grad_u: Vec3::new(p.z * around_ring, L::zero(), -(p.x * around_ring)),
+            grad_v: Vec3::new(p.x * inward, beyond * around_tube, p.z * inward),
         })
     }
 }

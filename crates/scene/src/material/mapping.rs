@@ -9,23 +9,7 @@ use crate::material::texture::{Axis, Mapping, Placement};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
-
-/// Formula of texture coordinates (u, v) in texture space: x to the right, y up, z to the front.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Projection {
-    /// Planar projection: u = x, v = y.
-    Planar,
-    /// Spherical projection: u is the angle around y in turns, 1/2 at the front; v the angle from
-    /// the lower pole in half turns.
-    Spherical,
-    /// Cylindrical projection: u is the angle around y in turns, 1/2 at the front; v the height
-    /// above the shape's lower end divided by the shape's height.
-    Cylindrical,
-    /// Planar projection of each side of a box, seen from outside.
-    Box,
-    /// No projection: the shape's own texture coordinates.
-    Uv,
-}
+use zerkalo_kernel::primitive::{Projection, TexCoord};
 
 /// Distance that v keeps from 0 and 1 in a cylindrical projection, so that rounding errors at a flat
 /// end of the shape do not move v past the edge of the image.
@@ -42,20 +26,6 @@ const POINT_ROUNDINGS: f64 = 16.0;
 /// Largest angle between the normal of a surface and the gradient of a texture coordinate at which
 /// the coordinate counts as constant along the surface, in rounding errors of 1.
 const ANGLE_ROUNDINGS: f64 = 64.0;
-
-/// Texture coordinates of a point, in repetitions of the image, and their gradients with respect to
-/// the position in texture space.
-#[derive(Clone, Copy, Debug)]
-pub struct TexCoord<L> {
-    /// Coordinate to the right in the image.
-    pub u: L,
-    /// Coordinate upwards in the image.
-    pub v: L,
-    /// Gradient of u.
-    pub grad_u: Vec3<L>,
-    /// Gradient of v.
-    pub grad_v: Vec3<L>,
-}
 
 /// Placement of a texture on one part of an object, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]

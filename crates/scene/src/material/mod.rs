@@ -15,7 +15,7 @@ pub use bsdf::{
     Bsdf, BsdfQuery, BsdfSample, BsdfValue, ReflectionLobe, SpecularModel, Transmission,
 };
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
-pub use mapping::{Projection, TexCoord, TextureMapping};
+pub use mapping::TextureMapping;
 pub use microfacet::{FacetNormals, MicrofacetDistribution, SMOOTH_ALPHA};
 pub use refraction::{FresnelSplit, Interface};
 pub use rough_interface::{InterfaceMedia, InterfaceQuery, InterfaceSample};

@@ -42,7 +42,6 @@ pub use texture_space::TextureSpace;
 pub use torus::Torus;
 pub use transform::{Rotate, Scale, TransformOp, compose, ill_conditioned};
 pub use unit_frustum::UnitFrustum;
-pub use zerkalo_kernel::primitive::DefaultMapping;
 
 #[cfg(test)]
 mod normals_at_test;

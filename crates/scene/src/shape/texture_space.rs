@@ -3,7 +3,7 @@
 use crate::shape::Shape;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
-use zerkalo_kernel::primitive::DefaultMapping;
+use zerkalo_kernel::primitive::Projection;
 
 /// Texture space of a shape that is no compound: x to the right, y up or along the axis, z to the
 /// front or along the normal, in scene units before the object's transform.
@@ -14,7 +14,7 @@ pub struct TextureSpace {
     /// Corners of the shape's bounding box in texture space; for a plane, its `point`.
     pub corners: [DVec3; 2],
     /// Mapping that `mapping = "auto"` selects for the shape.
-    pub default_mapping: DefaultMapping,
+    pub default_mapping: Projection,
 }
 
 impl TextureSpace {
@@ -33,9 +33,9 @@ impl TextureSpace {
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {
-            DefaultMapping::Uv => true,
-            DefaultMapping::Planar => low != high,
-            DefaultMapping::Spherical | DefaultMapping::Cylindrical | DefaultMapping::Box => false,
+            Projection::Uv => true,
+            Projection::Planar => low != high,
+            Projection::Spherical | Projection::Cylindrical | Projection::Box => false,
         }
     }
 }
@@ -125,7 +125,7 @@ mod tests {
         let cube = one("shape.cube = { corner = [4.0, 0.0, 1.0], edge = 1.5, rotation = 33.0 }");
         let size = cube.corners[1] - cube.corners[0];
         assert!((size - DVec3::splat(1.5)).length() < 1e-12, "its own sides: {size}");
-        assert_eq!(cube.default_mapping, DefaultMapping::Box);
+        assert_eq!(cube.default_mapping, Projection::Box);
     }
 
     #[test]
@@ -142,10 +142,7 @@ mod tests {
         let spaces = compound.texture_spaces();
         assert_eq!(spaces.len(), compound.form().parts());
         let kinds: Vec<_> = spaces.iter().map(|s| s.default_mapping).collect();
-        assert_eq!(
-            kinds,
-            [DefaultMapping::Spherical, DefaultMapping::Box, DefaultMapping::Cylindrical]
-        );
+        assert_eq!(kinds, [Projection::Spherical, Projection::Box, Projection::Cylindrical]);
         let corner = spaces[1].shape_from_texture.transform_point3(DVec3::ONE);
         assert!((corner - DVec3::new(7.0, 2.0, 2.0)).length() < 1e-12, "{corner}");
     }

@@ -3,13 +3,14 @@
 use crate::world::World;
 use glam::{DAffine3, DVec3};
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
-use zerkalo_kernel::primitive::{Aggregate, PrimitiveId, SurfacePoint, keep_visible};
+use zerkalo_kernel::primitive::{
+    Aggregate, PrimitiveId, Projection, SurfacePoint, TexCoord, keep_visible,
+};
 use zerkalo_scene::Scene;
 use zerkalo_scene::material::{
-    Bump, BumpMap, CompiledTexture, Mapping, Material, Placement, Projection, TexCoord, Texture,
-    TextureMapping,
+    Bump, BumpMap, CompiledTexture, Mapping, Material, Placement, Texture, TextureMapping,
 };
-use zerkalo_scene::shape::{DefaultMapping, TextureSpace};
+use zerkalo_scene::shape::TextureSpace;
 
 /// Texture and bump map of one primitive.
 struct SurfaceTexture<S> {
@@ -35,18 +36,14 @@ pub(crate) struct ShadingPoints<L: SimdFloat> {
 
 /// Returns the projection that `mapping` selects for a shape.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
-    match (mapping, space.default_mapping) {
-        (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
-            Projection::Planar
-        }
-        (Mapping::Spherical, _) | (Mapping::Auto, DefaultMapping::Spherical) => {
-            Projection::Spherical
-        }
-        (Mapping::Cylindrical, _) | (Mapping::Auto, DefaultMapping::Cylindrical) => {
-            Projection::Cylindrical
-        }
-        (Mapping::Box, _) | (Mapping::Auto, DefaultMapping::Box) => Projection::Box,
-        (Mapping::Uv, _) | (Mapping::Auto, DefaultMapping::Uv) => Projection::Uv,
+    match mapping {
+        Mapping::Auto => space.default_mapping,
+        Mapping::Uv if space.default_mapping == Projection::Planar => Projection::Planar,
+        Mapping::Uv => Projection::Uv,
+        Mapping::Planar => Projection::Planar,
+        Mapping::Spherical => Projection::Spherical,
+        Mapping::Cylindrical => Projection::Cylindrical,
+        Mapping::Box => Projection::Box,
     }
 }
 
@@ -140,11 +137,9 @@ fn coordinates<L: SimdFloat>(
 ) -> TexCoord<L> {
     let surface = &points.surface;
     if mapping.wants_uv()
-        && let Some(mesh_uv) = geometry.uv(points.primitive, points.triangle, surface.point)
+        && let Some(own) = geometry.uv(points.primitive, points.triangle, surface.point)
     {
-        let [u, v] = mesh_uv.uv;
-        let [grad_u, grad_v] = mesh_uv.gradients;
-        return mapping.placed(TexCoord { u, v, grad_u, grad_v });
+        return mapping.placed(own);
     }
     mapping.coordinates(surface.point, surface.normal)
 }

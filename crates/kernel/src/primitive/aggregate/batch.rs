@@ -2,7 +2,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::primitive::compiled::{AnalyticPrimitive, Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, Primitive, SurfacePoint, TexCoord};
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg::CompoundPart;
@@ -43,7 +43,7 @@ macro_rules! batches {
                     AnalyticPrimitive::surface(self, point)
                 }
 
-                fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+                fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
                     AnalyticPrimitive::uv(self, point)
                 }
             }
@@ -132,7 +132,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
     }
 
     /// See [`Aggregate::uv`](super::Aggregate::uv).
-    pub fn uv(&self, primitive: usize, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    pub fn uv(&self, primitive: usize, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
         each!(self, primitives => Primitive::uv(&primitives[primitive], triangle, point))
     }
 }

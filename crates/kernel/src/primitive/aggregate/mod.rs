@@ -12,7 +12,7 @@ use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::batch::{LabelledBatch, PrimitiveBatch, compile};
 use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::aggregate::scene_bvh::SceneBvh;
-use crate::primitive::compiled::{SurfacePoint, UvGradients};
+use crate::primitive::compiled::{SurfacePoint, TexCoord};
 use crate::primitive::form::Form;
 use crate::primitive::mesh::instance::MeshInstance;
 use std::fmt;
@@ -437,7 +437,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the texture coordinates that the geometry of `primitive` defines at `point`, if any.
-    pub fn uv(&self, primitive: u32, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    pub fn uv(&self, primitive: u32, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
         let batch = &self.batches[self.batch_index(primitive)];
         batch.batch.uv((primitive - batch.base) as usize, triangle, point)
     }

@@ -20,7 +20,7 @@ pub use tree::{CsgSolid, CsgTree};
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::canonical::CanonicalShape;
-use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{Primitive, SurfacePoint, TexCoord};
 use crate::primitive::csg::interval::{Event, Interval, Transition, events, insert, with_scratch};
 use crate::primitive::csg::solid::CompiledSolid;
 use std::ops::Range;
@@ -209,7 +209,7 @@ impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
         SurfacePoint { normal, ..surface }
     }
 
-    fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    fn uv(&self, _triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
         self.compound.parts[self.part].solid.uv(point)
     }
 }

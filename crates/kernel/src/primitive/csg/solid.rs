@@ -3,7 +3,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::CanonicalShape;
-use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint, TexCoord};
 use crate::primitive::conical_frustum::{ConicalFrustum, ConicalFrustumForm};
 use crate::primitive::convex_polyhedron::{ConvexPolyhedron, ConvexPolyhedronForm};
 use crate::primitive::ellipsoid::{Ellipsoid, EllipsoidForm};
@@ -107,7 +107,7 @@ macro_rules! solids {
             }
 
             /// See [`AnalyticPrimitive::uv`].
-            pub fn uv<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> Option<UvGradients<L>> {
+            pub fn uv<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> Option<TexCoord<L>> {
                 match self {
                     $(Self::$kind(solid) => solid.uv(point),)+
                 }

@@ -6,10 +6,9 @@ use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, frobenius_norm, rows,
-    segment_distance,
+    Bounds, CanonicalShape, Projection, Proxy, box_distance, frobenius_norm, rows, segment_distance,
 };
-use crate::primitive::compiled::{Primitive, SurfacePoint, UvGradients};
+use crate::primitive::compiled::{Primitive, SurfacePoint, TexCoord};
 use crate::primitive::keep_visible;
 use crate::primitive::mesh::{Mesh, intersection};
 use glam::{DAffine3, DVec3};
@@ -90,10 +89,10 @@ impl CanonicalShape for MeshForm {
         if normals.is_empty() { Vec::new() } else { vec![normals] }
     }
 
-    fn default_mapping(&self) -> DefaultMapping {
+    fn default_mapping(&self) -> Projection {
         match self.mesh.mesh.uvs {
-            Some(_) => DefaultMapping::Uv,
-            None => DefaultMapping::Box,
+            Some(_) => Projection::Uv,
+            None => Projection::Box,
         }
     }
 
@@ -353,7 +352,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
     }
 
     #[inline(never)]
-    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    fn uv(&self, triangle: L, point: Vec3<L>) -> Option<TexCoord<L>> {
         let corners = self.attribute(triangle, self.mesh.mesh.uvs.as_deref()?);
         let triangle = self.triangle(triangle);
         let weights = triangle.weights(self.point(point));
@@ -363,8 +362,8 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
             let value = a * weights[0] + b * weights[1] + c * weights[2];
             (value, gradient[0] * (b - a) + gradient[1] * (c - a))
         };
-        let ((u, du), (v, dv)) = (along(0), along(1));
-        Some(UvGradients { uv: [u, v], gradients: [du, dv] })
+        let ((u, grad_u), (v, grad_v)) = (along(0), along(1));
+        Some(TexCoord { u, v, grad_u, grad_v })
     }
 }
 
