@@ -46,10 +46,13 @@ impl Bench {
         scene.film.size = size;
         scene.trace.acceleration = acceleration;
         let world = AnyWorld::compile(&scene, &Options::default());
-        let (scales, mix) = (world.group_scales(), LightWeights { weights: world.mix(&scene) });
+        let (scales, mix) = (
+            world.info().scales.clone(),
+            LightWeights { weights: world.info().groups.mix(&scene) },
+        );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let [width, height] = size.map(|n| n as usize);
-        let precision = world.lanes().to_string();
+        let precision = world.info().lanes.to_string();
         let film = Film::new(Header { width, height, scales, seed: 1, precision });
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         Self { world, film, estimator, pool }

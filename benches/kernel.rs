@@ -131,7 +131,7 @@ fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];
     let world = World::<L>::new(&scene);
-    let scales = world.scales().to_vec();
+    let scales = world.info.scales.clone();
     let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
     let precision = "single".to_string();
@@ -185,20 +185,23 @@ fn wave(c: &mut Criterion) {
     group.sample_size(10);
     for precision in [Precision::Single, Precision::Double] {
         let world = AnyWorld::compile(&scene, &Options { precision, ..Options::default() });
-        let (scales, mix) = (world.group_scales(), LightWeights { weights: world.mix(&scene) });
+        let (scales, mix) = (
+            world.info().scales.clone(),
+            LightWeights { weights: world.info().groups.mix(&scene) },
+        );
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let header = Header {
             width: 640,
             height: 480,
             scales,
             seed: 1,
-            precision: world.precision().to_string(),
+            precision: world.info().precision.to_string(),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
         let film = Film::new(header.clone());
         let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first: 8, count: 8 });
         let wave = Wave { replicate: 0, jobs: jobs.collect(), estimate: false };
-        group.bench_function(world.lanes(), |b| {
+        group.bench_function(world.info().lanes, |b| {
             b.iter_batched_ref(
                 || Film::new(header.clone()),
                 |film| {

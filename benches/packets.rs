@@ -72,7 +72,7 @@ fn tracer<L: SimdFloat>(form: &Form, rays: &[([f64; 3], [f64; 3])]) -> impl FnMu
 /// Creates a function that traces eight samples per pixel of `scene`, tile by tile.
 fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
     let world = World::<L>::new(scene);
-    let scales = world.scales().to_vec();
+    let scales = world.info.scales.clone();
     let mix = LightWeights { weights: vec![[1.0; 3]; scales.len()] };
     let estimator = Estimator::new(&scales, &mix, &Display::default());
     let [width, height] = scene.film.size.map(|n| n as usize);

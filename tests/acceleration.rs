@@ -143,7 +143,7 @@ fn inventory_names_acceleration() {
         let mut scene = parsed(text);
         scene.trace.acceleration = acceleration;
         let world = AnyWorld::compile(&scene, &Options::default());
-        let inventory = world.inventory().to_string();
+        let inventory = world.info().inventory.clone();
         assert!(inventory.contains(&format!("1 sphere ({name})")), "{acceleration:?}: {inventory}");
         assert!(inventory.contains("1 plane (list)"), "{acceleration:?}: {inventory}");
     }

@@ -19,7 +19,7 @@ const COLUMNS: [u32; 16] =
 fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
     let sampling = sobol(0);
     let tracer = world.camera_tracer(&sampling);
-    let scales = world.scales().to_vec();
+    let scales = world.info.scales.clone();
     let precision = "double".to_string();
     let mut film = Film::new(Header { width: 16, height: 1, scales, seed: 0, precision });
     let tile = film.slots(&[0]).remove(0).prepare();
@@ -29,7 +29,7 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
         let mut add = |packet: TracedPacket<f64>, radiance: &mut Radiance<Double>| {
             for (lane, pixel) in packet.pixels.clone().enumerate() {
                 assert!(pixel < TILE_PIXELS);
-                for (group, scale) in world.scales().iter().enumerate() {
+                for (group, scale) in world.info.scales.iter().enumerate() {
                     let value = radiance.groups[group];
                     let sums = [value.x, value.y, value.z].map(|channel| {
                         let lanes = channel.fixed(*scale);
@@ -54,7 +54,7 @@ fn big_picture_has_the_pixels_of_single_rays() {
     let path = std::env::var_os("ZERKALO_PICTURE").map(PathBuf::from).expect("a picture");
     let scene = sized(shipped("mirror-room-physical.toml"), [SIDE; 2]);
     let world = AnyWorld::compile(&scene, &Options::default());
-    let mix = LightWeights { weights: world.mix(&scene) };
+    let mix = LightWeights { weights: world.info().groups.mix(&scene) };
     let AnyWorld::Double(world) = &world else { panic!("double precision is expected") };
     let decoder = png::Decoder::new(BufReader::new(File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();

@@ -17,7 +17,7 @@ enum Bias {
 }
 
 fn reported_bias(scene: &Scene, limit: &str) -> Bias {
-    let all = AnyWorld::compile(scene, &world::Options::default()).biases();
+    let all = AnyWorld::compile(scene, &world::Options::default()).info().biases.clone();
     let Some(text) = all.iter().find(|text| text.starts_with(limit)) else { return Bias::Zero };
     match text.split_once("at most ") {
         Some((_, rest)) => Bias::AtMost(rest.split(' ').next().unwrap().parse().unwrap()),

@@ -59,7 +59,7 @@ fn light_weights_replace_retracing() {
         let rendering = rendered(&before, 4, precision, 8);
         let unchanged = picture(&rendering, Replicates::Both).concat();
         for (what, after) in &changes {
-            let mix = LightWeights { weights: rendering.world.mix(after) };
+            let mix = LightWeights { weights: rendering.world.info().groups.mix(after) };
             let (mut mixed, mut row) = (Vec::new(), Vec::new());
             for y in 0..rendering.film.height() {
                 rendering.film.row(y, Replicates::Both, &mix, &mut row);
@@ -87,7 +87,7 @@ fn many_lights() -> Scene {
         scene.lights.push(light);
     }
     let world = AnyWorld::compile(&scene, &world::Options::default());
-    assert!(world.inventory().contains("shared light group"));
+    assert!(world.info().inventory.contains("shared light group"));
     scene
 }
 

@@ -282,6 +282,6 @@ fn scene_is_not_saved_where_mesh_would_be_missing() {
 #[test]
 fn the_inventory_counts_triangles() {
     let scene = shipped("shape-mesh.toml");
-    let inventory = AnyWorld::compile(&scene, &Options::default()).inventory().to_string();
+    let inventory = AnyWorld::compile(&scene, &Options::default()).info().inventory.clone();
     assert!(inventory.contains("4 meshes of 23,106 triangles (list)"), "{inventory}");
 }

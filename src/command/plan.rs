@@ -77,7 +77,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         size: scene.film.size,
         seed: args.compute.seed,
         sampler: args.sampler,
-        precision: state.world.precision().to_string(),
+        precision: state.world.info().precision.to_string(),
         display: args.picture.display(),
         rays_per_pixel: scene.film.rays_per_pixel,
         noise_levels: args.noise,

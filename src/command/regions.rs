@@ -28,8 +28,8 @@ impl Division {
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         // The measured memory of the process then includes the scene.
         let world = AnyWorld::compile(scene, &args.precision.world_options());
-        let groups = world.light_groups().members.len();
-        let merged = world.light_groups().merged_count();
+        let groups = world.info().groups.members.len();
+        let merged = world.info().groups.merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
         let (cap, limit) = usable(cap);
         // `check` demands more memory than `divide` estimates.

@@ -179,7 +179,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
         let written = state.write(report, &provenance, depth, &output);
-        (report.clone(), state.world.precision(), state.world.biases(), written)
+        (report.clone(), state.world.info().precision, state.world.info().biases.clone(), written)
     });
     let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;
     written?;
@@ -204,7 +204,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     let results = render.write(&provenance, args.bits, output, &mut observe);
     let results = results.map(|(report, stopped_by)| {
         let world = &render.state().world;
-        (report, stopped_by, world.precision(), world.biases())
+        (report, stopped_by, world.info().precision, world.info().biases.clone())
     });
     drop(render);
     progress.finish();

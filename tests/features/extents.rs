@@ -18,7 +18,7 @@ fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<
 /// their formulas say, and that no acceleration structure changes a bit of the picture.
 fn uses_object_boxes(original: &Scene, tested: &Scene) -> Verdict {
     let world = AnyWorld::compile(tested, &Options::default());
-    let inventory = world.inventory().to_string();
+    let inventory = world.info().inventory.clone();
     ensure(inventory.contains("boxes of their own"), || inventory.clone())?;
     hits_agree(original, tested)?;
     for precision in [Precision::Single, Precision::Double] {

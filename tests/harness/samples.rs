@@ -72,12 +72,12 @@ pub fn trace_packet<L: SimdFloat>(
     let points = sampler.block(first, L::WIDTH);
     let draws = points.for_pixel(sampler.key(pixel, 0));
     let half = L::from_f64(0.5);
-    let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
-    let mut path = Path::new(world.camera().rays(corner, jitter));
+    let jitter = if world.jitter { draws.pixel() } else { (half, half) };
+    let corner = Vec3::splat(world.camera.pixel_corner_direction(pixel));
+    let mut path = Path::new(world.camera.rays(corner, jitter));
     let mut radiance = Radiance::black();
     world.trace(&mut path, None, &draws, active, &mut radiance);
-    let groups = &radiance.groups[..world.groups()];
+    let groups = &radiance.groups[..world.info.scales.len()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
     (0..L::WIDTH).map(of_lane).collect()
 }

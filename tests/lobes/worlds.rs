@@ -63,7 +63,7 @@ fn extreme_26_parallel_mirrors() {
         let double = AnyWorld::compile(&scene, &options(Precision::Double));
         let first = rho.powi(depth as i32 + 1);
         let cut = first / (1.0 - rho);
-        let told = double.biases();
+        let told = double.info().biases.clone();
         assert_eq!(told.len(), 1, "{told:?}");
         assert!(told[0].contains(&format!("max_depth {depth} ")), "{told:?}");
         // The report shows the bound with three digits, rounded up.

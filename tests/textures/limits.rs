@@ -78,7 +78,7 @@ fn ramp_tilts_normals_by_its_slope() {
 }
 
 fn inventory(scene: &Scene) -> String {
-    AnyWorld::compile(scene, &Options::default()).inventory().to_string()
+    AnyWorld::compile(scene, &Options::default()).info().inventory.clone()
 }
 
 #[test]

@@ -76,7 +76,8 @@ impl SampleInputs {
         };
         self.contents_hash == compiled.contents_hash()
             && AnyWorld::compile(&compiled, &world::Options::default())
-                .light_groups()
+                .info()
+                .groups
                 .can_reuse(&compiled, scene)
     }
 

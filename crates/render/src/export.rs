@@ -69,7 +69,7 @@ pub fn metadata(
     report: &Report,
     provenance: &Provenance,
 ) -> Vec<(String, String)> {
-    let biases = state.world.biases();
+    let biases = &state.world.info().biases;
     let biased = if biases.is_empty() { "no".to_string() } else { biases.join("; ") };
     let header = state.film.header();
     let (sampler, adaptive) = (provenance.sampler.name(), provenance.adaptive);

@@ -82,12 +82,12 @@ pub(super) struct TileRenderer<'a, L: SimdFloat> {
 impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
         let mut limits = [L::zero(); MAX_GROUPS];
-        for (limit, scale) in limits.iter_mut().zip(world.scales()) {
+        for (limit, scale) in limits.iter_mut().zip(&world.info.scales) {
             *limit = L::from_f64((49f64.exp2() / scale).min(L::MAX));
         }
         Self {
             tracer: world.camera_tracer(sampling),
-            scales: world.scales(),
+            scales: &world.info.scales,
             limits,
             whole_tile: pixels_of([TILE; 2]),
         }
@@ -308,10 +308,10 @@ mod tests {
         )
         .unwrap_or_else(|e| panic!("{e}"));
         let world = World::<Single>::new(&scene);
-        assert_eq!(world.groups(), 2);
+        assert_eq!(world.info.scales.len(), 2);
         let renderer =
             TileRenderer::new(&world, &SampleSettings { seed: 0, kind: SamplerKind::Sobol });
-        let limit = 49f64.exp2() / world.scales()[0];
+        let limit = 49f64.exp2() / world.info.scales[0];
         for (value, stored) in [
             (f64::NAN, 0.0),
             (-1.0, 0.0),
@@ -319,7 +319,7 @@ mod tests {
             (f64::INFINITY, limit),
             (1e30, limit),
         ] {
-            let (scales, precision) = (world.scales().to_vec(), "single".to_string());
+            let (scales, precision) = (world.info.scales.clone(), "single".to_string());
             let mut film = Film::new(Header { width: 8, height: 1, scales, seed: 0, precision });
             let tile = film.slots(&[0]).remove(0).prepare();
             let mut rejected = RejectedSamples::new(0);

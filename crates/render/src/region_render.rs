@@ -65,8 +65,8 @@ impl RegionRender {
         let state = RenderState::compile(Arc::clone(scene), options, None, rows_at_once)?;
         let report = Report {
             compile_seconds: start.elapsed().as_secs_f64(),
-            lanes: state.world.lanes(),
-            inventory: Arc::from(state.world.inventory()),
+            lanes: state.world.info().lanes,
+            inventory: Arc::from(&*state.world.info().inventory),
             spp: Spp { min: u32::MAX, mean: 0.0, max: 0 },
             threads,
             ..Report::default()

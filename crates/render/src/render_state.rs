@@ -78,7 +78,7 @@ impl RenderState {
     ) -> Result<Self, String> {
         let world = AnyWorld::compile(&scene, &options.world);
         let (size, groups) =
-            ([scene.film.size[0], rows.len() as u32], world.light_groups().members.len());
+            ([scene.film.size[0], rows.len() as u32], world.info().groups.members.len());
         let film_of = |previous: &Self| {
             let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
             Film::memory_bytes(size, previous.film.groups())
@@ -91,11 +91,11 @@ impl RenderState {
         let header = Header {
             width,
             height,
-            scales: world.group_scales(),
+            scales: world.info().scales.clone(),
             seed: options.sampling.seed,
-            precision: world.precision().to_string(),
+            precision: world.info().precision.to_string(),
         };
-        let mix = LightWeights { weights: world.mix(&scene) };
+        let mix = LightWeights { weights: world.info().groups.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &mix, &options.display);
         let film = match previous {
             Some(previous) => previous.film.reuse_for(header),
@@ -103,7 +103,7 @@ impl RenderState {
         };
         let film = film.map_err(|_| memory_budget::refused(size, groups))?;
         let film = film.starting_at(rows.start as usize);
-        let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
+        let lighting = Relighting::new(Arc::clone(&scene), world.info().groups.clone());
         Ok(Self {
             world,
             film,
@@ -135,7 +135,7 @@ impl RenderState {
 
     /// Returns the name of each light group.
     pub fn group_names(&self) -> Vec<String> {
-        self.world.light_groups().names(&self.scene)
+        self.world.info().groups.names(&self.scene)
     }
 
     /// Returns the light groups of the film, with the scene for which its samples were traced.
@@ -165,7 +165,7 @@ impl RenderState {
         let film = &self.film;
         let pixels = (0..film.tile_count()).map(|tile| film.tile_pixels(tile) as u32);
         let pixels: Vec<u32> = pixels.collect();
-        Schedule::new(&pixels, settings).with_light_period(self.world.light_period())
+        Schedule::new(&pixels, settings).with_light_period(self.world.info().light_period)
     }
 
     /// Traces the jobs of the first pass, see `first_pass::run`. The film of a cancelled pass may

@@ -3,10 +3,8 @@
 use crate::analysis::precision;
 use crate::compile::RecenteredGeometry;
 use crate::integrator::first_hit::FirstHit;
-use crate::lights::choice::LightChoice;
-use crate::lights::groups::LightGroups;
-use crate::world::World;
-use zerkalo_kernel::lanes::{Double, SimdFloat, Single};
+use crate::world::{World, WorldInfo};
+use zerkalo_kernel::lanes::{Double, Single};
 use zerkalo_scene::Scene;
 
 /// Floating-point precision in which a scene is rendered.
@@ -39,16 +37,6 @@ pub enum AnyWorld {
     Double(World<Double>),
 }
 
-/// Evaluates an expression with `$world` bound to the [`World`] of an [`AnyWorld`].
-macro_rules! dispatch {
-    ($any:expr, $world:ident => $value:expr) => {
-        match $any {
-            AnyWorld::Single($world) => $value,
-            AnyWorld::Double($world) => $value,
-        }
-    };
-}
-
 /// Returns `true` if [`Precision::Auto`] chooses double precision for `scene`.
 pub fn requires_double(scene: &Scene) -> bool {
     !single_suffices(scene, &RecenteredGeometry::new(scene))
@@ -75,63 +63,20 @@ impl AnyWorld {
         }
     }
 
-    /// Returns the name of the precision: `single` or `double`.
-    pub fn precision(&self) -> &'static str {
+    /// Returns the properties of the world that do not depend on its precision.
+    pub fn info(&self) -> &WorldInfo {
         match self {
-            Self::Single(_) => "single",
-            Self::Double(_) => "double",
+            Self::Single(world) => &world.info,
+            Self::Double(world) => &world.info,
         }
-    }
-
-    /// Returns the name of the SIMD type, such as `f32x8`.
-    pub fn lanes(&self) -> &'static str {
-        match self {
-            Self::Single(_) => Single::NAME,
-            Self::Double(_) => Double::NAME,
-        }
-    }
-
-    /// Returns the name of each light group.
-    pub fn group_names(&self) -> Vec<String> {
-        dispatch!(self, world => world.group_names.clone())
-    }
-
-    /// Returns the light groups.
-    pub fn light_groups(&self) -> &LightGroups {
-        dispatch!(self, world => &world.groups)
     }
 
     /// Writes the first hit of the camera ray through each of `points`, positions in the picture
     /// \[pixels\], into `hits`, a slice of the same length.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
-        dispatch!(self, world => world.first_hit(points, hits))
-    }
-
-    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two.
-    pub fn group_scales(&self) -> Vec<f64> {
-        dispatch!(self, world => world.scales.clone())
-    }
-
-    /// Returns the factors of each light group in the picture of `scene`, see [`LightGroups::mix`].
-    pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
-        dispatch!(self, world => world.groups.mix(scene))
-    }
-
-    /// Returns the number of successive samples of a pixel that together trace a shadow ray to each
-    /// light once; 1 if every sample traces shadow rays to all lights.
-    pub fn light_period(&self) -> u32 {
-        dispatch!(self, world => world.light_choice.as_ref().map_or(1, LightChoice::period))
-    }
-
-    /// Returns the list of features that the compiled scene contains.
-    pub fn inventory(&self) -> &str {
-        dispatch!(self, world => &world.inventory)
-    }
-
-    /// Returns one sentence for each setting of the scene that ends paths early, such as
-    /// `max_depth`. Each sentence gives an upper bound of the light that is lost.
-    pub fn biases(&self) -> Vec<String> {
-        dispatch!(self, world => world.truncation_biases.clone())
+        match self {
+            Self::Single(world) => world.first_hit(points, hits),
+            Self::Double(world) => world.first_hit(points, hits),
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::analysis::inventory::inventory;
 use crate::analysis::radiance_range::SceneDistances;
-use crate::analysis::truncation_bias;
+use crate::analysis::truncation_bias::truncation_bounds;
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
@@ -15,7 +15,9 @@ use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
 use crate::lights::emitters::{Emitters, ObjectGeometry};
 use crate::lights::groups::{LightGroupSource, LightGroups};
 use crate::lights::on_surfaces::OnSurface;
-use crate::world::{DeltaSource, EnvironmentSource, LightSource, ShadowRayTarget, World};
+use crate::world::{
+    DeltaSource, EnvironmentSource, LightSource, ShadowRayTarget, World, WorldInfo,
+};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::{Float, SimdFloat};
@@ -445,9 +447,15 @@ impl<L: SimdFloat> World<L> {
                 .groups
                 .find(&LightGroupSource::Background)
                 .filter(|_| has_background),
-            group_names: lights.groups.names(scene),
-            groups: lights.groups,
-            scales: lights.scales,
+            info: WorldInfo {
+                groups: lights.groups,
+                scales: lights.scales,
+                precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
+                lanes: L::NAME,
+                light_period: lights.choice.as_ref().map_or(1, LightChoice::period),
+                inventory: String::new(),
+                biases: truncation_bounds(scene),
+            },
             sources: lights.sources,
             light_choice: lights.choice,
             emitters: lights.emitters,
@@ -457,10 +465,8 @@ impl<L: SimdFloat> World<L> {
             light_buffers: culling.light_buffers,
             camera,
             jitter: scene.film.filter == Filter::Box,
-            inventory: String::new(),
-            truncation_biases: truncation_bias::truncation_bounds(scene),
         };
-        world.inventory = inventory(scene, &world);
+        world.info.inventory = inventory(scene, &world);
         world
     }
 }

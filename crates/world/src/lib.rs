@@ -18,4 +18,4 @@ pub use integrator::path::{Counts, Path, Radiance};
 pub use lights::groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
 pub use tile_tracer::{CameraTracer, TileTracer, TracedPacket};
-pub use world::World;
+pub use world::{World, WorldInfo};

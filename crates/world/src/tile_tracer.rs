@@ -123,8 +123,8 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     ) {
         let world = self.world;
         let center = L::from_f64(0.5);
-        let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
-        let camera = world.camera();
+        let offset = if world.jitter { sampler.pixel() } else { (center, center) };
+        let camera = &world.camera;
         let mut path = Path::new(camera.rays(corner_directions, offset));
         if let Some(lens) = camera.lens() {
             let (u, v) = sampler.lens();

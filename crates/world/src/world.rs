@@ -100,47 +100,44 @@ pub struct World<L: SimdFloat> {
     pub(super) min_weight: f64,
     /// See [`BsdfQuery::fold`](zerkalo_scene::material::BsdfQuery::fold).
     pub(super) fold: bool,
-    pub(super) camera: PerspectiveCamera,
+    /// Camera, in coordinates relative to the scene's centre.
+    pub camera: PerspectiveCamera,
     /// Candidates for rays that belong to no tile.
     pub(super) all_candidates: TileCandidates,
     /// Light buffer of each light in `sources`; shadow rays to a light without one traverse the BVH.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     pub(super) culling: CullingMode,
-    pub(super) groups: LightGroups,
-    pub(super) group_names: Vec<String>,
-    /// Scale of each light group: the number of integer steps per unit of radiance in the film.
-    pub(super) scales: Vec<f64>,
+    /// Properties that do not depend on the SIMD type.
+    pub info: WorldInfo,
     /// `true` if samples are distributed over the area of their pixel, not at its centre.
-    pub(super) jitter: bool,
-    pub(super) inventory: String,
-    /// One sentence for each setting that ends paths early, with an upper bound of the lost light.
-    pub(super) truncation_biases: Vec<String>,
+    pub jitter: bool,
+}
+
+/// Properties of a compiled scene that do not depend on its SIMD type.
+pub struct WorldInfo {
+    /// Light groups.
+    pub groups: LightGroups,
+    /// Scale of each light group: the number of integer steps per unit of radiance in the film, a
+    /// power of two.
+    pub scales: Vec<f64>,
+    /// Name of the precision: `single` or `double`.
+    pub precision: &'static str,
+    /// Name of the SIMD type, such as `f32x8`.
+    pub lanes: &'static str,
+    /// Number of successive samples of a pixel that together trace a shadow ray to each light once;
+    /// 1 if every sample traces shadow rays to all lights.
+    pub light_period: u32,
+    /// List of the features that the compiled scene contains.
+    pub inventory: String,
+    /// One sentence for each setting of the scene that ends paths early, such as `max_depth`. Each
+    /// sentence gives an upper bound of the light that is lost.
+    pub biases: Vec<String>,
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Returns the number of light groups.
-    pub fn groups(&self) -> usize {
-        self.scales.len()
-    }
-
-    /// Returns the scale of each light group.
-    pub fn scales(&self) -> &[f64] {
-        &self.scales
-    }
-
-    /// Returns `true` if samples are distributed over the area of their pixel.
-    pub fn jitter(&self) -> bool {
-        self.jitter
-    }
-
     /// Returns the random positions that camera rays use.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
-    }
-
-    /// Returns the camera, in coordinates relative to the scene's centre.
-    pub fn camera(&self) -> &PerspectiveCamera {
-        &self.camera
     }
 
     /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.

@@ -35,7 +35,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let reference = reference.transpose()?;
     let plan = plan(args);
     let world = AnyWorld::compile(&scene, &world::Options::default());
-    let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
+    let (lanes, single) = (world.info().lanes, matches!(world, AnyWorld::Single(_)));
     drop(world);
     let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));

@@ -141,7 +141,7 @@ impl ShardRender {
             eta_seconds: Some((left, left)),
             progress: Some(self.progress()),
             recent_samples_per_second: speed,
-            lanes: self.state.world.lanes(),
+            lanes: self.state.world.info().lanes,
             threads: self.pool.current_num_threads(),
             ..Report::default()
         }

@@ -109,7 +109,7 @@ impl Schedule {
     }
 
     /// Sets the light period: the number of samples of a pixel that together trace a shadow ray to
-    /// each light once; see [`AnyWorld::light_period`](zerkalo_world::AnyWorld::light_period).
+    /// each light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
     ///
     /// The error falls steeply at this number of samples. Estimates from fewer samples do not
     /// predict the error, and are discarded once a tile has one from this many.

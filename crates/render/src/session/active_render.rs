@@ -84,7 +84,7 @@ impl ActiveRender {
             first_picture_after: None,
             estimates_stale: false,
             throughput: Throughput::default(),
-            inventory: Arc::from(state.world.inventory()),
+            inventory: Arc::from(&*state.world.info().inventory),
             downsample: None,
             first_hits: None,
             first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
@@ -304,7 +304,7 @@ impl ActiveRender {
             saturated_pixels: self.state.film.saturated_pixels(),
             recent_samples_per_second: self.speed().unwrap_or(0.0),
             threads: context.pool.current_num_threads(),
-            lanes: self.state.world.lanes(),
+            lanes: self.state.world.info().lanes,
             inventory: Arc::clone(&self.inventory),
         }
     }

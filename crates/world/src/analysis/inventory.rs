@@ -12,7 +12,7 @@ use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
 /// commas, in one line.
 pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
-    let groups = &world.groups.members;
+    let groups = &world.info.groups.members;
     let (emissive, unsampled) = world.emitters.object_counts();
     let mut parts = vec![world.geometry.to_string()];
     let textures = world.surface_textures.as_ref().map(SurfaceTextures::features);
@@ -57,7 +57,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         (ray_types == RayTypes::Shadows && has_lights, "shadows only"),
         (scene.film.filter == Filter::Point, "no anti-aliasing"),
     ]));
-    parts.push(format!("{} precision", if L::EPSILON > 1e-10 { "single" } else { "double" }));
+    parts.push(format!("{} precision", world.info.precision));
     parts.join(", ")
 }
 

@@ -50,7 +50,7 @@ impl<L: SimdFloat> World<L> {
         active: L::Mask,
         out: &mut Radiance<L>,
     ) {
-        for group in &mut out.groups[..self.groups()] {
+        for group in &mut out.groups[..self.info.scales.len()] {
             *group = Vec3::zero();
         }
         let candidates = candidates.unwrap_or(&self.all_candidates);
