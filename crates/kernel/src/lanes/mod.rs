@@ -91,12 +91,12 @@ macro_rules! float {
 float!(f32);
 float!(f64);
 
-/// Implements methods of [`SimdFloat`] by the inherent methods of `$type` with the same names.
+/// Implements methods of SIMD traits by inherent methods of `$type`.
 macro_rules! by_own_methods {
-    ($type:ident: $($name:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
+    ($type:ident: $($name:ident = $own:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
         #[inline(always)]
         fn $name(self, $($argument: Self),*) -> $result {
-            <$type>::$name(self, $($argument),*)
+            <$type>::$own(self, $($argument),*)
         }
     )+};
 }
@@ -113,12 +113,15 @@ pub trait Mask:
     + Not<Output = Self>
     + 'static
 {
-    /// Returns `true` if at least one lane is true.
-    fn any(self) -> bool;
-    /// Returns `true` if every lane is true.
-    fn all(self) -> bool;
     /// Returns lane `i` as bit `i`.
     fn bits(self) -> u32;
+    /// Returns `true` if every lane is true.
+    fn all(self) -> bool;
+    /// Returns `true` if at least one lane is true.
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
     /// Returns lane `i`.
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
@@ -197,7 +200,10 @@ pub trait SimdFloat:
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
     /// Returns `table[indices[i]]` in each lane `i`.
-    fn gather(table: &[Self::Scalar], indices: &[u32; MAX_WIDTH]) -> Self;
+    #[inline(always)]
+    fn gather(table: &[Self::Scalar], indices: &[u32; MAX_WIDTH]) -> Self {
+        Self::from_fn(|i| table[indices[i] as usize])
+    }
     /// Returns lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
     /// Returns `x`, rounded, in every lane.

@@ -5,10 +5,6 @@ use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i6
 
 impl Mask for bool {
     #[inline(always)]
-    fn any(self) -> bool {
-        self
-    }
-    #[inline(always)]
     fn all(self) -> bool {
         self
     }
@@ -97,10 +93,6 @@ macro_rules! scalar_lanes {
                 f(0)
             }
             #[inline(always)]
-            fn gather(table: &[$float], indices: &[u32; MAX_WIDTH]) -> Self {
-                table[indices[0] as usize]
-            }
-            #[inline(always)]
             fn lane(self, _: usize) -> $float {
                 self
             }
@@ -127,13 +119,13 @@ macro_rules! scalar_lanes {
             }
             by_own_methods! {
                 $float:
-                abs() -> Self,
-                sqrt() -> Self,
-                sin_cos() -> (Self, Self),
-                atan2(x) -> Self,
-                ln() -> Self,
-                exp() -> Self,
-                copysign(sign) -> Self,
+                abs = abs() -> Self,
+                sqrt = sqrt() -> Self,
+                sin_cos = sin_cos() -> (Self, Self),
+                atan2 = atan2(x) -> Self,
+                ln = ln() -> Self,
+                exp = exp() -> Self,
+                copysign = copysign(sign) -> Self,
             }
             #[inline(always)]
             fn lt(self, other: Self) -> bool {

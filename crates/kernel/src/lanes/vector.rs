@@ -7,7 +7,7 @@ use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 use wide::{f32x16, f64x8, i32x16, i64x8, u32x16};
 
 macro_rules! vector_bits {
-    ($bits:ident, $n:literal, $reverse:expr) => {
+    ($bits:ident, $reverse:expr) => {
         impl SimdU32 for $bits {
             #[inline(always)]
             fn splat(x: u32) -> Self {
@@ -89,23 +89,19 @@ fn reverse4(x: u32x4) -> u32x4 {
     cast(i8x16::shuffle(cast(bytes), order))
 }
 
-vector_bits!(u32x8, 8, reverse8);
-vector_bits!(u32x4, 4, reverse4);
+vector_bits!(u32x8, reverse8);
+vector_bits!(u32x4, reverse4);
 #[cfg(target_feature = "avx512f")]
-vector_bits!(u32x16, 16, reverse_by_shifts);
-
-/// Implements [`SimdFloat::gather`] by one table access for each lane.
-#[inline(always)]
-fn gather_by_lane<L: SimdFloat>(table: &[L::Scalar], indices: &[u32; MAX_WIDTH]) -> L {
-    L::from_fn(|i| table[indices[i] as usize])
-}
+vector_bits!(u32x16, reverse_by_shifts);
 
 /// Looks up all lanes by one permutation instruction, if the table fits into one register.
 #[cfg(target_feature = "avx512f")]
 #[inline(always)]
 fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
     use safe_arch::{m512i, permute_i32_m512i};
-    let Ok(table) = <[f32; 16]>::try_from(table) else { return gather_by_lane(table, indices) };
+    let Ok(table) = <[f32; 16]>::try_from(table) else {
+        return f32x16::new(array_from_fn(|i| table[indices[i] as usize]));
+    };
     let indices = m512i::from(cast::<[u32; 16], [i32; 16]>(*indices));
     let table = m512i::from(cast::<[f32; 16], [i32; 16]>(table));
     let lanes: [i32; 16] = permute_i32_m512i(indices, table).into();
@@ -122,19 +118,12 @@ fn fold_to_four(sums: &[i64]) -> i64x4 {
 
 macro_rules! vector_lanes {
     ($vector:ident, $half:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, [$double:ident, $long:ident],
-     $gather:expr, $unit:expr) => {
+     $unit:expr $(; $gather:ident)?) => {
         impl Mask for $vector {
-            #[inline(always)]
-            fn any(self) -> bool {
-                $vector::to_bitmask(self) != 0
-            }
+            by_own_methods! { $vector: bits = to_bitmask() -> u32 }
             #[inline(always)]
             fn all(self) -> bool {
                 $vector::to_bitmask(self) == (1u32 << $n) - 1
-            }
-            #[inline(always)]
-            fn bits(self) -> u32 {
-                $vector::to_bitmask(self)
             }
         }
 
@@ -154,26 +143,13 @@ macro_rules! vector_lanes {
             fn from_fn(f: impl FnMut(usize) -> $scalar) -> Self {
                 $vector::new(array_from_fn(f))
             }
-            #[inline(always)]
+            $(#[inline(always)]
             fn gather(table: &[$scalar], indices: &[u32; MAX_WIDTH]) -> Self {
-                let gather: fn(&[$scalar], &[u32; MAX_WIDTH]) -> Self = $gather;
-                gather(table, indices)
-            }
+                $gather(table, indices)
+            })?
             #[inline(always)]
             fn lane(self, i: usize) -> $scalar {
                 self.as_array()[i]
-            }
-            #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                $vector::mul_add(self, a, b)
-            }
-            #[inline(always)]
-            fn min(self, other: Self) -> Self {
-                $vector::fast_min(self, other)
-            }
-            #[inline(always)]
-            fn max(self, other: Self) -> Self {
-                $vector::fast_max(self, other)
             }
             #[inline(always)]
             fn min_max(self) -> ($scalar, $scalar) {
@@ -191,21 +167,18 @@ macro_rules! vector_lanes {
             }
             by_own_methods! {
                 $vector:
-                abs() -> Self,
-                sqrt() -> Self,
-                sin_cos() -> (Self, Self),
-                atan2(x) -> Self,
-                ln() -> Self,
-                exp() -> Self,
-                copysign(sign) -> Self,
-            }
-            #[inline(always)]
-            fn lt(self, other: Self) -> Self {
-                self.simd_lt(other)
-            }
-            #[inline(always)]
-            fn le(self, other: Self) -> Self {
-                self.simd_le(other)
+                mul_add = mul_add(a, b) -> Self,
+                min = fast_min(other) -> Self,
+                max = fast_max(other) -> Self,
+                abs = abs() -> Self,
+                sqrt = sqrt() -> Self,
+                sin_cos = sin_cos() -> (Self, Self),
+                atan2 = atan2(x) -> Self,
+                ln = ln() -> Self,
+                exp = exp() -> Self,
+                copysign = copysign(sign) -> Self,
+                lt = simd_lt(other) -> Self,
+                le = simd_le(other) -> Self,
             }
             #[inline(always)]
             fn mask(value: bool) -> Self {
@@ -269,20 +242,20 @@ macro_rules! vector_lanes {
     };
 }
 
-vector_lanes!(f32x8, f32x4, f32, u32x8, u32, 8, [f64x4, i64x4], gather_by_lane, |bits| {
+vector_lanes!(f32x8, f32x4, f32, u32x8, u32, 8, [f64x4, i64x4], |bits| {
     f32x8::from_i32x8(cast::<u32x8, i32x8>(bits >> 8u32)) * f32x8::splat(1.0 / 16_777_216.0)
 });
-vector_lanes!(f64x4, f64x2, f64, u32x4, u64, 4, [f64x4, i64x4], gather_by_lane, |bits| {
+vector_lanes!(f64x4, f64x2, f64, u32x4, u64, 4, [f64x4, i64x4], |bits| {
     let signed: i32x4 = cast(bits ^ u32x4::splat(0x8000_0000));
     (f64x4::from_i32x4(signed) + f64x4::splat(2_147_483_648.5))
         * f64x4::splat(1.0 / 4_294_967_296.0)
 });
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f32x16, f32x8, f32, u32x16, u32, 16, [f64x8, i64x8], gather16, |bits| {
+vector_lanes!(f32x16, f32x8, f32, u32x16, u32, 16, [f64x8, i64x8], |bits| {
     f32x16::from_i32x16(cast::<u32x16, i32x16>(bits >> 8u32)) * f32x16::splat(1.0 / 16_777_216.0)
-});
+}; gather16);
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f64x8, f64x4, f64, u32x8, u64, 8, [f64x8, i64x8], gather_by_lane, |bits| {
+vector_lanes!(f64x8, f64x4, f64, u32x8, u64, 8, [f64x8, i64x8], |bits| {
     let signed: i32x8 = cast(bits ^ u32x8::splat(0x8000_0000));
     (f64x8::from_i32x8(signed) + f64x8::splat(2_147_483_648.5))
         * f64x8::splat(1.0 / 4_294_967_296.0)

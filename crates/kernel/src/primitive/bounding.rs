@@ -78,12 +78,13 @@ impl Frustum {
         let Self { apex, forward, corners, .. } = self;
         let axis = corners.iter().sum::<DVec3>().normalize();
         let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
-        if cos > 0.0 {
-            let cone = Cone { apex: *apex, axis, cos, sin: (1.0 - cos * cos).sqrt() };
-            return cone.meets(ball);
-        }
         let to = ball.center - *apex;
-        let reach = ball.reach(*apex);
+        let reach = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center) + ray_error(*apex);
+        if cos > 0.0 {
+            let (along, across) = along_and_across(to, axis);
+            let sin = (1.0 - cos * cos).sqrt();
+            return along >= -reach && across * cos - along * sin <= reach;
+        }
         let is_outside = |i: usize| {
             let normal = corners[i].cross(corners[(i + 1) % 4]);
             let inward = normal * normal.dot(axis).signum();
@@ -127,11 +128,6 @@ impl BoundingSphere {
         let errors = ray_error(self.center) + ray_error(other.center);
         self.center.distance(other.center)
             <= self.radius + errors + other.radius * (1.0 + F32_RAY_ERROR)
-    }
-
-    /// Returns the radius with a margin for the rounding errors of rays that start at `apex`.
-    fn reach(&self, apex: DVec3) -> f64 {
-        self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
 }
 
@@ -264,9 +260,7 @@ impl BoundingVolume {
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
         }
-        let to = self.ball.center - lit.center;
-        let along = to.dot(direction);
-        let across = (to - direction * along).length();
+        let (along, across) = along_and_across(self.ball.center - lit.center, direction);
         let radius = grown(lit).radius + self.ball.radius;
         let both = radius * (1.0 + F32_RAY_ERROR) + ray_error(self.ball.center);
         across <= both && along >= -both
@@ -285,8 +279,7 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     let axis = b.center - a.center;
     let length = axis.length().max(f64::MIN_POSITIVE);
     let direction = axis / length;
-    let along = (point - a.center).dot(direction);
-    let across = (point - a.center - direction * along).length();
+    let (along, across) = along_and_across(point - a.center, direction);
     // Distance between the point and the interpolated ball with the centre at `x` on the axis, a
     // convex function. It is least where the sine of the angle between the line from the centre to
     // the point and the perpendicular to the axis is `slope`.
@@ -301,23 +294,11 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     distance(nearest.clamp(0.0, length)).min(ends)
 }
 
-/// Infinite cone of less than 90 degrees around an axis.
-struct Cone {
-    apex: DVec3,
-    axis: DVec3,
-    sin: f64,
-    cos: f64,
-}
-
-impl Cone {
-    /// Returns `true` if `ball` may overlap the cone.
-    fn meets(&self, ball: &BoundingSphere) -> bool {
-        let to = ball.center - self.apex;
-        let along = to.dot(self.axis);
-        let across = (to - self.axis * along).length();
-        let radius = ball.reach(self.apex);
-        along >= -radius && across * self.cos - along * self.sin <= radius
-    }
+/// Returns the signed length of the part of `v` along the unit vector `axis`, and the length of the
+/// part perpendicular to it.
+fn along_and_across(v: DVec3, axis: DVec3) -> (f64, f64) {
+    let along = v.dot(axis);
+    (along, (v - axis * along).length())
 }
 
 #[cfg(test)]

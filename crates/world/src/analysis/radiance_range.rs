@@ -24,7 +24,7 @@ use crate::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 use zerkalo_kernel::lanes::Float;
-use zerkalo_kernel::primitive::{Bounds, Form, box_distance};
+use zerkalo_kernel::primitive::{BoundingSphere, Bounds, Form, box_distance};
 use zerkalo_scene::asset::RadianceMap;
 use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::{CompiledLight, DeltaLight, Emitter};
@@ -128,6 +128,8 @@ struct Response {
 }
 
 impl Response {
+    const WHITE: Self = Self { least: 1.0, most: 1.0, peak: 1.0 };
+
     /// Returns `None` if the material reflects no direct light.
     fn new(material: &Material) -> Option<Self> {
         let diffuse = material.color.0.map(|c| c * material.diffuse);
@@ -162,6 +164,17 @@ fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
         away if away > 0.0 => away,
         _ => 0.5 * bounds.0.distance(bounds.1),
     }
+}
+
+/// Light whose irradiance depends on the distance from it.
+struct LitBy {
+    center: DVec3,
+    /// Radius of a sphere around the light; 0 for a light without a size.
+    radius: f64,
+    /// Smallest distance from surfaces that counts, except for `spots`.
+    min_distance: f64,
+    /// Largest distance at which the light counts as on a surface; negative if it never does.
+    min_clearance: f64,
 }
 
 /// Properties of a scene without its lights, from which the [`RadianceRange`] of each light group
@@ -234,20 +247,19 @@ impl<'a> SceneDistances<'a> {
 
     /// Returns the factors over all objects; 1 if no object reflects direct light.
     fn response(&self) -> Response {
-        let all = self.responses.iter().flatten().copied().reduce(Response::or);
-        all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 })
+        self.responses.iter().flatten().copied().reduce(Response::or).unwrap_or(Response::WHITE)
     }
 
     /// Returns the range for ambient light of intensity 1.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
-        self.range_of(1.0, (least, most, most))
+        self.range_of(1.0, Response { least, most, peak: most })
     }
 
     /// Returns the range for a background of intensity 1.
     pub fn background(&self) -> RadianceRange {
-        self.range_of(1.0, (1.0, 1.0, 1.0))
+        self.range_of(1.0, Response::WHITE)
     }
 
     /// Returns the range for a light of intensity 1. `visible` is `true` if the camera and mirrors
@@ -263,121 +275,116 @@ impl<'a> SceneDistances<'a> {
     fn delta<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
-            let Response { least, most, peak } = self.response();
-            return self.range_of(typical, (least, most, peak));
+            return self.range_of(typical, self.response());
         };
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
-        // The bright spot on a surface below a light is about as wide as the distance between them.
-        // Spots smaller than a quarter of a pixel are ignored.
-        let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
-        let spots = radiance_at(clearance(self.forms, position));
-        let mut out =
-            RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
-        for (form, response) in self.forms.iter().zip(&self.responses) {
-            let Some(response) = response else { continue };
+        let source = LitBy {
+            center: position,
+            radius: 0.0,
+            // The bright spot on a surface below a light is about as wide as the distance between
+            // them. Spots smaller than a quarter of a pixel are ignored.
+            min_distance: (0.25 * pixel * eye.distance(position)).max(self.ray_offset),
             // A light on a surface does not illuminate that surface, because shadow rays from the
             // surface start above the light.
-            if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
-                let radiance = radiance_at(distance.max(min_distance));
-                out.brightest = out.brightest.max(radiance * response.most);
-                out.spots = out.spots.max(radiance_at(distance) * response.most);
-                out.extreme = out.extreme.max(radiance * response.peak * self.gain);
-            }
-            let far = form.bounds().map_or_else(
-                || form.clearance(position).unwrap_or(0.0),
-                |bounds| distance_to_box(bounds, position),
-            );
-            let radiance = radiance_at(far.max(min_distance));
-            out.dimmest = out.dimmest.min(radiance * response.least * self.faintest);
-        }
-        let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
-        RadianceRange {
-            dimmest: or_typical(out.dimmest),
-            brightest: or_typical(out.brightest),
-            extreme: or_typical(out.extreme),
-            ..out
-        }
+            min_clearance: self.ray_offset,
+        };
+        let range = self.lit_by(&source, typical, radiance_at);
+        let spots = range.spots.max(radiance_at(clearance(self.forms, position)));
+        RadianceRange { spots, ..range }
     }
 
     fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
-        if emitter.is_distant() {
-            return self.distant_disk(emitter.radiance.to_f64(), visible);
+        let emitted = emitter.radiance.to_f64();
+        if !emitter.is_distant() {
+            let ball = BoundingSphere { center: emitter.center, radius: emitter.radius };
+            return self.emitting_surface(ball, emitter.area, emitted, visible);
         }
-        let ball = (emitter.center, emitter.radius);
-        self.emitting_surface(ball, emitter.area, emitter.radiance.to_f64(), visible)
-    }
-
-    /// Returns the range of the radiance due to an infinitely distant disk that gives a facing surface
-    /// the irradiance pi. `emitted` is the radiance of the disk, counted if it is `visible`.
-    fn distant_disk(&self, emitted: f64, visible: bool) -> RadianceRange {
-        let Response { least, most, peak } = self.response();
-        let range = self.range_of(1.0, (least, most, peak));
-        if !visible {
-            return range;
-        }
+        // An infinitely distant disk gives a facing surface the irradiance pi.
+        let range = self.range_of(1.0, self.response());
         // The angular radius, of whose sine `emitted` is the inverse square, is compared with a
         // quarter of a pixel.
         let is_wide = emitted.sqrt().recip() > 0.25 * self.eye.1;
-        RadianceRange {
-            brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },
-            spots: range.spots.max(emitted),
-            extreme: range.extreme.max(emitted * self.gain),
-            ..range
-        }
+        if visible { self.seen(range, emitted, is_wide) } else { range }
     }
 
     /// Returns the range for object `index` of radiance 1. The area of the object's bounding sphere
     /// stands for its own.
     pub fn object(&self, index: usize) -> RadianceRange {
-        match self.forms[index].bounds() {
-            Some((low, high)) => {
-                let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high));
-                self.emitting_surface((center, radius), 4.0 * PI * radius * radius, 1.0, true)
-            }
-            // The irradiance from an infinite emissive plane is the same at every distance.
-            None => {
-                let Response { least, most, peak } = self.response();
-                self.range_of(1.0, (least, most.max(1.0), peak.max(1.0)))
-            }
+        let bounds = self.forms[index].bounds();
+        if bounds.is_some() {
+            let ball = BoundingSphere::around_box(bounds);
+            return self.emitting_surface(ball, 4.0 * PI * ball.radius * ball.radius, 1.0, true);
         }
+        // The irradiance from an infinite emissive plane is the same at every distance.
+        let Response { least, most, peak } = self.response();
+        self.range_of(1.0, Response { least, most: most.max(1.0), peak: peak.max(1.0) })
     }
 
-    /// Returns the range for a surface inside the sphere with `center` and `radius`, with the given
-    /// area and the radiance `emitted`, which counts itself if the surface is visible.
+    /// Returns the range for a surface inside the sphere `ball`, with the given area and the radiance
+    /// `emitted`, which counts itself if the surface is visible.
     fn emitting_surface(
         &self,
-        (center, radius): (DVec3, f64),
+        ball: BoundingSphere,
         area: f64,
         emitted: f64,
         visible: bool,
     ) -> RadianceRange {
+        let BoundingSphere { center, radius } = ball;
         // Radiance of a white surface that faces the emitter at `distance` from the emitter's
         // centre.
         let radiance_at = |distance: f64| {
             emitted * (area / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
         };
         let typical = radiance_at(center.length().max(self.radius));
-        let (mut dimmest, mut brightest, mut extreme) = (f64::INFINITY, 0.0f64, 0.0f64);
+        let source = LitBy { center, radius, min_distance: 0.0, min_clearance: -1.0 };
+        let range = self.lit_by(&source, typical, radiance_at);
+        let (eye, pixel) = self.eye;
+        let is_wide = radius > 0.25 * pixel * eye.distance(center);
+        if visible { self.seen(range, emitted, is_wide) } else { range }
+    }
+
+    fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
+        let mean = map.mean().into_iter().fold(0.0, f64::max);
+        let typical = if mean > 0.0 { mean } else { 1.0 };
+        let range = self.range_of(typical, self.response());
+        if !visible {
+            return range;
+        }
+        // Bright pixels of the image may be smaller than a pixel of the picture. They count as
+        // `spots` but not as `brightest`, which is at least the mean of the image.
+        let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
+        RadianceRange {
+            dimmest: range.dimmest.min(dimmest * self.faintest),
+            brightest: range.brightest.max(typical),
+            ..self.seen(range, map.max(), false)
+        }
+    }
+
+    /// Returns the range for surfaces at different distances from a light. `radiance_at` returns the
+    /// radiance of a white surface that faces the light, for the distance between them.
+    fn lit_by(
+        &self,
+        light: &LitBy,
+        typical: f64,
+        radiance_at: impl Fn(f64) -> f64,
+    ) -> RadianceRange {
+        let LitBy { center, radius, min_distance, min_clearance } = *light;
+        let (mut dimmest, mut brightest) = (f64::INFINITY, 0.0f64);
+        let (mut spots, mut extreme) = (0.0f64, 0.0f64);
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
-            let near = form.clearance(center).unwrap_or(0.0) - radius;
-            let far = form.bounds().map_or(near, |bounds| distance_to_box(bounds, center));
-            let nearest = radiance_at(near.max(0.0));
-            brightest = brightest.max(nearest * response.most);
-            extreme = extreme.max(nearest * response.peak * self.gain);
-            dimmest = dimmest.min(radiance_at(far.max(radius)) * response.least * self.faintest);
-        }
-        let mut spots = brightest;
-        if visible {
-            // The radiance of the emitting surface itself counts, too. It counts as `brightest`
-            // only if the surface is larger than a quarter of a pixel.
-            let (eye, pixel) = self.eye;
-            spots = spots.max(emitted);
-            extreme = extreme.max(emitted * self.gain);
-            if radius > 0.25 * pixel * eye.distance(center) {
-                brightest = brightest.max(emitted);
+            let clearance = form.clearance(center).unwrap_or(0.0);
+            let near = clearance - radius;
+            if clearance > min_clearance {
+                let nearest = radiance_at(near.max(min_distance));
+                brightest = brightest.max(nearest * response.most);
+                spots = spots.max(radiance_at(near.max(0.0)) * response.most);
+                extreme = extreme.max(nearest * response.peak * self.gain);
             }
+            let far = form.bounds().map_or(near, |bounds| distance_to_box(bounds, center));
+            let farthest = radiance_at(far.max(radius).max(min_distance));
+            dimmest = dimmest.min(farthest * response.least * self.faintest);
         }
         let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
         RadianceRange {
@@ -389,29 +396,21 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
-        let mean = map.mean().into_iter().fold(0.0, f64::max);
-        let typical = if mean > 0.0 { mean } else { 1.0 };
-        let Response { least, most, peak } = self.response();
-        let range = self.range_of(typical, (least, most, peak));
-        if !visible {
-            return range;
-        }
-        // Bright pixels of the image may be smaller than a pixel of the picture. They count as
-        // `spots` but not as `brightest`, which is at least the mean of the image.
-        let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
+    /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see. It
+    /// counts as `brightest` only if it is larger than a quarter of a pixel (`is_wide`).
+    fn seen(&self, range: RadianceRange, emitted: f64, is_wide: bool) -> RadianceRange {
         RadianceRange {
-            dimmest: range.dimmest.min(dimmest * self.faintest),
-            brightest: range.brightest.max(typical),
-            spots: range.spots.max(map.max()),
-            extreme: range.extreme.max(map.max() * self.gain),
+            brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },
+            spots: range.spots.max(emitted),
+            extreme: range.extreme.max(emitted * self.gain),
             ..range
         }
     }
 
-    /// Returns the range for surfaces that multiply `light`, the radiance of a white surface, by
-    /// factors from `least` to `most`, and by `peak` in highlights.
-    fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
+    /// Returns the range for surfaces that multiply `light`, the radiance of a white surface, by the
+    /// factors of `response`.
+    fn range_of(&self, light: f64, response: Response) -> RadianceRange {
+        let Response { least, most, peak } = response;
         RadianceRange {
             typical: light,
             dimmest: light * least * self.faintest,

@@ -1,7 +1,7 @@
 //! First hits of camera rays, for picking objects with a pointer and for auxiliary images.
 
 use crate::world::World;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
+use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
 
 /// Object, distance and normal at the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,15 +22,15 @@ impl FirstHit {
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
-/// Implements [`World::first_hit`].
-#[inline(never)]
-pub(crate) fn trace_first_hits<L: SimdFloat>(
-    world: &World<L>,
-    points: &[[f64; 2]],
-    hits: &mut [FirstHit],
-) {
-    for (points, hits) in points.chunks(L::WIDTH).zip(hits.chunks_mut(L::WIDTH)) {
-        trace_packet(world, points, hits);
+impl<L: SimdFloat> World<L> {
+    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
+    /// same length. A point is a position in the picture: a column and a row in pixels, with
+    /// fractions.
+    #[inline(never)]
+    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
+        for (points, hits) in points.chunks(L::WIDTH).zip(hits.chunks_mut(L::WIDTH)) {
+            trace_packet(self, points, hits);
+        }
     }
 }
 
@@ -49,16 +49,11 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     let from_eye = hit_points - Vec3::of(world.camera.eye().to_array());
     let depth = from_eye.dot(from_eye).sqrt();
     hits.fill(FirstHit::MISS);
-    let valid_lanes = (1 << points.len()) - 1;
-    let mut remaining = hit.t.lt(L::from_f64(L::MAX)).bits() & valid_lanes;
-    while remaining != 0 {
-        let primitive = hit.primitive.id_lane(remaining.trailing_zeros() as usize);
-        let lanes = hit.primitive.id_eq(primitive).bits() & remaining;
-        remaining &= !lanes;
+    for (primitive, lanes) in distinct(hit.primitive, hit.t.lt(L::from_f64(L::MAX))) {
         let normal = world.geometry.surface(primitive, hit.triangle, hit_points).normal;
         let facing = normal.dot(ray.direction);
         let bsdf = &world.bsdfs[world.bsdf_of[primitive as usize] as usize];
-        for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes >> l & 1 != 0) {
+        for (lane, hit) in hits.iter_mut().enumerate().filter(|(l, _)| lanes.lane(*l)) {
             let front = facing.lane(lane).to_f64() < 0.0;
             let side = if front { 1.0 } else { -1.0 };
             let axis = |c: L| (side * c.lane(lane).to_f64()) as f32;

@@ -18,7 +18,6 @@ mod transmission;
 mod vertex;
 
 use crate::culling::tile::TileCandidates;
-use crate::integrator::first_hit::FirstHit;
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::World;
@@ -69,13 +68,6 @@ impl<L: SimdFloat> World<L> {
                 (_, false) => integrator.trace_opaque::<false, true>(path, active, None, out),
             }
         }
-    }
-
-    /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a position in the picture: a column and a row in pixels, with
-    /// fractions.
-    pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
-        first_hit::trace_first_hits(self, points, hits);
     }
 }
 

@@ -13,15 +13,7 @@ const MAX_TRIANGLES: usize = 1 << 16;
 
 /// Returns `true` if light can be sampled from points on an object of this shape.
 pub(crate) fn is_sampled(form: &Form) -> bool {
-    match form {
-        Form::Sphere(_) | Form::Parallelogram(_) | Form::ConvexPolyhedron(_) => true,
-        Form::Mesh(form) => form.mesh.mesh.triangles.len() <= MAX_TRIANGLES,
-        Form::Ellipsoid(_)
-        | Form::ConicalFrustum(_)
-        | Form::Csg(_)
-        | Form::Plane(_)
-        | Form::Torus(_) => false,
-    }
+    surface_of(form).is_some()
 }
 
 /// Returns the surface from which light of the object `form` is sampled; `None` if its points cannot
@@ -35,7 +27,7 @@ pub(crate) fn surface_of(form: &Form) -> Option<EmissiveSurface> {
         Form::ConvexPolyhedron(form) => {
             Some(EmissiveSurface::ConvexTriangles(triangles_of_polyhedron(form)))
         }
-        Form::Mesh(mesh) => is_sampled(form)
+        Form::Mesh(mesh) => (form.triangles() <= MAX_TRIANGLES)
             .then(|| EmissiveSurface::Triangles(triangles_of_mesh(mesh, 1).collect())),
         Form::Ellipsoid(_)
         | Form::ConicalFrustum(_)
