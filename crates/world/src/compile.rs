@@ -15,9 +15,7 @@ use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
 use crate::lights::emitters::{Emitters, ObjectGeometry};
 use crate::lights::groups::{LightGroupSource, LightGroups};
 use crate::lights::on_surfaces::OnSurface;
-use crate::world::{
-    DeltaSource, EnvironmentSource, LightSource, ShadowRayTarget, World, WorldInfo,
-};
+use crate::world::{DeltaSource, EnvironmentSource, ShadowRayTarget, World, WorldInfo};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::{Float, SimdFloat};
@@ -243,13 +241,13 @@ impl<S: Float> CompiledLights<S> {
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
         let (mut sources, mut emitters, mut environments) = (Vec::new(), Vec::new(), Vec::new());
         let mut ranges = HashMap::new();
-        for (index, group, emission) in groups.lights(scene) {
+        for source in groups.sources(scene) {
+            let LightGroupSource::Light(index) = *source.source else { continue };
             let light = &scene.lights[index];
             let lift = |surface: &EmissiveSurface| light_lift::<S>(geometry, surface);
             let Some(compiled) = light.compile(geometry.origin, lift) else { continue };
             ranges.insert(index, distances.light(&compiled, light.visible));
-            let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-            let source = LightSource { light: (), group, emission, visible: light.visible };
+            let source = source.with_light((), light.visible);
             match compiled {
                 CompiledLight::Delta(delta) => {
                     sources.push(source.with_light(shadow_ray_target(geometry, light, delta)));

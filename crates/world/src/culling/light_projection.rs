@@ -16,11 +16,10 @@ const MAX_TANGENT: f64 = 3.0;
 pub(crate) enum LightProjection<S> {
     /// For a point light that has primitives on several sides.
     CubeMap,
-    /// For a point light that has all primitives on one side. The third axis is the view direction.
-    /// `low` and `scale` map coordinates on the face to 0..=1.
-    Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
-    /// For a directional light, to which the two axes are perpendicular.
-    Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
+    /// Perspective projection for a point light that has all primitives on one side, or orthographic
+    /// projection for a directional light. The third axis points away from the light. `low` and
+    /// `scale` map coordinates on the face to 0..=1.
+    Planar { is_perspective: bool, axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
 }
 
 impl<S: Float> LightProjection<S> {
@@ -60,20 +59,15 @@ impl<S: Float> LightProjection<S> {
                     (cell_index(u.mul_add(scale, half)), cell_index(v.mul_add(scale, half)));
                 (face.mul_add(side, v).mul_add(side, u), limit)
             }
-            Self::Perspective { axes, low, scale } => {
-                let [a, b, c] = axes.map(|axis| d.dot(Vec3::splat(axis)));
-                let inverse = L::one() / c;
+            Self::Planar { is_perspective, axes, low, scale } => {
+                let projected = if *is_perspective { d } else { ray.origin };
+                let [a, b, c] = axes.map(|axis| projected.dot(Vec3::splat(axis)));
+                let (inverse, depth) =
+                    if *is_perspective { (L::one() / c, limit) } else { (L::one(), c) };
                 let along = |x: L, i: usize| {
                     cell_index(x.mul_add(inverse, -L::splat(low[i])) * L::splat(scale[i]))
                 };
-                (along(b, 1).mul_add(side, along(a, 0)), limit)
-            }
-            Self::Orthographic { axes, low, scale } => {
-                let along = |i: usize| {
-                    let x = ray.origin.dot(Vec3::splat(axes[i]));
-                    cell_index((x - L::splat(low[i])) * L::splat(scale[i]))
-                };
-                (along(1).mul_add(side, along(0)), -ray.origin.dot(ray.direction))
+                (along(b, 1).mul_add(side, along(a, 0)), depth)
             }
         }
     }
@@ -171,9 +165,7 @@ fn perspective<S: Float>(
         (z > ball.radius && max_tangent <= MAX_TANGENT).then_some(corners)
     };
     let corners: Vec<_> = balls.iter().map(tangents).collect::<Option<_>>()?;
-    let (low, scale, rects) = normalized(&corners);
-    let axes = axes.map(|axis| axis.to_array().map(S::from_f64));
-    Some((LightProjection::Perspective { axes, low, scale }, rects))
+    Some(planar(true, axes, &corners))
 }
 
 /// Projects spheres along `direction`, which points to the light.
@@ -187,22 +179,25 @@ fn orthographic<S: Float>(
         (center - ball.radius, center + ball.radius)
     };
     let corners: Vec<_> = balls.iter().map(square).collect();
-    let (low, scale, rects) = normalized(&corners);
-    let axes = [right, up].map(|axis| axis.to_array().map(S::from_f64));
-    (LightProjection::Orthographic { axes, low, scale }, rects)
+    planar(false, [right, up, -direction], &corners)
 }
 
-/// Maps rectangles, each given by its lowest and highest corner, into the unit square by one linear
-/// map, so that together they fill it. Returns the origin and the scale of the map, and the mapped
-/// rectangles.
-fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
+/// Returns the projection that maps rectangles, each given by its lowest and highest corner, into the
+/// unit square, so that together they fill it, and the mapped rectangles.
+fn planar<S: Float>(
+    is_perspective: bool,
+    axes: [DVec3; 3],
+    corners: &[(DVec2, DVec2)],
+) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
     let scale = (high - low).recip();
     let mapped = |v: DVec2| (v - low) * scale;
     let rect = |s: &(DVec2, DVec2)| vec![FaceRect { face: 0, low: mapped(s.0), high: mapped(s.1) }];
-    let floats = |v: DVec2| v.to_array().map(S::from_f64);
-    (floats(low), floats(scale), corners.iter().map(rect).collect())
+    let [low, scale] = [low, scale].map(|v| v.to_array().map(S::from_f64));
+    let axes = axes.map(|axis| axis.to_array().map(S::from_f64));
+    let projection = LightProjection::Planar { is_perspective, axes, low, scale };
+    (projection, corners.iter().map(rect).collect())
 }
 
 #[cfg(test)]

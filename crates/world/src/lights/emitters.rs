@@ -13,7 +13,7 @@
 
 use crate::integrator::coincident_surfaces::touching_pairs;
 use crate::lights::emissive_forms::surface_of;
-use crate::lights::groups::LightGroups;
+use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
@@ -55,21 +55,6 @@ struct TouchingObject {
     flat: bool,
 }
 
-/// Part of an object whose material emits.
-#[derive(Clone, Copy)]
-struct EmissivePart {
-    object: usize,
-    group: usize,
-    emission: [f64; 3],
-}
-
-impl EmissivePart {
-    /// Returns a value that is different for different parts.
-    fn key(&self) -> (usize, usize, [u64; 3]) {
-        (self.object, self.group, self.emission.map(f64::to_bits))
-    }
-}
-
 /// Objects of a scene, from which its emitters are compiled.
 pub(crate) struct ObjectGeometry<'a> {
     pub scene: &'a Scene,
@@ -89,36 +74,39 @@ impl<S: Float> Emitters<S> {
         groups: &LightGroups,
     ) -> Self {
         let ObjectGeometry { scene, forms, primitives, lift, .. } = *objects;
-        let emitting = groups.materials(scene);
+        let mut emitting: Vec<(&str, GroupedSource)> = Vec::new();
+        for light in groups.sources(scene) {
+            if let LightGroupSource::Material(name) = light.source {
+                emitting.push((name, light));
+            }
+        }
+        // Parts of objects whose materials emit: the index of the object, and that in `emitting`.
         let part_of = |id: &PrimitiveId| {
             let name = scene.objects[id.form].materials()[id.part];
-            let (_, group, emission) = emitting.iter().find(|(known, ..)| *known == name)?;
-            Some(EmissivePart { object: id.form, group: *group, emission: *emission })
+            Some((id.form, emitting.iter().position(|(known, _)| *known == name)?))
         };
-        let parts: Vec<Option<EmissivePart>> = match emitting.is_empty() {
+        let parts: Vec<Option<(usize, usize)>> = match emitting.is_empty() {
             true => Vec::new(),
             false => primitives.iter().map(part_of).collect(),
         };
         let mut known = HashSet::new();
-        let distinct = parts.iter().flatten().filter(|part| known.insert(part.key())).copied();
-        let compile = |part: EmissivePart| {
+        let distinct = parts.iter().flatten().filter(|part| known.insert(**part)).copied();
+        let compile = |part: (usize, usize)| {
             // Of compounds, no points are sampled: only they have materials of parts.
-            let material = scene.materials.get(&scene.objects[part.object].material);
+            let material = scene.materials.get(&scene.objects[part.0].material);
             let both_sides = material.is_none_or(|material: &Material| material.two_sided);
-            let light = surface_of(&forms[part.object])
+            let light = surface_of(&forms[part.0])
                 .and_then(|surface| Emitter::of_object(&surface, both_sides, lift));
-            let emission = (part.emission != [1.0; 3]).then(|| part.emission.map(S::from_f64));
-            (part, LightSource { light, group: part.group, emission, visible: true })
+            (part, emitting[part.1].1.with_light(light, true))
         };
         let (mut compiled, unsampled): (Vec<_>, Vec<_>) =
             distinct.map(compile).partition(|(_, source)| source.light.is_some());
-        let touching = objects.touching(compiled.iter().map(|(part, _)| part.object));
+        let touching = objects.touching(compiled.iter().map(|((object, _), _)| *object));
         let (lights_len, sampled) = (lights.len(), lights.len() + compiled.len());
         compiled.extend(unsampled);
         let indices: HashMap<_, u32> =
-            compiled.iter().map(|(part, _)| part.key()).zip(lights_len as u32..).collect();
-        let index_of = |part: &Option<EmissivePart>| indices.get(&part.as_ref()?.key()).copied();
-        let source_of = parts.iter().map(index_of).collect();
+            compiled.iter().map(|(part, _)| *part).zip(lights_len as u32..).collect();
+        let source_of = parts.iter().map(|part| indices.get(&(*part)?).copied()).collect();
         let mut sources = lights;
         sources.extend(compiled.into_iter().map(|(_, source)| source));
         Self { sources, lights: lights_len, sampled, source_of, touching, lift: S::from_f64(lift) }

@@ -5,6 +5,7 @@
 
 use crate::analysis::radiance_range::{RadianceRange, SceneDistances};
 use crate::lights::choice::ManyLights;
+use crate::world::LightSource;
 use std::collections::HashMap;
 use zerkalo_kernel::lanes::Float;
 use zerkalo_scene::light::Light;
@@ -58,6 +59,24 @@ impl LightGroupSource {
             Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
             Self::Ambient | Self::Background | Self::Shared(_) => [0.0; 3],
         }
+    }
+}
+
+/// Light or emissive material, with its light group.
+#[derive(Debug, PartialEq)]
+pub(crate) struct GroupedSource<'a> {
+    pub source: &'a LightGroupSource,
+    /// Index of the light group.
+    pub group: usize,
+    /// Emission by which the tracer multiplies the samples: 1 in a group of its own.
+    pub emission: [f64; 3],
+}
+
+impl GroupedSource<'_> {
+    /// Returns `light` as a source of the light group; see [`LightSource`].
+    pub fn with_light<T, S: Float>(&self, light: T, visible: bool) -> LightSource<T, S> {
+        let emission = (self.emission != [1.0; 3]).then(|| self.emission.map(S::from_f64));
+        LightSource { light, group: self.group, emission, visible }
     }
 }
 
@@ -132,39 +151,16 @@ impl LightGroups {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Returns each light in a group: its index in the scene, the index of the group, and the
-    /// emission by which the tracer multiplies its samples, which is 1 in a group of its own.
-    pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
-        let light = |source: &LightGroupSource| {
-            if let LightGroupSource::Light(i) = source { Some(*i) } else { None }
-        };
-        self.emitting(scene, light)
-    }
-
-    /// Returns each emissive material as [`LightGroups::lights`] returns lights, by its name.
-    pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
-        let material = |source: &LightGroupSource| {
-            if let LightGroupSource::Material(name) = source { Some(name.clone()) } else { None }
-        };
-        self.emitting(scene, material)
-    }
-
-    /// Returns the sources that `select` accepts, each with its group and the emission by which the
-    /// tracer multiplies its samples.
-    fn emitting<T>(
-        &self,
-        scene: &Scene,
-        select: impl Fn(&LightGroupSource) -> Option<T>,
-    ) -> Vec<(T, usize, [f64; 3])> {
-        let mut out = Vec::new();
-        for (group, member) in self.members.iter().enumerate() {
+    /// Iterates over all lights and emissive materials.
+    pub(crate) fn sources(&self, scene: &Scene) -> impl Iterator<Item = GroupedSource<'_>> {
+        let members = self.members.iter().enumerate();
+        members.flat_map(move |(group, member)| {
             let is_shared = matches!(member, LightGroupSource::Shared(_));
-            for source in member.emitting() {
+            member.emitting().iter().map(move |source| {
                 let emission = if is_shared { source.emission(scene) } else { [1.0; 3] };
-                out.extend(select(source).map(|name| (name, group, emission)));
-            }
-        }
-        out
+                GroupedSource { source, group, emission }
+            })
+        })
     }
 
     /// Returns the factors by which the film's sums of each group are multiplied in the picture of
@@ -403,8 +399,9 @@ mod tests {
             LightGroupSource::Material("lamp".to_string()),
         ];
         assert_eq!(groups.members.last(), Some(&LightGroupSource::Shared(shared.to_vec())));
-        let emission = groups.materials(&scene);
-        assert_eq!(emission, [("lamp".to_string(), MAX_LIGHT_GROUPS - 1, [4.0; 3])]);
+        let group = MAX_LIGHT_GROUPS - 1;
+        let lamp = GroupedSource { source: &shared[1], group, emission: [4.0; 3] };
+        assert_eq!(groups.sources(&scene).last(), Some(lamp));
         let change = |s: &mut Scene| s.materials.get_mut("lamp").unwrap().emission = 3.0;
         assert!(!can_reuse(&groups, &scene, change));
     }
