@@ -1,7 +1,7 @@
 //! Canonical forms: the few kinds of geometry to which every shape with its transform is reduced.
 
 use crate::bvh::Ray;
-use crate::lanes::Vec3;
+use crate::lanes::{SimdFloat, Vec3};
 use crate::primitive::Aggregate;
 use crate::primitive::canonical::CanonicalShape;
 use crate::primitive::conical_frustum::ConicalFrustumForm;
@@ -120,10 +120,20 @@ impl Form {
     /// is none. The unit of t is the length of `direction`.
     pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let length = direction.length();
+        Some(self.hit(origin, direction / length)?.0 / length)
+    }
+
+    /// Returns the distance of the closest hit of a ray with the unit direction `direction`, and the
+    /// unit normal there; `None` for a miss.
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
-        let ray = Ray { origin: vector(origin), direction: vector(direction / length) };
+        let ray = Ray { origin: vector(origin), direction: vector(direction) };
         let alone = Aggregate::with_tree(std::slice::from_ref(self), false);
-        let t = alone.closest(&ray, alone.all()).t;
-        (t < f64::MAX).then_some(t / length)
+        let hit = alone.closest(&ray, alone.all());
+        if hit.t >= f64::MAX {
+            return None;
+        }
+        let normal = alone.surface(hit.primitive.id_lane(0), hit.triangle, ray.at(hit.t)).normal;
+        Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
     }
 }

@@ -60,7 +60,7 @@ pub(crate) fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3
     let slack = 1e-6 * form.thickness();
     let mut triangles = Vec::new();
     for face in &form.faces {
-        let is_on_face = |corner: &&DVec3| (face.normal.dot(**corner) - face.offset).abs() <= slack;
+        let is_on_face = |corner: &&DVec3| face.height(**corner).abs() <= slack;
         let mut corners: Vec<DVec3> = form.corners.iter().filter(is_on_face).copied().collect();
         if corners.len() < 3 {
             continue;

@@ -16,10 +16,7 @@ use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
 use crate::lights::emitters::CONTACT_LIFTS;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
-use std::slice;
-use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{SimdFloat, Vec3};
-use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, HalfSpace, ParallelogramForm};
+use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace, ParallelogramForm};
 
 /// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
 /// points. At this distance the surface does not count as covering them (see [`CONTACT_LIFTS`]).
@@ -68,15 +65,12 @@ pub(crate) fn move_off_surfaces(
         sheet.is_some_and(|sheet| may_carry(&forms[carrier], sheet, reach))
     };
     let wanted = |a: usize, b: usize| may_lie_on(a, b) || may_lie_on(b, a);
-    let mut compiled = CompiledObjects { forms, aggregates: HashMap::new() };
     let mut contacts: HashMap<usize, Vec<Contact>> = HashMap::new();
     let mut fixed = vec![false; forms.len()];
     for (a, b) in touching_pairs(forms, wanted, reach) {
         let (object, carrier) = if sheets[a].is_some() { (a, b) } else { (b, a) };
         let Some(sheet) = &sheets[object] else { continue };
-        let Some(contact) = compiled.contact((object, sheet), carrier, eye, reach) else {
-            continue;
-        };
+        let Some(contact) = sheet.contact(&forms[carrier], eye, reach) else { continue };
         // Transparent surfaces in the plane of the sheet are crossed in a fixed order, from which a
         // shift would remove the sheet.
         fixed[object] |= transmits[carrier];
@@ -86,12 +80,12 @@ pub(crate) fn move_off_surfaces(
     let mut has_moved = false;
     for (object, contacts) in contacts {
         let Some(sheet) = sheets[object].as_ref().filter(|_| !fixed[object]) else { continue };
-        let HalfSpace { normal, offset } = sheet.plane;
+        let plane = sheet.plane;
         let side = if emits[object] == Emits::Front && sheet.has_front {
             1.0
         } else if contacts.iter().all(|contact| contact.side == contacts[0].side) {
             contacts[0].side
-        } else if normal.dot(eye) >= offset {
+        } else if plane.height(eye) >= 0.0 {
             // The sheet is between two surfaces, one on each side. It moves to the side of the eye.
             1.0
         } else {
@@ -99,7 +93,7 @@ pub(crate) fn move_off_surfaces(
         };
         let shift = |contact: &Contact| GAP_LIFTS * lift - side * contact.height;
         let shift = contacts.iter().map(shift).fold(0.0, f64::max);
-        let by = DAffine3::from_translation(normal * (side * shift));
+        let by = DAffine3::from_translation(plane.normal * (side * shift));
         moved[object] = forms[object].clone().transformed(&by);
         has_moved = true;
     }
@@ -108,7 +102,8 @@ pub(crate) fn move_off_surfaces(
 }
 
 /// Flat emissive object.
-struct Sheet {
+struct Sheet<'a> {
+    form: &'a Form,
     /// Plane that contains the sheet, with its normal on the front.
     plane: HalfSpace,
     /// `true` if all parts of the sheet have their fronts on the same side.
@@ -117,13 +112,13 @@ struct Sheet {
     ball: BoundingSphere,
 }
 
-impl Sheet {
+impl<'a> Sheet<'a> {
     /// Returns `None` if `form` is not flat. Corners of a mesh may be up to `lift` away from a
     /// common plane.
-    fn new(form: &Form, lift: f64) -> Option<Self> {
+    fn new(form: &'a Form, lift: f64) -> Option<Self> {
         let ball = form.bounding_sphere();
         if let Some(plane) = form.plane() {
-            return Some(Self { plane, has_front: true, ball });
+            return Some(Self { form, plane, has_front: true, ball });
         }
         let Form::Mesh(mesh) = form else { return None };
         let triangles = || triangles_of_mesh(mesh, 1);
@@ -140,11 +135,42 @@ impl Sheet {
         }
         let larger = |a: DVec3, b: DVec3| if a.length() >= b.length() { a } else { b };
         let normal = triangles().map(normal_of).reduce(larger)?.normalize();
-        let offset = normal.dot(some[0]);
-        let is_on = |corner: DVec3| (normal.dot(corner) - offset).abs() <= lift;
+        let plane = HalfSpace { normal, offset: normal.dot(some[0]) };
+        let is_on = |corner: DVec3| plane.height(corner).abs() <= lift;
         let has_front = triangles().all(|triangle| normal_of(triangle).dot(normal) >= 0.0);
         let is_flat = triangles().flatten().all(is_on);
-        is_flat.then_some(Self { plane: HalfSpace { normal, offset }, has_front, ball })
+        is_flat.then_some(Self { form, plane, has_front, ball })
+    }
+
+    /// Returns the contact of the sheet with the object `carrier`; `None` if no tested point of the
+    /// sheet is on it.
+    fn contact(&self, carrier: &Form, eye: DVec3, reach: f64) -> Option<Contact> {
+        let normal = self.plane.normal;
+        for point in points_on(self.form).into_iter().chain(points_on(carrier)) {
+            let from_plane = self.plane.height(point);
+            if from_plane.abs() > reach {
+                continue;
+            }
+            // The probe runs through the point along the normal of the sheet.
+            let point = point - normal * from_plane;
+            let start = point + normal * (2.0 * reach);
+            let probe = |form: &Form| {
+                let (t, outward) = form.hit(start, -normal)?;
+                let height = t - 2.0 * reach;
+                let is_on = height.abs() <= reach && outward.dot(normal).abs() >= MIN_COSINE;
+                is_on.then_some((height, outward))
+            };
+            let Some((height, outward)) = probe(self.form).and_then(|_| probe(carrier)) else {
+                continue;
+            };
+            // The first surface of the object on the way from the eye to the point shows whether
+            // the eye is inside of the object.
+            let sight = (point - eye).normalize_or(-normal);
+            let is_inside = carrier.hit(eye, sight).is_some_and(|(_, n)| n.dot(sight) > 0.0);
+            let shows = if is_inside { -outward } else { outward };
+            return Some(Contact { side: normal.dot(shows).signum(), height });
+        }
+        None
     }
 }
 
@@ -156,79 +182,14 @@ struct Contact {
     height: f64,
 }
 
-/// Objects of a scene, each compiled by itself at its first use.
-struct CompiledObjects<'a> {
-    forms: &'a [Form],
-    aggregates: HashMap<usize, Aggregate<f64>>,
-}
-
-impl CompiledObjects<'_> {
-    /// Returns the distance of a ray's closest hit with an object, and the outward normal there.
-    fn hit(&mut self, object: usize, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
-        let form = slice::from_ref(&self.forms[object]);
-        let compile = || Aggregate::with_tree(form, false);
-        let alone = self.aggregates.entry(object).or_insert_with(compile);
-        let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
-        let ray = Ray { origin: vector(origin), direction: vector(direction) };
-        let hit = alone.closest(&ray, alone.all());
-        if hit.t >= f64::MAX {
-            return None;
-        }
-        let normal = alone.surface(hit.primitive.id_lane(0), hit.triangle, ray.at(hit.t)).normal;
-        Some((hit.t, DVec3::new(normal.x, normal.y, normal.z)))
-    }
-
-    /// Returns the contact of the sheet `object` with the object `carrier`; `None` if no tested
-    /// point of the sheet is on it.
-    fn contact(
-        &mut self,
-        (object, sheet): (usize, &Sheet),
-        carrier: usize,
-        eye: DVec3,
-        reach: f64,
-    ) -> Option<Contact> {
-        let HalfSpace { normal, offset } = sheet.plane;
-        let points =
-            points_on(&self.forms[object]).into_iter().chain(points_on(&self.forms[carrier]));
-        for point in points {
-            let from_plane = normal.dot(point) - offset;
-            if from_plane.abs() > reach {
-                continue;
-            }
-            // The probe runs through the point along the normal of the sheet.
-            let point = point - normal * from_plane;
-            let start = point + normal * (2.0 * reach);
-            let mut probe = |object: usize| {
-                let (t, outward) = self.hit(object, start, -normal)?;
-                let height = t - 2.0 * reach;
-                let is_on = height.abs() <= reach && outward.dot(normal).abs() >= MIN_COSINE;
-                is_on.then_some((height, outward))
-            };
-            let Some((height, outward)) = probe(object).and_then(|_| probe(carrier)) else {
-                continue;
-            };
-            // The first surface of the object on the way from the eye to the point shows whether
-            // the eye is inside of the object.
-            let sight = (point - eye).normalize_or(-normal);
-            let first = self.hit(carrier, eye, sight);
-            let is_inside = first.is_some_and(|(_, outward)| outward.dot(sight) > 0.0);
-            let shows = if is_inside { -outward } else { outward };
-            return Some(Contact { side: normal.dot(shows).signum(), height });
-        }
-        None
-    }
-}
-
 /// Returns `true` if the form `carrier` may have a flat face in the plane of `sheet`. The two
 /// planes may be up to `reach` apart.
 fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
     let is_parallel = |normal: DVec3| normal.dot(sheet.plane.normal).abs() >= MIN_COSINE;
     // Angles below that of `MIN_COSINE` displace the edge of the sheet by 0.2 % of its radius.
     let room = reach + 2e-3 * sheet.ball.radius;
-    let is_face = |face: &HalfSpace| {
-        let height = face.normal.dot(sheet.ball.center) - face.offset;
-        is_parallel(face.normal) && height.abs() <= room
-    };
+    let is_face =
+        |face: &HalfSpace| is_parallel(face.normal) && face.height(sheet.ball.center).abs() <= room;
     match carrier {
         Form::Sphere(_) | Form::Ellipsoid(_) | Form::Torus(_) => false,
         Form::ConvexPolyhedron(form) => form.faces.iter().any(is_face),
