@@ -3,6 +3,7 @@
 
 use crate::lights::emissive_forms::is_sampled;
 use glam::DVec3;
+use zerkalo_kernel::primitive::Form;
 use zerkalo_scene::material::{Fresnel, Material, Texture};
 use zerkalo_scene::{Object, RayTypes, Scene};
 
@@ -40,44 +41,20 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
-struct ObjectTraits {
-    flat: bool,
-    /// `true` if a ray that leaves the object outwards may hit it again.
-    concave: bool,
-    /// `true` if camera rays may start inside of the object.
-    contains_eye: bool,
-}
-
 /// Largest displacement of the eye by rounding to single precision, as a fraction of the scene's
 /// extent.
 const ROUNDING: f64 = 1e-6;
 
-impl ObjectTraits {
-    fn new(object: &Object, scene: &Scene) -> Self {
-        let form = object.form();
-        let flat = form.is_flat();
-        let eye = DVec3::from(scene.camera.eye);
-        let lens_radius = scene.camera.lens_radius();
-        let within = form.bounds().is_some_and(|(low, high)| {
-            let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
-            let room = DVec3::splat(ROUNDING * (extent + lens_radius) + lens_radius);
-            (low - room).cmple(eye).all() && (high + room).cmpge(eye).all()
-        });
-        Self {
-            flat,
-            concave: !form.is_convex(),
-            contains_eye: !flat && (within || scene.camera.near > 0.0),
-        }
-    }
-
-    /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
-    /// convex object outwards cannot hit it again. A ray inside can, but a path is inside only if
-    /// it starts there or was transmitted. Bump maps make no difference: directions on the wrong
-    /// side of the surface are mirrored to the right side.
-    fn sees_itself(&self, material: &Material) -> bool {
-        let let_in = !self.flat && material.transmission > 0.0;
-        self.concave || let_in || self.contains_eye && material.two_sided
-    }
+/// Returns `true` if camera rays may start inside of the object `form`.
+fn contains_eye(form: &Form, scene: &Scene) -> bool {
+    let eye = DVec3::from(scene.camera.eye);
+    let lens_radius = scene.camera.lens_radius();
+    let within = form.bounds().is_some_and(|(low, high)| {
+        let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
+        let room = DVec3::splat(ROUNDING * (extent + lens_radius) + lens_radius);
+        (low - room).cmple(eye).all() && (high + room).cmpge(eye).all()
+    });
+    form.is_solid() && (within || scene.camera.near > 0.0)
 }
 
 /// Largest factors by which surfaces multiply the throughput of a path. They bound the radiance
@@ -99,18 +76,24 @@ impl Reach {
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
         let (mut entered, mut through) = (0, false);
         for object in &scene.objects {
-            let traits = ObjectTraits::new(object, scene);
+            let form = object.form();
+            let starts_inside = contains_eye(&form, scene);
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
                 let diffuse_albedo =
                     if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
-                let rho = max_albedo(material, traits.flat) + diffuse_albedo;
-                if rho > 0.0 && traits.sees_itself(material) {
+                let rho = max_albedo(material, form.is_flat()) + diffuse_albedo;
+                let let_in = form.is_solid() && material.transmission > 0.0;
+                // A ray that leaves a convex object outwards cannot hit it again. A ray inside can,
+                // but a path is inside only if it starts there or was transmitted. Bump maps make no
+                // difference: directions on the wrong side of the surface are mirrored to the right
+                // side.
+                if !form.is_convex() || let_in || starts_inside && material.two_sided {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
                 through |= material.transmission > 0.0;
-                enters |= material.transmission > 0.0 && !traits.flat;
+                enters |= let_in;
                 second = second.max(rho.min(first));
                 first = first.max(rho);
             }
