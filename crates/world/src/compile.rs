@@ -6,7 +6,7 @@ use crate::analysis::radiance_range::SceneDistances;
 use crate::analysis::truncation_bias::truncation_bounds;
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use crate::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
+use crate::culling::tile::{CullingMode, FrustumCuller, LightBounds, TileCandidates, outside_only};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::integrator::surface_textures::SurfaceTextures;
@@ -217,29 +217,32 @@ fn shadow_ray_target<S: Float>(
     ShadowRayTarget { light: delta, on_surface }
 }
 
-struct CompiledLights<S> {
-    groups: LightGroups,
-    scales: Vec<f64>,
-    sources: Vec<DeltaSource<S>>,
-    choice: Option<LightChoice<S>>,
-    emitters: Emitters<S>,
-    environments: Vec<EnvironmentSource<S>>,
+/// Lights and emissive objects of a scene.
+pub(super) struct CompiledLights<S> {
+    /// Lights without a size to which all paths trace shadow rays.
+    pub delta_lights: Vec<DeltaSource<S>>,
+    /// Point and spot lights of which paths choose a few at each hit. `None` if shadow rays go to
+    /// all lights.
+    pub choice: Option<LightChoice<S>>,
+    /// Lights with a size and emissive objects.
+    pub emitters: Emitters<S>,
+    pub environments: Vec<EnvironmentSource<S>>,
 }
 
 impl<S: Float> CompiledLights<S> {
+    /// Compiles the lights in `groups`. Returns the scale of each group, too.
     fn new(
         scene: &Scene,
         geometry: &RecenteredGeometry,
         materials: &CompiledMaterials<S>,
         primitives: &[PrimitiveId],
         camera: &PerspectiveCamera,
-        merge_lights: bool,
-    ) -> Self {
-        let reflected = (materials.has_direct(), materials.has_ambient());
-        let groups = LightGroups::new(scene, reflected, merge_lights);
+        groups: &LightGroups,
+    ) -> (Self, Vec<f64>) {
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let (mut sources, mut emitters, mut environments) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut delta_lights, mut emitters, mut environments) =
+            (Vec::new(), Vec::new(), Vec::new());
         let mut ranges = HashMap::new();
         for source in groups.sources(scene) {
             let LightGroupSource::Light(index) = *source.source else { continue };
@@ -250,14 +253,14 @@ impl<S: Float> CompiledLights<S> {
             let source = source.with_light((), light.visible);
             match compiled {
                 CompiledLight::Delta(delta) => {
-                    sources.push(source.with_light(shadow_ray_target(geometry, light, delta)));
+                    delta_lights.push(source.with_light(shadow_ray_target(geometry, light, delta)));
                 }
                 CompiledLight::Emitter(emitter) => emitters.push(source.with_light(Some(emitter))),
                 CompiledLight::Environment(sky) => environments.push(source.with_light(sky)),
             }
         }
         let scales = groups.scales::<S>(scene, &ranges, &distances);
-        let choice = LightChoice::take(&mut sources, &groups.many, geometry.extent);
+        let choice = LightChoice::take(&mut delta_lights, &groups.many, geometry.extent);
         let start = start_region(scene, camera);
         let is_entered = |form: usize| {
             let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
@@ -270,42 +273,40 @@ impl<S: Float> CompiledLights<S> {
             lift: emitter_lift::<S>(geometry),
             is_entered: &is_entered,
         };
-        let emitters = Emitters::new(emitters, &objects, &groups);
-        Self { groups, scales, sources, choice, emitters, environments }
+        let emitters = Emitters::new(emitters, &objects, groups);
+        (Self { delta_lights, choice, emitters, environments }, scales)
     }
 
-    fn targets(&self) -> Vec<LightTarget> {
+    /// Returns `true` if there are lights with a size, environment lights or emissive objects.
+    #[inline(always)]
+    pub fn has_emitters(&self) -> bool {
+        !self.emitters.is_empty() || !self.environments.is_empty()
+    }
+
+    fn bounds(&self) -> LightBounds {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
-        let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
+        let target_of = |source: &DeltaSource<S>| match &source.light.light {
             DeltaLight::Point { position, .. } => LightTarget::Point(vector(position)),
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         };
-        self.sources.iter().map(target_of_source).collect()
-    }
-
-    /// Returns a sphere around each emitter, and then around each stratum of lights.
-    fn emitter_bounds(&self) -> Vec<BoundingSphere> {
-        self.emitters.balls().chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
-    }
-
-    /// Returns the number of lists of possible occluders, see [`TileCandidates::occluders`].
-    fn count(&self) -> usize {
-        let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
-        self.sources.len() + self.emitters.sampled() + strata
-    }
-
-    /// Returns the largest distance between a light on a surface and the end point of its shadow
-    /// rays; 0 if no light is on a surface.
-    fn max_end_offset(&self) -> f64 {
-        let on_surfaces = self.sources.iter().filter_map(|source| source.light.on_surface.as_ref());
-        on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max)
+        let on_surfaces = self.delta_lights.iter().filter_map(|s| s.light.on_surface.as_ref());
+        LightBounds {
+            delta_lights: self.delta_lights.iter().map(target_of).collect(),
+            max_end_offset: on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max),
+            emitters: self.emitters.balls().collect(),
+            strata: self.choice.iter().flat_map(LightChoice::balls).collect(),
+        }
     }
 }
 
-struct CompiledCulling<S> {
-    mode: CullingMode,
-    all_candidates: TileCandidates,
-    light_buffers: Vec<Option<LightBuffer<S>>>,
+/// What rays are tested against.
+pub(super) struct CompiledCulling<S> {
+    pub mode: CullingMode,
+    /// Candidates for rays that belong to no tile.
+    pub all_candidates: TileCandidates,
+    /// Light buffer of each light without a size; shadow rays to a light without one traverse the
+    /// BVH.
+    pub light_buffers: Vec<Option<LightBuffer<S>>>,
 }
 
 impl<S: Float> CompiledCulling<S> {
@@ -317,16 +318,14 @@ impl<S: Float> CompiledCulling<S> {
         lights: &CompiledLights<S>,
         outside_only: &[bool],
     ) -> Self {
-        let mut all_candidates = TileCandidates::all(geometry, lights.count());
+        let lights = lights.bounds();
+        let mut all_candidates = TileCandidates::all(geometry, &lights);
         let mut light_buffers = Vec::new();
         let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
         let forms = || geometry.sources.iter().map(form_of);
         let mode = match scene.trace.acceleration {
             Acceleration::Auto => {
-                let light_targets = (lights.targets(), lights.max_end_offset());
-                let emitters = lights.emitter_bounds();
-                let culler =
-                    FrustumCuller::new(forms().collect(), outside_only, light_targets, emitters);
+                let culler = FrustumCuller::new(forms().collect(), outside_only, lights);
                 all_candidates = culler.candidates(geometry, None);
                 if geometry.has_tree() {
                     if scene.trace.ray_types >= RayTypes::Shadows {
@@ -409,8 +408,10 @@ impl<L: SimdFloat> World<L> {
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let material_of = |id: &PrimitiveId| materials.material(id);
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
-        let lights =
-            CompiledLights::new(scene, recentered, &materials, primitives, &camera, merge_lights);
+        let reflected = (materials.has_direct(), materials.has_ambient());
+        let groups = LightGroups::new(scene, reflected, merge_lights);
+        let (lights, scales) =
+            CompiledLights::new(scene, recentered, &materials, primitives, &camera, &groups);
         let start = start_region(scene, &camera);
         let nested_dielectrics =
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, start);
@@ -440,27 +441,19 @@ impl<L: SimdFloat> World<L> {
             outside_only,
             bsdf_of,
             bsdfs: materials.bsdfs,
-            ambient: lights.groups.find(&LightGroupSource::Ambient),
-            background: lights
-                .groups
-                .find(&LightGroupSource::Background)
-                .filter(|_| has_background),
+            ambient: groups.find(&LightGroupSource::Ambient),
+            background: groups.find(&LightGroupSource::Background).filter(|_| has_background),
             info: WorldInfo {
-                groups: lights.groups,
-                scales: lights.scales,
+                groups,
+                scales,
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
                 lanes: L::NAME,
                 light_period: lights.choice.as_ref().map_or(1, LightChoice::period),
                 inventory: String::new(),
                 biases: truncation_bounds(scene),
             },
-            sources: lights.sources,
-            light_choice: lights.choice,
-            emitters: lights.emitters,
-            environments: lights.environments,
-            culling: culling.mode,
-            all_candidates: culling.all_candidates,
-            light_buffers: culling.light_buffers,
+            lights,
+            culling,
             camera,
             jitter: scene.film.filter == Filter::Box,
         };

@@ -1,12 +1,10 @@
 //! `World`: a compiled scene, as the integrators read it.
 
-use crate::culling::light_buffer::LightBuffer;
-use crate::culling::tile::{CullingMode, TileCandidates};
+use crate::compile::{CompiledCulling, CompiledLights};
+use crate::culling::tile::TileCandidates;
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
-use crate::lights::choice::LightChoice;
-use crate::lights::emitters::Emitters;
 use crate::lights::groups::LightGroups;
 use crate::lights::on_surfaces::OnSurface;
 use crate::tile_tracer::CameraTracer;
@@ -69,13 +67,7 @@ pub struct World<L: SimdFloat> {
     /// For each primitive, the index of its BSDF in `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
-    pub(super) sources: Vec<DeltaSource<L::Scalar>>,
-    /// Point and spot lights of which paths choose a few at each hit. `None` if shadow rays go to
-    /// all lights.
-    pub(super) light_choice: Option<LightChoice<L::Scalar>>,
-    /// Lights with a size and emissive objects.
-    pub(super) emitters: Emitters<L::Scalar>,
-    pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
+    pub(super) lights: CompiledLights<L::Scalar>,
     /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Index of the light group of the background. `None` if the background is black.
@@ -102,11 +94,7 @@ pub struct World<L: SimdFloat> {
     pub(super) fold: bool,
     /// Camera, in coordinates relative to the scene's centre.
     pub camera: PerspectiveCamera,
-    /// Candidates for rays that belong to no tile.
-    pub(super) all_candidates: TileCandidates,
-    /// Light buffer of each light in `sources`; shadow rays to a light without one traverse the BVH.
-    pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
-    pub(super) culling: CullingMode,
+    pub(super) culling: CompiledCulling<L::Scalar>,
     /// Properties that do not depend on the SIMD type.
     pub info: WorldInfo,
     /// `true` if samples are distributed over the area of their pixel, not at its centre.
@@ -152,33 +140,16 @@ impl<L: SimdFloat> World<L> {
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        self.culling.candidates(&self.geometry, self.light_lists(), &self.camera, (origin, extent))
-    }
-
-    /// Returns the number of lists of possible occluders: one for each light, and one for each
-    /// stratum of `light_choice`.
-    pub(super) fn light_lists(&self) -> usize {
-        self.all_candidates.occluders.len()
-    }
-
-    /// Returns the index of the first stratum in the lists of possible occluders.
-    #[inline(always)]
-    pub(super) fn first_stratum(&self) -> usize {
-        self.sources.len() + self.emitters.sampled()
-    }
-
-    /// Returns `true` if the world has lights with a size, environment lights or emissive objects.
-    #[inline(always)]
-    pub(super) fn has_emitters(&self) -> bool {
-        !self.emitters.is_empty() || !self.environments.is_empty()
+        let CompiledCulling { mode, all_candidates, .. } = &self.culling;
+        mode.candidates(&self.geometry, all_candidates, &self.camera, (origin, extent))
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()
-            && self.emitters.visible_lights().next().is_none()
-            && !self.environments.iter().any(|source| source.visible)
+            && self.lights.emitters.visible_lights().next().is_none()
+            && !self.lights.environments.iter().any(|source| source.visible)
     }
 
     /// Returns the lanes whose paths continue with `throughput`.

@@ -13,7 +13,7 @@ use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 /// commas, in one line.
 pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
     let groups = &world.info.groups.members;
-    let (emissive, unsampled) = world.emitters.object_counts();
+    let (emissive, unsampled) = world.lights.emitters.object_counts();
     let mut parts = vec![world.geometry.to_string()];
     let textures = world.surface_textures.as_ref().map(SurfaceTextures::features);
     parts.extend(textures.into_iter().flatten().map(String::from));
@@ -36,7 +36,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     for kind in KIND_KEYS {
         parts.extend(counted(light_count(kind), &format!("{kind} light")));
     }
-    parts.extend(present([(world.light_choice.is_some(), "choice of lights")]));
+    parts.extend(present([(world.lights.choice.is_some(), "choice of lights")]));
     parts.extend(counted(emissive, "emissive object"));
     if unsampled > 0 {
         parts.push(format!("{unsampled} of them without sampled points"));
@@ -47,7 +47,9 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         parts.extend(present([(!limits.caustics, "no caustics")]));
     }
     let ray_types = scene.trace.ray_types;
-    let has_lights = world.light_lists() > 0 || !world.environments.is_empty();
+    let lights = &world.lights;
+    let has_lights =
+        !lights.delta_lights.is_empty() || lights.choice.is_some() || lights.has_emitters();
     let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
     parts.extend(present([
         (groups.iter().any(is_shared), "shared light group"),

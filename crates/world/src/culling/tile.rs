@@ -14,15 +14,37 @@ use zerkalo_scene::camera::PerspectiveCamera;
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
     pub(crate) primary: PrimitiveSet,
-    /// Possible occluders of the light sources: of each light without a size, each emitter, and
-    /// each stratum of the lights among which paths choose.
-    pub(crate) occluders: Vec<PrimitiveSet>,
+    pub(crate) occluders: Occluders,
+}
+
+/// Possible occluders of each light.
+#[derive(Clone, Debug)]
+pub(crate) struct Occluders {
+    pub delta_lights: Vec<PrimitiveSet>,
+    pub emitters: Vec<PrimitiveSet>,
+    /// Those of each stratum of the lights among which paths choose.
+    pub strata: Vec<PrimitiveSet>,
+}
+
+/// Places of the lights that have lists of possible occluders.
+pub(crate) struct LightBounds {
+    pub delta_lights: Vec<LightTarget>,
+    /// Largest distance between a light without a size and the end point of its shadow rays.
+    pub max_end_offset: f64,
+    pub emitters: Vec<BoundingSphere>,
+    pub strata: Vec<BoundingSphere>,
 }
 
 impl TileCandidates {
-    /// Returns all primitives as candidates, without culling, for `lights` light sources.
-    pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
-        Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
+    /// Returns all primitives as candidates, without culling.
+    pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: &LightBounds) -> Self {
+        let sets = |count| vec![geometry.all().clone(); count];
+        let occluders = Occluders {
+            delta_lights: sets(lights.delta_lights.len()),
+            emitters: sets(lights.emitters.len()),
+            strata: sets(lights.strata.len()),
+        };
+        Self { primary: geometry.all().clone(), occluders }
     }
 }
 
@@ -41,12 +63,12 @@ pub(crate) enum CullingMode {
 
 impl CullingMode {
     /// Returns the candidates of a rectangle of the picture \[pixels\] with the upper left corner
-    /// `origin` and the size `extent`. `lights` is the number of light sources. Returns `None` if
-    /// rays must be tested against all primitives.
+    /// `origin` and the size `extent`. `all` are the candidates of all rays. Returns `None` if rays
+    /// must be tested against all primitives.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
-        lights: usize,
+        all: &TileCandidates,
         camera: &PerspectiveCamera,
         (origin, extent): ([usize; 2], [usize; 2]),
     ) -> Option<TileCandidates> {
@@ -67,11 +89,11 @@ impl CullingMode {
             Self::ScreenBounds(bounds) => {
                 let primary = geometry
                     .select(|primitive| bounds[primitive as usize].overlaps(origin, extent));
-                Some(TileCandidates { primary, ..TileCandidates::all(geometry, lights) })
+                Some(TileCandidates { primary, ..all.clone() })
             }
             Self::ScreenGrid(grid) => {
                 let primary = geometry.select_indices(&grid.candidates(origin, extent)?);
-                Some(TileCandidates { primary, ..TileCandidates::all(geometry, lights) })
+                Some(TileCandidates { primary, ..all.clone() })
             }
             Self::Off => None,
         }
@@ -102,29 +124,20 @@ pub(crate) struct FrustumCuller {
     /// `true` for each primitive that may occlude lights from points on its own surface: it is
     /// concave, or paths can be inside of it.
     self_shadowing: Vec<bool>,
-    lights: Vec<LightTarget>,
-    /// Bounding sphere of each emitter and each stratum of the lights among which paths choose.
-    emitters: Vec<BoundingSphere>,
+    lights: LightBounds,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of the primitives `forms`; see [`outside_only`]. `max_end_offset` is the
-    /// largest distance between a light without a size and the end point of its shadow rays.
-    /// `emitters` are bounding spheres of the other light sources.
-    pub fn new(
-        forms: Vec<&Form>,
-        outside_only: &[bool],
-        (lights, max_end_offset): (Vec<LightTarget>, f64),
-        emitters: Vec<BoundingSphere>,
-    ) -> Self {
-        let bound = |form: &Form| BoundingVolume::new(form).grown(max_end_offset);
+    /// Creates the culler of the primitives `forms`; see [`outside_only`].
+    pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
+        let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
         // A shadow ray that leaves the outside of a convex primitive cannot hit it again.
         let self_shadowing = |(b, outside_only): (&BoundingVolume, &bool)| {
             !(outside_only | (b.is_flat() & b.is_convex()))
         };
         let self_shadowing = bounds.iter().zip(outside_only).map(self_shadowing).collect();
-        Self { lights, emitters, self_shadowing, bounds }
+        Self { lights, self_shadowing, bounds }
     }
 
     /// Creates the light buffer of each light without a size, of the primitives in the BVH of
@@ -138,7 +151,7 @@ impl FrustumCuller {
             exempt_primitive: (!self.self_shadowing[primitive as usize]).then_some(primitive),
         };
         let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
-        self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
+        self.lights.delta_lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 
     /// Returns the candidates of the camera rays inside `frustum`, or of all camera rays.
@@ -169,13 +182,15 @@ impl FrustumCuller {
         };
         let of_light =
             |light: &LightTarget| occluders_of(&|bounds, part| bounds.may_occlude(part, light));
-        let of_emitter = |light: &BoundingSphere| {
+        let of_ball = |light: &BoundingSphere| {
             occluders_of(&|bounds, part| bounds.may_occlude_ball(part, light))
         };
-        let lights = self.lights.iter().map(of_light);
-        TileCandidates {
-            primary,
-            occluders: lights.chain(self.emitters.iter().map(of_emitter)).collect(),
-        }
+        let LightBounds { delta_lights, emitters, strata, .. } = &self.lights;
+        let occluders = Occluders {
+            delta_lights: delta_lights.iter().map(of_light).collect(),
+            emitters: emitters.iter().map(of_ball).collect(),
+            strata: strata.iter().map(of_ball).collect(),
+        };
+        TileCandidates { primary, occluders }
     }
 }

@@ -111,7 +111,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             return;
         }
         let origin = interaction.ray_origin();
-        let lights = world.sources.iter().zip(&self.candidates.occluders);
+        let lights = world.lights.delta_lights.iter().zip(&self.candidates.occluders.delta_lights);
         for (index, (source, occluders)) in lights.enumerate() {
             let target = &source.light;
             let light = target.light.sample_li(origin);
@@ -131,7 +131,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                     let ray = Ray { origin, direction };
                     if SIMPLE {
                         world.geometry.occluded_linear(&ray, t_max, lit, occluders)
-                    } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
+                    } else if let Some(Some(buffer)) = world.culling.light_buffers.get(index) {
                         let (primitive, outside) = (interaction.primitive, interaction.front);
                         let start = RayStart { primitive, outside };
                         buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
@@ -159,8 +159,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         self.out.counts.glossy = true;
         let origin = interaction.ray_origin();
         let lights = choice.choose(self.sampler.light_choice_1d(self.bounce));
-        let occluders = &self.candidates.occluders[world.first_stratum()..];
-        for (stratum, occluders) in occluders.iter().enumerate() {
+        for (stratum, occluders) in self.candidates.occluders.strata.iter().enumerate() {
             let to_light = lights.positions(stratum) - origin;
             let distance = to_light.length_squared().sqrt();
             let inverse = L::one() / distance;

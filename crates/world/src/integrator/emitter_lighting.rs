@@ -43,7 +43,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
-    for (light, source) in world.emitters.visible_lights() {
+    for (light, source) in world.lights.emitters.visible_lights() {
         let Ray { origin, direction } = path.ray;
         let t = light.hit(origin, direction);
         let seen = lanes & t.lt(t_max);
@@ -61,7 +61,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
         out.groups[source.group] += source.emitted(radiance).masked(seen);
     }
     let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
-    if !world.environments.is_empty() && escaped.any() {
+    if !world.lights.environments.is_empty() && escaped.any() {
         let left = media.and_then(|media| media.transmittance(L::from_f64(L::MAX)));
         visible_environments(world, path, left, escaped, out);
     }
@@ -107,7 +107,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let path = &*self.path;
         let interaction = self.interaction;
         for (primitive, lanes) in distinct(interaction.primitive, interaction.has_bsdf) {
-            let Some(source) = self.world.emitters.of_primitive(primitive) else { continue };
+            let Some(source) = self.world.lights.emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
                 && path.lobe_density.lt(L::from_f64(L::MAX)).any()
@@ -134,12 +134,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
             return;
         }
         let glossy = ReflectedRays { lanes: glossy, share: rays.share };
-        if !world.environments.is_empty() {
+        if !world.lights.environments.is_empty() {
             self.environment_lighting(&glossy);
         }
         let origin = interaction.ray_origin();
-        let occluders = &self.candidates.occluders[world.sources.len()..world.first_stratum()];
-        for (index, occluders) in occluders.iter().enumerate() {
+        for (index, occluders) in self.candidates.occluders.emitters.iter().enumerate() {
             let Some(source) = self.sample_emitter(index, origin) else { break };
             self.out.counts.glossy = true;
             let light = &source.light;
@@ -152,7 +151,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 let ray = Ray { origin, direction: light.wi };
                 let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
                 let (ray, lanes) = ((&ray, light.distance), lit.and_not(occluded));
-                occluded | world.emitters.covered(index, &world.geometry, ray, lanes)
+                occluded | world.lights.emitters.covered(index, &world.geometry, ray, lanes)
             };
             self.add_light(source.group, lit, occluded, |vertex, _| {
                 source.emitted(vertex.unoccluded(value, light))
@@ -200,6 +199,6 @@ impl<L: SimdFloat> Vertex<'_, L> {
         origin: Vec3<L>,
     ) -> Option<LightSource<LightSample<L>, L::Scalar>> {
         let numbers = self.sampler.light_2d(self.bounce, index as u32);
-        self.world.emitters.sample(index, origin, numbers)
+        self.world.lights.emitters.sample(index, origin, numbers)
     }
 }

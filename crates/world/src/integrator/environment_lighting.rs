@@ -38,7 +38,7 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     if lanes.none() {
         return;
     }
-    for source in world.environments.iter().filter(|source| source.visible) {
+    for source in world.lights.environments.iter().filter(|source| source.visible) {
         let (radiance, density) = source.light.radiance(path.ray.direction, lanes);
         let weight = power_heuristic(path.lobe_density, density);
         let mut radiance = path.throughput.component_mul(radiance) * weight;
@@ -57,7 +57,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let interaction = self.interaction;
         self.out.counts.glossy = true;
         let is_diffuse = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
-        for (index, environment) in self.world.environments.iter().enumerate() {
+        for (index, environment) in self.world.lights.environments.iter().enumerate() {
             let source = self.sample_environment(index, interaction.direct_mask | glossy.lanes);
             let light = &source.light;
             let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
@@ -80,7 +80,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         lanes: L::Mask,
     ) -> LightSource<LightSample<L>, L::Scalar> {
         let numbers = self.sampler.light_2d(self.bounce, ENVIRONMENT_SALT + 2 * index as u32);
-        let source = &self.world.environments[index];
+        let source = &self.world.lights.environments[index];
         source.with_light(source.light.sample(numbers, lanes))
     }
 

@@ -181,7 +181,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
                 break;
             }
             out.counts.glossy = true;
-            candidates = &world.all_candidates;
+            candidates = &world.culling.all_candidates;
             depth = if limits.caustics { world.depth } else { 0 };
         }
     }

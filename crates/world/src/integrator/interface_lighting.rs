@@ -47,7 +47,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         let mut rough = L::mask(false);
         // If shadows are off, emitters also light points that cannot see them. Reflected rays do
         // not find this light, so the two strategies cannot be combined.
-        if world.has_emitters() && world.shadows {
+        if world.lights.has_emitters() && world.shadows {
             for (index, lanes) in interaction.bsdfs(hit.lanes) {
                 if !world.bsdfs[index].is_delta() {
                     rough = rough | lanes;
@@ -117,7 +117,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 let Some(source) = self.sample_emitter(index, side.origin) else { break };
                 self.add_scattered(rough, side, &source, Some(index));
             }
-            for index in 0..self.world.environments.len() {
+            for index in 0..self.world.lights.environments.len() {
                 let source = self.sample_environment(index, side.lanes);
                 self.add_scattered(rough, side, &source, None);
             }
@@ -149,7 +149,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
             emitter.map_or(occluded, |index| {
                 let (ray, lanes) = ((&ray, t_max), lit.and_not(occluded));
-                occluded | world.emitters.covered(index, &world.geometry, ray, lanes)
+                occluded | world.lights.emitters.covered(index, &world.geometry, ray, lanes)
             })
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {

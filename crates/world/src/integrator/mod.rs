@@ -52,7 +52,7 @@ impl<L: SimdFloat> World<L> {
         for group in &mut out.groups[..self.info.scales.len()] {
             *group = Vec3::zero();
         }
-        let candidates = candidates.unwrap_or(&self.all_candidates);
+        let candidates = candidates.unwrap_or(&self.culling.all_candidates);
         let integrator = Integrator { world: self, sampler, candidates, depth: self.depth };
         if let Some(limits) = self.diffuse_limits {
             integrator.trace_generations(limits, path.ray, active, out);
@@ -62,7 +62,7 @@ impl<L: SimdFloat> World<L> {
             TransmissionIntegrator { base: integrator, nested_dielectrics }
                 .trace(&mut start, None, out);
         } else {
-            match (self.simple, !self.has_emitters()) {
+            match (self.simple, !self.lights.has_emitters()) {
                 (true, true) => integrator.trace_opaque::<true, false>(path, active, None, out),
                 (false, true) => integrator.trace_opaque::<false, false>(path, active, None, out),
                 (_, false) => integrator.trace_opaque::<false, true>(path, active, None, out),

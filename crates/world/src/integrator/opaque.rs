@@ -67,7 +67,7 @@ impl<L: SimdFloat> Integrator<'_, L> {
             if active.none() {
                 return;
             }
-            candidates = &world.all_candidates;
+            candidates = &world.culling.all_candidates;
         }
     }
 }

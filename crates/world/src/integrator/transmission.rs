@@ -112,7 +112,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         out: &mut Radiance<L>,
     ) -> bool {
         let Integrator { world, sampler, candidates, depth } = self.base;
-        let candidates = if branch.bounce == 0 { candidates } else { &world.all_candidates };
+        let candidates =
+            if branch.bounce == 0 { candidates } else { &world.culling.all_candidates };
         out.counts.add_rays(branch.lanes);
         let geometry = &world.geometry;
         let mut hit = geometry.closest_masked(&branch.path.ray, &candidates.primary, branch.lanes);
@@ -120,7 +121,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         // Paths and media are large, so they are borrowed instead of copied.
         let (path, stack, bounce) = (&mut branch.path, &branch.media, branch.bounce);
         let media = Some(Media { nested_dielectrics: self.nested_dielectrics, stack });
-        let emitters = world.has_emitters();
+        let emitters = world.lights.has_emitters();
         if emitters {
             visible_emitters(world, path, hit.t, branch.lanes, media, out);
         }
@@ -422,7 +423,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         }
         let uv = vertex.lobe_numbers(bsdf.is_delta(), numbers);
         let sample = bsdf.sample(&query.rays, uv);
-        if world.has_emitters() {
+        if world.lights.has_emitters() {
             let mut direction = sample.direction;
             if world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);

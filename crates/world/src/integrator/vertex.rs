@@ -62,12 +62,12 @@ impl<L: SimdFloat> Vertex<'_, L> {
         rays: impl FnOnce(&Self) -> ReflectedRays<L>,
     ) {
         let world = self.world;
-        if emitters && world.emitters.has_objects() {
+        if emitters && world.lights.emitters.has_objects() {
             self.surface_emission(hit);
         }
         self.ambient_light::<SIMPLE>(bouncing);
         self.delta_lights::<SIMPLE>();
-        if let Some(choice) = &world.light_choice {
+        if let Some(choice) = &world.lights.choice {
             self.chosen_lights::<SIMPLE>(choice);
         }
         if emitters {

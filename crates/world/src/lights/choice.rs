@@ -136,10 +136,6 @@ impl<S: Float> LightChoice<S> {
         Some(Self { group, sets, strata })
     }
 
-    pub fn strata(&self) -> usize {
-        self.strata.len()
-    }
-
     /// Returns the light period: the number of successive samples of a pixel that together trace a
     /// shadow ray to each light once.
     pub fn period(&self) -> u32 {

@@ -184,12 +184,6 @@ impl<S: Float> Emitters<S> {
         self.sources.len() > self.lights
     }
 
-    /// Returns the number of emitters from which light is sampled.
-    #[inline(always)]
-    pub fn sampled(&self) -> usize {
-        self.sampled
-    }
-
     /// Returns the number of emissive objects, and how many of them are found only by rays that hit
     /// them.
     pub fn object_counts(&self) -> (usize, usize) {
