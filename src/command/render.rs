@@ -4,9 +4,8 @@ use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
 use crate::command::progress::{Progress, counts, noise};
 use crate::command::regions::Division;
-use crate::command::stats::Stats;
 use crate::command::{
-    Failure, handle_signals, print_line, read_scene, shard, warn, warn_of_precision,
+    Failure, handle_signals, print_line, read_scene, shard, stats, warn, warn_of_precision,
 };
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,7 +19,6 @@ use zerkalo_render::session::{Report, Session, State};
 use zerkalo_render::{Checkpoint, Options, RegionRender};
 use zerkalo_scene::Scene;
 use zerkalo_scene::disk::{self, WriteError, check_writable};
-use zerkalo_scene::process_memory::resident_memory;
 use zerkalo_terminal::Signals;
 
 /// Default noise target: half a quantisation step of an 8-bit file.
@@ -40,13 +38,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
     // Reported before the render starts.
-    output.check_writable()?;
-    if let Some(path) = &args.stats {
-        check_stats_path(path, &args.output)?;
-    }
-    if let Some(path) = &args.checkpoint {
-        check_checkpoint_path(path, args)?;
-    }
+    check_outputs(args, &output)?;
     let checkpoint = read_checkpoint(args)?;
     for warning in warnings {
         warn(&format!("warning: {warning}"));
@@ -72,8 +64,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let end = rendered.end;
     let printed = print_line(&summary(output.path(), size, &rendered.report, end));
     if let Some(path) = &args.stats {
-        let stats = stats(args, hash, size, &rendered, started.elapsed());
-        disk::write(path, stats.json().as_bytes())?;
+        let stats = stats::json(args, &hash, size, &rendered, started.elapsed());
+        disk::write(path, stats.as_bytes())?;
     }
     printed?;
     if let Some(Err(error)) = rendered.kept {
@@ -82,54 +74,6 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     match end {
         End::Done(_) => Ok(()),
         End::Signal(status) => Err(Failure::Signalled(status)),
-    }
-}
-
-fn stats(
-    args: &RenderArgs,
-    scene_hash: String,
-    size: [u32; 2],
-    rendered: &Rendered,
-    total: Duration,
-) -> Stats {
-    let report = &rendered.report;
-    Stats {
-        scene: args.scene.display().to_string(),
-        scene_hash,
-        output: args.output.display().to_string(),
-        version: env!("CARGO_PKG_VERSION"),
-        size,
-        seed: args.compute.seed,
-        sampler: args.sampler.name(),
-        precision: rendered.precision,
-        lanes: report.lanes,
-        threads: args.compute.threads(),
-        adaptive: !args.uniform,
-        samples: report.samples,
-        spp_min: report.spp.min,
-        spp_mean: report.spp.mean,
-        spp_max: report.spp.max,
-        rays: report.rays,
-        seconds: report.seconds,
-        compile_seconds: report.compile_seconds,
-        write_seconds: rendered.write_seconds,
-        total_seconds: total.as_secs_f64(),
-        samples_per_second: report.samples_per_second(),
-        first_picture_seconds: report
-            .first_picture_seconds
-            .map(|s| s + rendered.set_after.as_secs_f64()),
-        noise_levels: report.noise.map(|n| n.rmse_levels),
-        noise_levels_p95: report.noise.map(|n| n.p95_levels),
-        rmse_linear: report.noise.map(|n| n.rmse_linear),
-        bad_samples: report.bad_samples,
-        saturated_samples: report.saturated_samples,
-        saturated_pixels: report.saturated_pixels,
-        biased: rendered.biased.clone(),
-        peak_rss_bytes: resident_memory().map(|resident| resident.peak),
-        stopped_by: match rendered.end {
-            End::Done(reason) => reason.name(),
-            End::Signal(_) => "signal",
-        },
     }
 }
 
@@ -145,15 +89,15 @@ struct Job<'a> {
 }
 
 /// Results of a render whose picture has been written.
-struct Rendered {
-    report: Report,
-    end: End,
-    precision: &'static str,
+pub struct Rendered {
+    pub report: Report,
+    pub end: End,
+    pub precision: &'static str,
     /// Upper bounds of the light that the picture loses by each limit of the scene, in sentences.
-    biased: Vec<String>,
+    pub biased: Vec<String>,
     /// Time from the start of the program to the compilation of the scene.
-    set_after: Duration,
-    write_seconds: f64,
+    pub set_after: Duration,
+    pub write_seconds: f64,
     /// Path of the last checkpoint, or the error of writing it.
     kept: Option<Result<PathBuf, WriteError>>,
 }
@@ -228,7 +172,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
 
 /// Reason for the end of a render.
 #[derive(Clone, Copy)]
-enum End {
+pub enum End {
     Done(StoppedBy),
     /// Signal with this exit status.
     Signal(u8),
@@ -278,18 +222,6 @@ fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     }
 }
 
-fn check_checkpoint_path(path: &Path, args: &RenderArgs) -> Result<(), Failure> {
-    for (option, other) in [("output", Some(&args.output)), ("stats", args.stats.as_ref())] {
-        if other.is_some_and(|other| other == path) {
-            let path = path.display();
-            return Err(Failure::Usage(format!(
-                "--checkpoint and --{option} name the same file, {path}"
-            )));
-        }
-    }
-    CheckpointWriter::check(path, args.resume.as_deref())
-}
-
 /// Returns `scene` with the settings of the command line.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
@@ -299,12 +231,27 @@ fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     Ok(scene)
 }
 
-fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
-    if path == output {
-        let path = path.display();
-        return Err(Failure::Usage(format!("--stats and --output name the same file, {path}")));
+/// Checks that the files of `--output`, `--stats` and `--checkpoint` differ and can be written.
+fn check_outputs(args: &RenderArgs, output: &ImageOutput) -> Result<(), Failure> {
+    let outputs = [
+        ("output", Some(&args.output)),
+        ("stats", args.stats.as_ref()),
+        ("checkpoint", args.checkpoint.as_ref()),
+    ];
+    for (i, (option, path)) in outputs.iter().enumerate() {
+        let same = outputs[..i].iter().find(|(_, other)| other.is_some() && other == path);
+        if let (Some(path), Some((other, _))) = (path, same) {
+            let path = path.display();
+            let what = format!("--{option} and --{other} name the same file, {path}");
+            return Err(Failure::Usage(what));
+        }
     }
-    Ok(check_writable(path)?)
+    output.check_writable()?;
+    args.stats.as_deref().map(check_writable).transpose()?;
+    match &args.checkpoint {
+        Some(path) => CheckpointWriter::check(path, args.resume.as_deref()),
+        None => Ok(()),
+    }
 }
 
 fn options(args: &RenderArgs) -> Options {

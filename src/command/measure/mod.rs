@@ -56,7 +56,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     };
     let printed = print_line(&report.to_string());
     if let Some(path) = &args.json {
-        disk::write(path, &data::json(&report))?;
+        disk::write(path, data::json(&report).as_bytes())?;
     }
     if let Some(path) = &args.csv {
         disk::write(path, &data::csv(&measurement))?;
