@@ -259,8 +259,8 @@ pub struct MeasureArgs {
     pub noise: Vec<f64>,
     /// Compare only these settings, such as:
     /// adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
-    #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
-    pub only: Vec<Experiment>,
+    #[arg(long, value_name = "SETTING,..", value_parser = Experiment::named, value_delimiter = ',', conflicts_with = "full")]
+    pub only: Vec<&'static Experiment>,
     /// Compare all settings, which takes about five minutes
     #[arg(long)]
     pub full: bool,

@@ -1,7 +1,6 @@
 //! Experiments: settings that trade speed for accuracy are varied one at a time.
 
 use std::io;
-use std::str::FromStr;
 use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::Display;
@@ -11,108 +10,149 @@ use zerkalo_scene::material::Lobe;
 use zerkalo_scene::{Acceleration, RayTypes, Scene};
 use zerkalo_world::{self as world, AnyWorld, Precision};
 
-/// Setting of the renderer that an experiment varies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Experiment {
-    Default,
-    /// Adaptive or uniform sampling.
-    Adaptivity,
-    /// Single or double precision.
-    Precision,
-    Threads,
-    /// Sobol points or independent random numbers.
-    Sampler,
-    /// Cone lobe of glossy reflection, or the square lobe, its cheap approximation.
-    Lobe,
-    /// Only camera rays, or camera and shadow rays.
-    Level,
-    /// Largest number of reflections of a path.
-    Depth,
-    /// Throughput below which a path ends.
-    MinWeight,
-    /// Largest number of samples per pixel in glossy tiles.
-    RaysPerPixel,
-    Acceleration,
+/// Experiment: variants of one setting that trades speed for accuracy, against its default.
+#[derive(Debug)]
+pub struct Experiment {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Title in tables and plots.
+    pub title: &'static str,
+    /// `true` if the pictures of all variants differ in noise only.
+    pub is_unbiased: bool,
+    /// Returns the variants of a render with default settings that differ from it.
+    vary: Vary,
+}
+
+type Vary = fn(&Variant) -> Vec<Variant>;
+
+/// Default settings, an experiment without variants.
+pub static DEFAULT: Experiment = unbiased("default", "Default settings", |_| Vec::new());
+
+/// All experiments.
+pub static EXPERIMENTS: [Experiment; 10] = [
+    unbiased("adaptivity", "Adaptive against uniform sampling", |base| {
+        vec![base.with("uniform", |v| v.adaptive = false)]
+    }),
+    unbiased("precision", "Single against double precision", other_precision),
+    unbiased("threads", "Scaling with threads", fewer_threads),
+    unbiased("sampler", "Sobol points against independent random numbers", |base| {
+        vec![base.with("random", |v| v.options.sampling.kind = SamplerKind::Random)]
+    }),
+    biased("lobe", "Square lobe against cone lobe", other_lobes),
+    biased("ray-types", "Fewer ray types", fewer_ray_types),
+    biased("max-depth", "Fewer reflections", smaller_depths),
+    biased("min-throughput", "Termination of weak paths", larger_throughputs),
+    biased("rays-per-pixel", "Cap on samples of glossy pixels", caps),
+    unbiased("acceleration", "Acceleration structures", other_accelerations),
+];
+
+const fn unbiased(name: &'static str, title: &'static str, vary: Vary) -> Experiment {
+    Experiment { name, title, is_unbiased: true, vary }
+}
+
+const fn biased(name: &'static str, title: &'static str, vary: Vary) -> Experiment {
+    Experiment { name, title, is_unbiased: false, vary }
+}
+
+impl PartialEq for Experiment {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
 }
 
 impl Experiment {
-    /// All experiments, each with its name on the command line and its title in tables and plots.
-    pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
-        (Self::Default, "default", "Default settings"),
-        (Self::Adaptivity, "adaptivity", "Adaptive against uniform sampling"),
-        (Self::Precision, "precision", "Single against double precision"),
-        (Self::Threads, "threads", "Scaling with threads"),
-        (Self::Sampler, "sampler", "Sobol points against independent random numbers"),
-        (Self::Lobe, "lobe", "Square lobe against cone lobe"),
-        (Self::Level, "ray-types", "Fewer ray types"),
-        (Self::Depth, "max-depth", "Fewer reflections"),
-        (Self::MinWeight, "min-throughput", "Termination of weak paths"),
-        (Self::RaysPerPixel, "rays-per-pixel", "Cap on samples of glossy pixels"),
-        (Self::Acceleration, "acceleration", "Acceleration structures"),
-    ];
-
-    pub fn name(self) -> &'static str {
-        self.words()[0]
-    }
-
-    pub fn title(self) -> &'static str {
-        self.words()[1]
-    }
-
-    fn words(self) -> [&'static str; 2] {
-        let found = Self::ALL.iter().find(|(experiment, ..)| *experiment == self);
-        found.map_or([""; 2], |(_, name, title)| [name, title])
-    }
-
-    /// Returns the name of the setting's default in tables, such as `adaptive, default`. `single`
-    /// is `true` for single precision; `threads` is the default number of threads.
-    pub fn default_name(self, single: bool, threads: usize) -> String {
-        let name = match self {
-            Self::Adaptivity => "adaptive".to_string(),
-            Self::Precision => if single { "single" } else { "double" }.to_string(),
-            Self::Threads => thread_count(threads),
-            Self::Sampler => "Sobol".to_string(),
-            Self::Default
-            | Self::Lobe
-            | Self::Level
-            | Self::Depth
-            | Self::MinWeight
-            | Self::RaysPerPixel
-            | Self::Acceleration => return "default".to_string(),
-        };
-        format!("{name}, default")
-    }
-
-    /// Returns `true` if the pictures of all variants differ in noise only.
-    pub fn unbiased(self) -> bool {
-        matches!(
-            self,
-            Self::Default
-                | Self::Adaptivity
-                | Self::Precision
-                | Self::Threads
-                | Self::Sampler
-                | Self::Acceleration
-        )
+    /// Returns the experiment with the name `name`, or a message with all names.
+    pub fn named(name: &str) -> Result<&'static Self, String> {
+        EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
+            let names: Vec<_> = EXPERIMENTS.iter().map(|experiment| experiment.name).collect();
+            format!("setting `{name}` is not known; known: {}", names.join(", "))
+        })
     }
 }
 
-impl FromStr for Experiment {
-    type Err = String;
+/// Returns the variant with the precision that `auto` does not choose for the scene.
+fn other_precision(base: &Variant) -> Vec<Variant> {
+    let (name, precision) = match AnyWorld::compile(&base.scene, &base.options.world) {
+        AnyWorld::Single(_) => ("double", Precision::Double),
+        AnyWorld::Double(_) => ("single", Precision::Single),
+    };
+    vec![base.with(name, |v| v.options.world.precision = precision)]
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let found = Self::ALL.iter().find(|(_, name, _)| *name == text);
-        found.map(|(experiment, ..)| *experiment).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|(_, name, _)| *name).collect();
-            format!("setting `{text}` is not known; known: {}", names.join(", "))
+fn fewer_threads(base: &Variant) -> Vec<Variant> {
+    let counts = (0..).map(|k| 1 << k).take_while(|n| *n < base.threads);
+    let name = |n| if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };
+    counts.map(|n| base.with(name(n), |v| v.threads = n)).collect()
+}
+
+fn fewer_ray_types(base: &Variant) -> Vec<Variant> {
+    let fewer = RayTypes::ALL.into_iter().filter(|kind| *kind < base.scene.trace.ray_types);
+    let name = |kind| RayTypes::CHOICES[kind as usize].name;
+    fewer.map(|kind| base.with_scene(name(kind), |s| s.trace.ray_types = kind)).collect()
+}
+
+fn other_accelerations(base: &Variant) -> Vec<Variant> {
+    let present = base.scene.trace.acceleration;
+    let others = Acceleration::ALL.into_iter().filter(|kind| *kind != present);
+    others.map(|kind| base.with_scene(kind.name(), |s| s.trace.acceleration = kind)).collect()
+}
+
+/// Returns the variants with the cone lobe of glossy reflection in place of the square lobe, its
+/// cheap approximation, and the reverse.
+fn other_lobes(base: &Variant) -> Vec<Variant> {
+    let exchanges = [
+        (Lobe::Cone, Lobe::Square, "square for cone"),
+        (Lobe::Square, Lobe::Cone, "cone for square"),
+    ];
+    let occurs =
+        |from: Lobe| base.scene.materials.values().any(|m| m.lobe == from && m.roughness > 0.0);
+    let variants = exchanges.into_iter().filter(|(from, ..)| occurs(*from));
+    let variants = variants.map(|(from, to, name)| {
+        base.with_scene(name, |s| {
+            let matching = s.materials.values_mut().filter(|m| m.lobe == from);
+            matching.for_each(|m| m.lobe = to);
         })
-    }
+    });
+    if_reflecting(base, variants)
+}
+
+fn smaller_depths(base: &Variant) -> Vec<Variant> {
+    let depths = [0, 1, 2, 4, 8].into_iter().filter(|depth| *depth < base.scene.trace.max_depth);
+    let name = |depth| format!("depth {depth}");
+    let variants = depths.map(|depth| base.with_scene(name(depth), |s| s.trace.max_depth = depth));
+    if_reflecting(base, variants)
+}
+
+fn larger_throughputs(base: &Variant) -> Vec<Variant> {
+    let present = base.scene.trace.min_throughput;
+    let larger = [0.001, 0.01, 0.1].into_iter().filter(|limit| *limit > present);
+    let name = |limit| format!("throughput {limit}");
+    let variants =
+        larger.map(|limit| base.with_scene(name(limit), |s| s.trace.min_throughput = limit));
+    if_reflecting(base, variants)
+}
+
+fn caps(base: &Variant) -> Vec<Variant> {
+    let caps = [64, 256, 1024].into_iter();
+    let name = |cap| format!("{cap} samples");
+    let variants = caps.map(|cap| base.with_scene(name(cap), |s| s.film.rays_per_pixel = cap));
+    if_reflecting(base, variants)
+}
+
+/// Collects `variants` of a setting that has an effect on reflections only.
+fn if_reflecting(base: &Variant, variants: impl Iterator<Item = Variant>) -> Vec<Variant> {
+    let Scene { trace, objects, materials, .. } = &*base.scene;
+    let mut names = objects.iter().flat_map(|object| object.materials());
+    let reflects = trace.ray_types == RayTypes::Full
+        && trace.max_depth > 0
+        && names.any(|name| materials.get(name).is_some_and(|m| m.reflection > 0.0));
+    if reflects { variants.collect() } else { Vec::new() }
 }
 
 /// One render of an experiment.
 #[derive(Clone)]
 pub struct Variant {
-    pub experiment: Experiment,
+    pub experiment: &'static Experiment,
     /// Value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
     pub scene: Arc<Scene>,
@@ -128,18 +168,30 @@ impl Variant {
         let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
+
+    /// Creates the variant `name`, which `change` changes.
+    fn with(&self, name: impl Into<String>, change: impl FnOnce(&mut Self)) -> Self {
+        let mut variant = Self { name: name.into(), ..self.clone() };
+        change(&mut variant);
+        variant
+    }
+
+    /// Creates the variant `name`, whose scene `change` changes.
+    fn with_scene(&self, name: impl Into<String>, change: impl FnOnce(&mut Scene)) -> Self {
+        self.with(name, |variant| change(Arc::make_mut(&mut variant.scene)))
+    }
 }
 
 /// Plan of a measurement.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub targets: Vec<f64>,
-    pub experiments: Vec<Experiment>,
+    pub experiments: Vec<&'static Experiment>,
     /// Smallest number of timed renders of each variant.
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
-    /// Number of tracing threads, except in [`Experiment::Threads`].
+    /// Number of tracing threads, except in the experiment `threads`.
     pub threads: usize,
     pub seed: u64,
     pub display: Display,
@@ -149,17 +201,9 @@ impl Plan {
     /// Returns the default settings, then the changed settings of each experiment that differ from
     /// the default in this scene.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
-        let mut all = vec![self.default_of(scene)];
-        for experiment in &self.experiments {
-            all.extend(self.of_topic(*experiment, scene));
-        }
-        all
-    }
-
-    pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
-        Variant {
-            experiment: Experiment::Default,
-            name: "default".to_string(),
+        let base = Variant {
+            experiment: &DEFAULT,
+            name: DEFAULT.name.to_string(),
             scene: Arc::clone(scene),
             options: Options {
                 world: world::Options::default(),
@@ -168,119 +212,13 @@ impl Plan {
             },
             adaptive: true,
             threads: self.threads,
+        };
+        let mut all = vec![base.clone()];
+        for experiment in self.experiments.iter().copied() {
+            all.extend((experiment.vary)(&Variant { experiment, ..base.clone() }));
         }
+        all
     }
-
-    fn of_topic(&self, experiment: Experiment, scene: &Arc<Scene>) -> Vec<Variant> {
-        let base = self.default_of(scene);
-        let named = |name: &str| Variant { experiment, name: name.to_string(), ..base.clone() };
-        match experiment {
-            Experiment::Default => Vec::new(),
-            Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
-            Experiment::Precision => {
-                // The precision that `auto` does not choose for this scene.
-                let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
-                    AnyWorld::Single(_) => ("double", Precision::Double),
-                    AnyWorld::Double(_) => ("single", Precision::Single),
-                };
-                let mut variant = named(name);
-                variant.options.world.precision = precision;
-                vec![variant]
-            }
-            Experiment::Threads => {
-                let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
-                counts.map(|n| Variant { threads: n, ..named(&thread_count(n)) }).collect()
-            }
-            Experiment::Sampler => {
-                let mut random = named("random");
-                random.options.sampling.kind = SamplerKind::Random;
-                vec![random]
-            }
-            Experiment::Lobe
-            | Experiment::Level
-            | Experiment::Depth
-            | Experiment::MinWeight
-            | Experiment::RaysPerPixel
-            | Experiment::Acceleration => edited(experiment, scene)
-                .into_iter()
-                .map(|(name, scene)| Variant { scene: Arc::new(scene), ..named(&name) })
-                .collect(),
-        }
-    }
-}
-
-fn thread_count(threads: usize) -> String {
-    if threads == 1 { "1 thread".to_string() } else { format!("{threads} threads") }
-}
-
-/// Returns the variants of an experiment that edits the scene, by name.
-fn edited(experiment: Experiment, scene: &Scene) -> Vec<(String, Scene)> {
-    let mut variants = Vec::new();
-    let mut edit = |name: String, edit: &dyn Fn(&mut Scene)| {
-        let mut scene = scene.clone();
-        edit(&mut scene);
-        variants.push((name, scene));
-    };
-    let trace = &scene.trace;
-    let reflects = trace.ray_types == RayTypes::Full
-        && trace.max_depth > 0
-        && scene
-            .objects
-            .iter()
-            .flat_map(|object| object.materials())
-            .any(|name| scene.materials.get(name).is_some_and(|m| m.reflection > 0.0));
-    match experiment {
-        Experiment::Level => {
-            for (name, level) in [("primary", RayTypes::Primary), ("shadows", RayTypes::Shadows)] {
-                if level < trace.ray_types {
-                    edit(name.to_string(), &|s| s.trace.ray_types = level);
-                }
-            }
-        }
-        Experiment::Acceleration => {
-            for kind in Acceleration::ALL.into_iter().filter(|kind| *kind != trace.acceleration) {
-                edit(kind.name().to_string(), &|s| s.trace.acceleration = kind);
-            }
-        }
-        Experiment::Lobe if reflects => {
-            for (from, to, name) in [
-                (Lobe::Cone, Lobe::Square, "square for cone"),
-                (Lobe::Square, Lobe::Cone, "cone for square"),
-            ] {
-                if scene.materials.values().any(|m| m.lobe == from && m.roughness > 0.0) {
-                    edit(name.to_string(), &|s| {
-                        let matching = s.materials.values_mut().filter(|m| m.lobe == from);
-                        matching.for_each(|m| m.lobe = to);
-                    });
-                }
-            }
-        }
-        Experiment::Depth if reflects => {
-            for depth in [0, 1, 2, 4, 8].into_iter().filter(|depth| *depth < trace.max_depth) {
-                edit(format!("depth {depth}"), &|s| s.trace.max_depth = depth);
-            }
-        }
-        Experiment::MinWeight if reflects => {
-            for weight in [0.001, 0.01, 0.1].into_iter().filter(|w| *w > trace.min_throughput) {
-                edit(format!("weight {weight}"), &|s| s.trace.min_throughput = weight);
-            }
-        }
-        Experiment::RaysPerPixel if reflects => {
-            for cap in [64, 256, 1024] {
-                edit(format!("{cap} samples"), &|s| s.film.rays_per_pixel = cap);
-            }
-        }
-        Experiment::Lobe
-        | Experiment::Depth
-        | Experiment::MinWeight
-        | Experiment::RaysPerPixel
-        | Experiment::Default
-        | Experiment::Adaptivity
-        | Experiment::Precision
-        | Experiment::Threads
-        | Experiment::Sampler => {}
-    }
-    variants
 }
 
 #[cfg(test)]
@@ -288,10 +226,10 @@ mod tests {
     use super::*;
     use zerkalo_scene::Scene;
 
-    fn names(experiment: Experiment, threads: usize) -> Vec<String> {
+    fn names(experiment: &str, threads: usize) -> Vec<String> {
         let plan = Plan {
             targets: vec![0.5],
-            experiments: vec![experiment],
+            experiments: vec![Experiment::named(experiment).unwrap()],
             repetitions: 3,
             seconds: 1.0,
             threads,
@@ -300,19 +238,16 @@ mod tests {
         };
         let text = include_str!("../../scenes/mirror-room.toml");
         let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
-        assert_eq!((all[0].experiment, all[0].threads), (Experiment::Default, threads));
+        assert_eq!((all[0].experiment, all[0].threads), (&DEFAULT, threads));
         all[1..].iter().map(|v| v.name.clone()).collect()
     }
 
     #[test]
     fn variants_differ_from_the_default() {
-        assert_eq!(names(Experiment::Precision, 2), ["double"]);
-        assert_eq!(names(Experiment::Threads, 1), [""; 0]);
-        assert_eq!(names(Experiment::Threads, 2), ["1 thread"]);
-        assert_eq!(names(Experiment::Threads, 6), ["1 thread", "2 threads", "4 threads"]);
-        assert_eq!(names(Experiment::Adaptivity, 2), ["uniform"]);
-        assert_eq!(Experiment::Threads.default_name(true, 6), "6 threads, default");
-        assert_eq!(Experiment::Precision.default_name(true, 6), "single, default");
-        assert_eq!(Experiment::Depth.default_name(true, 6), "default");
+        assert_eq!(names("precision", 2), ["double"]);
+        assert_eq!(names("threads", 1), [""; 0]);
+        assert_eq!(names("threads", 2), ["1 thread"]);
+        assert_eq!(names("threads", 6), ["1 thread", "2 threads", "4 threads"]);
+        assert_eq!(names("adaptivity", 2), ["uniform"]);
     }
 }

@@ -19,7 +19,7 @@ mod run;
 
 pub use convergence_order::Slope;
 pub use error_curve::Point;
-pub use experiment::{Experiment, Plan, Variant};
+pub use experiment::{DEFAULT, EXPERIMENTS, Experiment, Plan, Variant};
 pub use reference_image::{Bias, Errors, Reference};
 pub use result::{
     Expected, Measured, Measurement, Median, Steadiness, TimeToTarget, median, spread,

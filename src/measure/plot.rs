@@ -1,6 +1,7 @@
 //! Plot of error against time in a measurement. Each experiment has a panel with logarithmic axes,
 //! which shows the error curves of the default settings and of the experiment's variants.
 
+use crate::measure::experiment;
 use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
 use plotters::coord::Shift;
@@ -61,8 +62,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
 
 /// Returns the experiments with their variants, each of which has a panel that also shows the
 /// default settings. They have a panel of their own only if there are no experiments.
-fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
-    let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
+fn panels(measurement: &Measurement) -> Vec<(&'static Experiment, Vec<&Measured>)> {
+    let mut panels: Vec<(&'static Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
         match panels.last_mut() {
             Some((experiment, variants)) if *experiment == measured.experiment => {
@@ -72,7 +73,7 @@ fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
         }
     }
     if panels.is_empty() {
-        panels.push((Experiment::Default, Vec::new()));
+        panels.push((&experiment::DEFAULT, Vec::new()));
     }
     panels
 }
@@ -139,7 +140,7 @@ where
     let (cols, rows) = grid(panels.len());
     let areas = body.split_evenly((rows as usize, cols as usize));
     for (area, (experiment, variants)) in areas.iter().zip(&panels) {
-        panel(area, measurement, *experiment, variants)?;
+        panel(area, measurement, experiment, variants)?;
     }
     root.present()?;
     Ok(())
@@ -149,7 +150,7 @@ where
 fn panel<B: DrawingBackend>(
     area: &DrawingArea<B, Shift>,
     measurement: &Measurement,
-    experiment: Experiment,
+    experiment: &Experiment,
     variants: &[&Measured],
 ) -> Drawn
 where
@@ -161,7 +162,7 @@ where
     let numbers = || curves.iter().flat_map(|(_, points)| points);
     let (seconds, levels) = (range(numbers().map(|p| p.0)), range(numbers().map(|p| p.1)));
     let mut chart = ChartBuilder::on(area)
-        .caption(experiment.title(), text(15, INK))
+        .caption(experiment.title, text(15, INK))
         .margin(12)
         .x_label_area_size(42)
         .y_label_area_size(52)

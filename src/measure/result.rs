@@ -42,7 +42,7 @@ pub struct Median {
 /// Results of one variant of the settings.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    pub experiment: Experiment,
+    pub experiment: &'static Experiment,
     /// Value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
     pub threads: usize,
@@ -72,7 +72,7 @@ pub struct Measurement {
     /// Noise targets that the default settings did not reach in time.
     pub expected: Vec<Expected>,
     /// Experiments without a variant that differs from the default settings in this scene.
-    pub idle: Vec<Experiment>,
+    pub idle: Vec<&'static Experiment>,
     /// Results of the variants, the default first.
     pub measured: Vec<Measured>,
 }
@@ -261,6 +261,7 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::experiment::DEFAULT;
     use crate::measure::reference_image::Errors;
     use zerkalo_render::film::testing::Rng;
 
@@ -279,7 +280,7 @@ mod tests {
             },
         };
         Measured {
-            experiment: Experiment::Default,
+            experiment: &DEFAULT,
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),

@@ -64,7 +64,7 @@ pub fn measure(
         None => render_reference(&default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
     };
     let reference = &rendered.reference;
-    let idle = |experiment: &Experiment| {
+    let idle = |experiment: &&'static Experiment| {
         !course.variants.iter().any(|variant| variant.experiment == *experiment)
     };
     let mut measurement = Measurement {
@@ -124,7 +124,7 @@ impl<'a> Course<'a> {
             }
             self.announce(&variant.name, 1 + i);
             let levels = if i == 0 { least } else { measurement.compared_at };
-            let use_estimate = !variant.experiment.unbiased();
+            let use_estimate = !variant.experiment.is_unbiased;
             let end = End { levels, seconds: longest, use_estimate };
             let Followed { points, stolen, render } = follow(variant, reference, end)?;
             let bias = use_estimate.then(|| reference.bias(&render.state.film, &render.state.mix));
@@ -241,6 +241,7 @@ fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::DEFAULT;
     use crate::measure::error_curve::Point;
     use crate::measure::reference_image::Errors;
 
@@ -256,7 +257,7 @@ mod tests {
             errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, rel_mse: 0.0, spread: 0.0 },
         };
         Measured {
-            experiment: Experiment::Default,
+            experiment: &DEFAULT,
             name: String::new(),
             threads: 1,
             points: points.iter().map(point).collect(),

@@ -45,7 +45,7 @@ fn variation(measured: &Measured, targets: &[f64]) -> Value {
     let (speed, slope) = (measured.samples_per_second(), measured.slope());
     let crossings = targets.iter().filter_map(|levels| measured.time_to(*levels));
     json!({
-        "setting": measured.experiment.name(),
+        "setting": measured.experiment.name,
         "name": measured.name,
         "threads": measured.threads,
         "samples_per_second": speed.map(|s| s.value),
@@ -98,7 +98,7 @@ pub fn csv(measurement: &Measurement) -> Vec<u8> {
     for measured in &measurement.measured {
         for point in points(measured) {
             let variant = Variant {
-                setting: measured.experiment.name(),
+                setting: measured.experiment.name,
                 name: &measured.name,
                 threads: measured.threads,
             };

@@ -6,7 +6,7 @@ mod table;
 use crate::command::args::MeasureArgs;
 use crate::command::progress::style;
 use crate::command::{Failure, handle_signals, print_line, read_scene_and_warn};
-use crate::measure::{self, Experiment, Plan, Reference};
+use crate::measure::{self, EXPERIMENTS, Plan, Reference};
 use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use zerkalo_scene::disk::{self, check_writable};
 use zerkalo_world::{self as world, AnyWorld};
 
 /// Experiments without `--only` and `--full`.
-const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
+const SHORT: [&str; 3] = ["adaptivity", "precision", "threads"];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
@@ -35,7 +35,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let reference = reference.transpose()?;
     let plan = plan(args);
     let world = AnyWorld::compile(&scene, &world::Options::default());
-    let (lanes, single) = (world.info().lanes, matches!(world, AnyWorld::Single(_)));
+    let lanes = world.info().lanes;
     drop(world);
     let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
@@ -51,7 +51,6 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         scene: &args.scene,
         threads: plan.threads,
         lanes,
-        single,
         measurement: &measurement,
     };
     let printed = print_line(&report.to_string());
@@ -72,10 +71,10 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
 }
 
 fn plan(args: &MeasureArgs) -> Plan {
-    let experiments = match (&args.only, args.full) {
-        (experiments, _) if !experiments.is_empty() => experiments.clone(),
-        (_, true) => Experiment::ALL.iter().map(|(experiment, ..)| *experiment).collect(),
-        _ => SHORT.to_vec(),
+    let all = EXPERIMENTS.iter();
+    let experiments = match &args.only[..] {
+        [] => all.filter(|e| args.full || SHORT.contains(&e.name)).collect(),
+        only => only.to_vec(),
     };
     let seconds = args.seconds.unwrap_or(if args.full { 300.0 } else { 50.0 });
     let mut targets = args.noise.clone();

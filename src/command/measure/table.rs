@@ -1,6 +1,8 @@
 //! Results of `zerkalo measure` as a text table.
 
-use crate::measure::{Experiment, Measured, Measurement, Median, Steadiness, TimeToTarget, median};
+use crate::measure::{
+    DEFAULT, Experiment, Measured, Measurement, Median, Steadiness, TimeToTarget, median,
+};
 use std::fmt;
 use std::path::Path;
 
@@ -9,8 +11,6 @@ pub struct MeasureReport<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
-    /// `true` if the scene is rendered in single precision by default.
-    pub single: bool,
     pub measurement: &'a Measurement,
 }
 
@@ -137,17 +137,17 @@ impl fmt::Display for MeasureReport<'_> {
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
         self.times(f, default)?;
-        let mut last = Experiment::Default;
+        let mut last = &DEFAULT;
         for measured in &m.measured[1..] {
             if measured.experiment != last {
                 last = measured.experiment;
                 self.heading(f, last)?;
-                self.row(f, &last.default_name(self.single, self.threads), default)?;
+                self.row(f, &default.name, default)?;
             }
             self.row(f, &measured.name, measured)?;
         }
         for experiment in &m.idle {
-            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title())?;
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title)?;
         }
         if m.measured.iter().any(|m| m.bias.is_some()) {
             writeln!(
@@ -196,14 +196,13 @@ impl MeasureReport<'_> {
         Ok(())
     }
 
-    fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
+    fn heading(&self, f: &mut fmt::Formatter, experiment: &Experiment) -> fmt::Result {
         writeln!(
             f,
             "\n{} (to {:.2} 8-bit levels)",
-            experiment.title(),
-            self.measurement.compared_at
+            experiment.title, self.measurement.compared_at
         )?;
-        let last = if experiment.unbiased() { "" } else { "   bias" };
+        let last = if experiment.is_unbiased { "" } else { "   bias" };
         writeln!(
             f,
             "  {:<18}  {:>14}  {:>9}  {:>9}  {:>9}{last}",
