@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::Film;
-use zerkalo_render::film::file::{FilmReader, ReadError};
+use zerkalo_render::film::file::FilmReader;
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use zerkalo_render::session::Report;
-use zerkalo_render::{Options, RenderState};
+use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::Document;
 use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision};
@@ -125,7 +125,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
             path.display()
         ))
     };
-    let report = |error: &ReadError| warn(&format!("warning: {error}; the shard starts again"));
+    let report = |error: &FileError| warn(&format!("warning: {error}; the shard starts again"));
     let Ok(reader) = FilmReader::open(path).inspect_err(report) else { return Ok(None) };
     let found = Part::of_header(path, reader.header())?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;

@@ -7,10 +7,10 @@
 //! because equal renders take different times.
 
 use crate::export::{Provenance, film_header};
+use crate::file_error::FileError;
 use crate::film::Film;
 use crate::film::file::{
-    Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
-    write_film_file,
+    Fields, FilmFileHeader, FilmReader, Tag, encode_end, encode_tiles, tile_chunks, write_film_file,
 };
 use crate::schedule::{Schedule, Settings};
 use crate::session::Report;
@@ -151,13 +151,13 @@ pub(super) struct Resumed {
 impl Checkpoint {
     /// Reads the checkpoint at `path`. Fails if the file cannot be read, is no checkpoint, or is
     /// damaged.
-    pub fn read(path: &Path) -> Result<Self, ReadError> {
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         let (header, film) = FilmReader::open(path)?.read()?;
         let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
         let Some(inputs) = inputs else {
             let what = "it is a film without the state of a render";
             let remedy = "name a file that `zerkalo render --checkpoint` has written";
-            return Err(ReadError::new(path, what, remedy));
+            return Err(FileError::new(path, what, remedy));
         };
         Ok(Self { path: path.to_path_buf(), header, inputs, film })
     }
@@ -175,7 +175,7 @@ impl Checkpoint {
         scene: &Arc<Scene>,
         options: &Options,
         settings: Settings,
-    ) -> Result<Resumed, ReadError> {
+    ) -> Result<Resumed, FileError> {
         self.check_options(scene, options)?;
         let foreign = "name the scene and its files as they were, or render without --resume";
         let same = scene.to_text() == self.inputs.scene;
@@ -198,9 +198,7 @@ impl Checkpoint {
             let what = format!("its precision is {}, not {}", theirs.precision, ours.precision);
             return Err(self.error(what, &format!("add --precision {}", theirs.precision)));
         }
-        if let Err(mismatch) = state.film.check_header(theirs) {
-            return Err(self.error(mismatch.to_string(), foreign));
-        }
+        state.film.check_header(theirs).map_err(|what| self.error(what, foreign))?;
         if !same && !state.try_reuse(scene) {
             let what = "it is of another scene, which differs in more than its lights";
             return Err(self.error(what, foreign));
@@ -219,7 +217,7 @@ impl Checkpoint {
     }
 
     /// Checks size, seed, sampler and program version.
-    fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
+    fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), FileError> {
         let film = &self.header.film;
         let [width, height] = scene.film.size.map(|n| n as usize);
         let size = format!("{}x{}", film.width, film.height);
@@ -244,8 +242,8 @@ impl Checkpoint {
         Ok(())
     }
 
-    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
-        ReadError::new(&self.path, what, remedy)
+    fn error(&self, what: impl Into<String>, remedy: &str) -> FileError {
+        FileError::new(&self.path, what, remedy)
     }
 }
 

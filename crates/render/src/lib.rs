@@ -8,6 +8,7 @@ pub mod image_file;
 
 mod checkpoint;
 pub mod export;
+mod file_error;
 mod first_hit_buffer;
 mod first_pass;
 pub mod memory_budget;
@@ -23,6 +24,7 @@ mod threads;
 pub mod wave;
 
 pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
+pub use file_error::FileError;
 pub use first_hit_buffer::FirstHitBuffer;
 pub use region_render::RegionRender;
 pub use relighting::Relighting;

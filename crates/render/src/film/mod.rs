@@ -32,7 +32,7 @@ pub use linear_image::LinearImage;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use pixel_probe::PixelProbe;
 pub use srgb_table::quantised_8;
-pub use store::{Film, Header, Mismatch, TileHandle};
+pub use store::{Film, Header, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
 /// Side of a film tile in pixels, which are stored and sampled together.

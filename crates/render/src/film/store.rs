@@ -8,7 +8,6 @@ use crate::film::light_weights::{LightWeights, Replicates, Sums};
 use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
-use std::fmt;
 
 /// Size in bytes from which all tiles are allocated before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
@@ -64,35 +63,6 @@ impl<'a> TileHandle<'a> {
         self.tile
     }
 }
-
-/// Reason for which two films cannot be added.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Mismatch {
-    /// The headers differ: name of the property, its value in the first and in the second film.
-    Header(&'static str, String, String),
-    /// In the tile with this number, both films have the first sample of only some pixels. In their
-    /// sum, pixels would have different numbers of samples.
-    Overlap(usize),
-}
-
-impl fmt::Display for Mismatch {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Header(property, ours, theirs) => write!(
-                f,
-                "these films cannot be added: {property} {ours} here, {theirs} there; \
-                 only films of the same scene, size, seed and precision can"
-            ),
-            Self::Overlap(tile) => write!(
-                f,
-                "these films cannot be added: both hold the first sample of tile {tile}; \
-                 only films of disjoint sample ranges can"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for Mismatch {}
 
 impl Film {
     /// Creates a film without samples.
@@ -355,13 +325,14 @@ impl Film {
     /// Adds the samples of another film, which hold another range of sample indices.
     ///
     /// # Errors
-    /// Fails, without a change, in the cases of [`Mismatch`].
-    pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
+    /// Fails, without a change, if the headers differ, or if both films have the first sample of
+    /// only some pixels of a tile: in their sum, pixels would have different numbers of samples.
+    pub fn add(&mut self, other: &Self) -> Result<(), String> {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
             let ours = &mut self.tiles[index];
             ours.clear_if_stale(self.epoch);
-            ours.add_tile(theirs).map_err(|()| Mismatch::Overlap(index))?;
+            ours.add_tile(theirs).map_err(|()| overlap(index))?;
         }
         Ok(())
     }
@@ -374,20 +345,20 @@ impl Film {
     }
 
     /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
-    pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), Mismatch> {
+    pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), String> {
         let ours = &mut self.tiles[index];
         if !ours.is_of(self.epoch) {
             *ours = tile;
             return Ok(());
         }
-        ours.add_tile(&tile).map_err(|()| Mismatch::Overlap(index))
+        ours.add_tile(&tile).map_err(|()| overlap(index))
     }
 
     /// Checks that a film with the properties `theirs` can be added to this film.
     ///
     /// # Errors
     /// Fails if a property differs.
-    pub fn check_header(&self, theirs: &Header) -> Result<(), Mismatch> {
+    pub fn check_header(&self, theirs: &Header) -> Result<(), String> {
         let properties = |h: &Header| -> [(&'static str, String); 4] {
             [
                 ("size", format!("{}x{}", h.width, h.height)),
@@ -399,17 +370,28 @@ impl Film {
         let ours = properties(&self.header);
         let different = ours.into_iter().zip(properties(theirs)).find(|(a, b)| a != b);
         different.map_or(Ok(()), |((property, ours), (_, theirs))| {
-            Err(Mismatch::Header(property, ours, theirs))
+            Err(format!(
+                "these films cannot be added: {property} {ours} here, {theirs} there; \
+                 only films of the same scene, size, seed and precision can"
+            ))
         })
     }
 
-    fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
+    fn check_addable(&self, other: &Self) -> Result<(), String> {
         self.check_header(&other.header)?;
-        let overlap = other.touched().find(|(index, theirs)| {
-            theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
+        let is_partial = |tile: &Tile| tile.lattice_px() != 0;
+        let both = other.touched().find(|(index, theirs)| {
+            is_partial(theirs) && self.tile(*index).is_some_and(is_partial)
         });
-        overlap.map_or(Ok(()), |(index, _)| Err(Mismatch::Overlap(index)))
+        both.map_or(Ok(()), |(index, _)| Err(overlap(index)))
     }
+}
+
+fn overlap(tile: usize) -> String {
+    format!(
+        "these films cannot be added: both hold the first sample of tile {tile}; \
+         only films of disjoint sample ranges can"
+    )
 }
 
 #[cfg(test)]
@@ -497,7 +479,7 @@ mod tests {
             (altered(|h| h.precision = "double".into()), "precision single here, double there"),
         ];
         for (other, difference) in others {
-            let message = ours.add(&other).unwrap_err().to_string();
+            let message = ours.add(&other).unwrap_err();
             assert!(message.contains(difference), "{message}");
         }
         assert_eq!(ours.bytes(), before);
@@ -513,7 +495,7 @@ mod tests {
             film
         };
         let mut ours = lattice();
-        assert_eq!(ours.add(&lattice()), Err(Mismatch::Overlap(0)));
+        assert_eq!(ours.add(&lattice()), Err(overlap(0)));
         let mut others = film(16, 16, &[1.0]);
         fill(&mut others, 4, |_, _, _| vec![4.0; 3]);
         others.add(&ours).unwrap();

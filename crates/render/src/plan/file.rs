@@ -4,16 +4,15 @@
 //! same in the merged picture, the expected number of rays per sample, and `g` if a path in the
 //! tile has made a random choice, otherwise `-`.
 
+use crate::file_error::{self, FileError, begins_with};
 use crate::film::{Display, Tone};
 use crate::plan::{MAX_SHARDS, Plan, PlanSettings, PlannedTile, tiles_of};
 use crate::schedule::MAX_SAMPLES;
-use std::fmt;
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 use std::str::FromStr;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
 
 /// First line of a plan file.
@@ -26,36 +25,11 @@ const MAX_SIDE: u32 = 1 << 14;
 const MIN_TILE_BYTES: usize = 8;
 
 /// Beginning of the first line, whatever the version.
-const START: &[u8] = b"zerkalo plan ";
+const START: &[u8; 13] = b"zerkalo plan ";
 
 pub fn is_plan_file(path: &Path) -> bool {
-    let mut start = [0; START.len()];
-    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == START
+    begins_with(path, START)
 }
-
-/// Error that makes a plan file, or a film file with a plan, unusable.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlanError {
-    pub path: PathBuf,
-    /// Line of the error, counted from 1; 0 for the file as a whole.
-    pub line: usize,
-    /// Clause about what was found and expected.
-    pub what: String,
-    /// Advice to the user, as a clause.
-    pub remedy: &'static str,
-}
-
-impl fmt::Display for PlanError {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}", self.path.display())?;
-        if self.line > 0 {
-            write!(f, ":{}", self.line)?;
-        }
-        write!(f, ": {}; {}", self.what, self.remedy)
-    }
-}
-
-impl std::error::Error for PlanError {}
 
 impl Plan {
     pub fn text(&self) -> String {
@@ -104,58 +78,46 @@ impl Plan {
     }
 
     /// Reads a plan file. Fails if it cannot be read or is no valid plan.
-    pub fn read(path: &Path) -> Result<Self, PlanError> {
-        let error =
-            |what: String, remedy| PlanError { path: path.to_path_buf(), line: 0, what, remedy };
-        let unreadable = |e: std::io::Error| match e.kind() {
-            ErrorKind::NotFound => error("there is no such file".into(), "check its name"),
-            _ => error(e.to_string(), "check its name and permissions"),
-        };
-        let file = open_regular(path).map_err(unreadable)?;
-        let length = file.metadata().map_err(unreadable)?.len();
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let (file, length) = file_error::open(path)?;
         if length > MAX_BYTES {
             let what = format!("it has {length} bytes; a plan has at most {MAX_BYTES}");
-            return Err(error(what, "name a file that `zerkalo plan` has written"));
+            return Err(FileError::new(path, what, NOT_A_PLAN));
         }
         let mut bytes = Vec::new();
-        file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+        let read = file.take(MAX_BYTES).read_to_end(&mut bytes);
+        read.map_err(|e| FileError::new(path, e.to_string(), "check the disk"))?;
         Self::parse(path, &bytes)
     }
 
     /// Parses the text of a plan file. `path` is its name in error messages.
-    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, PlanError> {
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
         let mut lines = Lines { path, line: 0, rest: "" };
-        let whole = |lines: &Lines, what: &str, remedy| PlanError {
-            line: 0,
-            remedy,
-            ..lines.error(what.to_string())
-        };
         if !bytes.starts_with(START) {
-            let remedy = "name a file that `zerkalo plan` has written";
-            return Err(whole(&lines, "it is not a plan file", remedy));
+            return Err(FileError::new(path, "it is not a plan file", NOT_A_PLAN));
         }
         let Ok(text) = std::str::from_utf8(bytes) else {
-            return Err(whole(&lines, "it is damaged: it is not UTF-8", DAMAGED));
+            return Err(FileError::new(path, "it is damaged: it is not UTF-8", DAMAGED));
         };
         lines.rest = text;
         let title = lines.next_line();
         if title != Some(TITLE) {
             let found = truncated(title.unwrap_or_default());
             let what = format!("found `{found}`, expected `{TITLE}`");
-            let remedy = "use the version of zerkalo that wrote it, or plan again";
-            return Err(PlanError { remedy, ..lines.error(what) });
+            let remedy = "use the version of zerkalo that wrote it, or plan again".to_string();
+            return Err(FileError { remedy, ..lines.error(what) });
         }
         let body = text.trim_end_matches('\n').rfind('\n').map_or("", |end| &text[..=end]);
         let last = &text[body.len()..];
         if last != format!("checksum {:016x}\n", fnv1a64(body.as_bytes())) {
             let what = "it is damaged, altered or incomplete: the checksum at its end is wrong";
-            return Err(whole(&lines, what, DAMAGED));
+            return Err(FileError::new(path, what, DAMAGED));
         }
         lines.rest = &body[TITLE.len() + 1..];
         Self::parse_body(&mut lines)
     }
 
-    fn parse_body(lines: &mut Lines) -> Result<Self, PlanError> {
+    fn parse_body(lines: &mut Lines) -> Result<Self, FileError> {
         let positive = |text: &str| number(text).filter(|n: &f64| n.is_finite() && *n > 0.0);
         // The fields are read in the order of the file. The last two follow other lines.
         let mut settings = PlanSettings {
@@ -216,6 +178,7 @@ impl Plan {
 }
 
 const DAMAGED: &str = "copy it again or plan again";
+const NOT_A_PLAN: &str = "name a file that `zerkalo plan` has written";
 
 /// Remaining lines of a plan file.
 struct Lines<'a> {
@@ -226,8 +189,8 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    fn error(&self, what: String) -> PlanError {
-        PlanError { path: self.path.to_path_buf(), line: self.line, what, remedy: DAMAGED }
+    fn error(&self, what: String) -> FileError {
+        FileError { line: self.line, ..FileError::new(self.path, what, DAMAGED) }
     }
 
     fn next_line(&mut self) -> Option<&'a str> {
@@ -244,7 +207,7 @@ impl<'a> Lines<'a> {
         key: &str,
         expected: &str,
         parse: impl FnOnce(&str) -> Option<T>,
-    ) -> Result<T, PlanError> {
+    ) -> Result<T, FileError> {
         let line = self.next_line().unwrap_or_default();
         let value = line.strip_prefix(key).and_then(|value| value.strip_prefix(' '));
         value.and_then(parse).ok_or_else(|| {
@@ -252,7 +215,7 @@ impl<'a> Lines<'a> {
         })
     }
 
-    fn tile(&mut self) -> Result<PlannedTile, PlanError> {
+    fn tile(&mut self) -> Result<PlannedTile, FileError> {
         let line = self.next_line().unwrap_or_default();
         let parse = || {
             let mut fields = line.split(' ');
@@ -368,6 +331,6 @@ mod tests {
     fn unreadable_files_are_refused() {
         let message = |path: &str| Plan::read(Path::new(path)).unwrap_err().to_string();
         assert!(message("no-such-file").contains("there is no such file"));
-        assert!(message(".").contains("check its name and permissions"));
+        assert!(message(".").contains("not a regular file; name a file"));
     }
 }

@@ -19,7 +19,7 @@ mod shard_render;
 mod testing;
 mod watched;
 
-pub use file::{PlanError, is_plan_file};
+pub use file::is_plan_file;
 pub use merge::Merged;
 pub use part::{Part, PartShard};
 pub use shard_render::ShardRender;

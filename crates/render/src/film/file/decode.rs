@@ -1,6 +1,7 @@
 //! Reader of film files. It compares every length with the length of the file before it allocates
 //! memory.
 
+use crate::file_error::{self, FileError, begins_with};
 use crate::film::display::Display;
 use crate::film::file::encode::CHECKSUM_BYTES;
 use crate::film::file::{
@@ -11,47 +12,18 @@ use crate::film::light_weights::LightWeights;
 use crate::film::store::{Film, Header};
 use crate::film::{MAX_FILM_GROUPS, TILE};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::truncated;
 
 /// Bytes of the record of a tile without samples, the shortest.
 const RECORD_BYTES: u64 = 8;
 
-/// Error that makes a film file unusable.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ReadError {
-    /// Path of the film file.
-    pub path: PathBuf,
-    /// Description of the error, as a clause of a sentence.
-    pub what: String,
-    /// Advice to the user, as a clause of a sentence.
-    pub remedy: String,
-}
-
-impl fmt::Display for ReadError {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "cannot use {}: {}; {}", self.path.display(), self.what, self.remedy)
-    }
-}
-
-impl std::error::Error for ReadError {}
-
-impl ReadError {
-    /// Creates an error; `what` and `remedy` become the fields of these names.
-    pub(crate) fn new(path: &Path, what: impl Into<String>, remedy: &str) -> Self {
-        Self { path: path.to_path_buf(), what: what.into(), remedy: remedy.to_string() }
-    }
-}
-
 /// Returns `true` if the file at `path` begins with the magic bytes of film files.
 pub fn is_film_file(path: &Path) -> bool {
-    let mut start = [0; MAGIC.len()];
-    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
+    begins_with(path, &MAGIC)
 }
 
 /// Reader of a film file. It has already read everything before the tiles.
@@ -81,20 +53,15 @@ struct Chunk {
 
 impl FilmReader<BufReader<File>> {
     /// Opens the film file at `path` and reads everything before the tiles.
-    pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
-        let (length, file) = opened.map_err(|e| match e.kind() {
-            ErrorKind::NotFound => ReadError::new(path, "there is no such file", "check its name"),
-            ErrorKind::InvalidInput => ReadError::new(path, e.to_string(), "name a file"),
-            _ => ReadError::new(path, e.to_string(), "check its name and permissions"),
-        })?;
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let (file, length) = file_error::open(path)?;
         Self::new(path, BufReader::with_capacity(1 << 16, file), length)
     }
 }
 
 impl<R: Read> FilmReader<R> {
     /// Reads everything before the tiles from `bytes`, a film file of `length` bytes.
-    pub fn new(path: &Path, bytes: R, length: u64) -> Result<Self, ReadError> {
+    pub fn new(path: &Path, bytes: R, length: u64) -> Result<Self, FileError> {
         let mut input = Input { path: path.to_path_buf(), bytes, left: length };
         let mut checksums = crc32fast::Hasher::new();
         let magic = input.take(MAGIC.len() as u64, "its first bytes")?;
@@ -149,17 +116,16 @@ impl<R: Read> FilmReader<R> {
     }
 
     /// Reads header and film.
-    pub fn read(self) -> Result<(FilmFileHeader, Film), ReadError> {
+    pub fn read(self) -> Result<(FilmFileHeader, Film), FileError> {
         let mut film = Film::new(self.header.film.clone());
         let header = self.add_to(&mut film)?;
         Ok((header, film))
     }
 
     /// Adds the samples of the file to `film`, which may contain some of them after an error.
-    pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, ReadError> {
-        if let Err(mismatch) = film.check_header(&self.header.film) {
-            return Err(self.input.error(mismatch.to_string(), "name a file of the same render"));
-        }
+    pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, FileError> {
+        film.check_header(&self.header.film)
+            .map_err(|what| self.input.error(what, "name a file of the same render"))?;
         let groups = self.header.film.scales.len();
         self.visit_tiles(|fields, numbers| {
             for index in numbers {
@@ -176,7 +142,7 @@ impl<R: Read> FilmReader<R> {
     }
 
     /// Reads the file to its end and verifies all checksums.
-    pub fn verify(self) -> Result<FilmFileHeader, ReadError> {
+    pub fn verify(self) -> Result<FilmFileHeader, FileError> {
         self.visit_tiles(|_, _| Some(()))
     }
 
@@ -185,7 +151,7 @@ impl<R: Read> FilmReader<R> {
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
-    ) -> Result<FilmFileHeader, ReadError> {
+    ) -> Result<FilmFileHeader, FileError> {
         let Self { mut input, header, mut next, mut checksums } = self;
         let all = header.film.width.div_ceil(TILE) * header.film.height.div_ceil(TILE);
         let mut tiles = 0;
@@ -269,11 +235,11 @@ fn decode_metadata(fields: &mut Fields) -> Option<Vec<(String, String)>> {
 }
 
 impl<R: Read> Input<R> {
-    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
-        ReadError::new(&self.path, what, remedy)
+    fn error(&self, what: impl Into<String>, remedy: &str) -> FileError {
+        FileError::new(&self.path, what, remedy)
     }
 
-    fn damaged(&self, what: impl Into<String>) -> ReadError {
+    fn damaged(&self, what: impl Into<String>) -> FileError {
         self.error(
             format!("it is damaged or was altered: {}", what.into()),
             "copy it again, or use an older one",
@@ -281,7 +247,7 @@ impl<R: Read> Input<R> {
     }
 
     /// Reads `length` bytes, the `part` of error messages.
-    fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
+    fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, FileError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
             input.error(what, "copy it again, or use an older one")
@@ -306,7 +272,7 @@ impl<R: Read> Input<R> {
         Ok(bytes)
     }
 
-    fn chunk(&mut self) -> Result<Chunk, ReadError> {
+    fn chunk(&mut self) -> Result<Chunk, FileError> {
         let start = self.take(12, "a part")?;
         let (tag, length) = start.split_at(4);
         let tag: Tag = [tag[0], tag[1], tag[2], tag[3]];

@@ -36,7 +36,7 @@ mod encode;
 mod tests;
 mod tile_record;
 
-pub use decode::{Fields, FilmReader, ReadError, is_film_file};
+pub use decode::{Fields, FilmReader, is_film_file};
 pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
 
 use crate::film::display::Display;

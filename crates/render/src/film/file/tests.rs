@@ -1,6 +1,7 @@
 //! Unit tests of film files.
 
 use super::*;
+use crate::FileError;
 use crate::film::testing::TestFilm;
 use crate::film::testing::{Rng, each_tile, film, white};
 use crate::film::{Film, InvalidSample, TILE};
@@ -52,7 +53,7 @@ fn pieces(film: &Film) -> Vec<Vec<u8>> {
     pieces
 }
 
-fn read(bytes: &[u8]) -> Result<(FilmFileHeader, Film), ReadError> {
+fn read(bytes: &[u8]) -> Result<(FilmFileHeader, Film), FileError> {
     FilmReader::new(Path::new("a.zk"), Cursor::new(bytes), bytes.len() as u64)?.read()
 }
 
