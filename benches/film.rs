@@ -3,10 +3,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use zerkalo_render::film::testing::header;
 use zerkalo_render::film::{
     Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone,
 };
-use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 
 /// Returns a film with `groups` light groups that shows a noisy gradient. Each pixel has two
 /// replicates (halves of the samples) of 64 samples each. The noise is estimated from the
@@ -74,16 +75,8 @@ fn pictures(c: &mut Criterion) {
         [("8.png", Depth::Eight), ("16.png", Depth::Sixteen), ("32.exr", Depth::Eight)]
     {
         let target = ImageOutput::from_path(dir.path().join(name)).expect("a known extension");
-        let picture = ImageData {
-            size: [one.width(), one.height()].map(|n| n as u32),
-            mix: &white(1),
-            group_names: &["lamp".to_string()],
-            display: Display::default(),
-            depth,
-        };
-        group.bench_function(name, |b| {
-            b.iter(|| target.write(&picture, &mut WholeFilm { film: &one, metadata: &[] }));
-        });
+        let header = header(&one);
+        group.bench_function(name, |b| b.iter(|| target.write(&header, depth, &mut &one)));
         let bytes = std::fs::metadata(target.path()).map_or(0, |m| m.len());
         println!("{name}: {bytes} bytes");
     }

@@ -4,8 +4,10 @@ use crate::harness::*;
 use proptest::prelude::*;
 use std::fs::File;
 use std::io::BufReader;
+use zerkalo_render::film::file::FilmFileHeader;
+use zerkalo_render::film::testing::header;
 use zerkalo_render::film::{InvalidSample, TileHandle, lattice_pixels, quantised_8, quantised_16};
-use zerkalo_render::image_file::{Depth, ImageData, ImageOutput, WholeFilm};
+use zerkalo_render::image_file::{Depth, ImageOutput};
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 21;
@@ -216,13 +218,14 @@ fn mix() -> LightWeights {
 }
 
 fn write(path: &Path, film: &Film, depth: Depth, display: Display) {
-    let group_names = ["lamp".to_string(), "окно-2".to_string()];
-    let metadata = metadata();
-    let (mix, group_names) = (&mix(), &group_names[..]);
-    let size = [film.width(), film.height()].map(|n| n as u32);
-    let picture = ImageData { size, mix, group_names, display, depth };
-    let mut bands = WholeFilm { film, metadata: &metadata };
-    ImageOutput::from_path(path).unwrap().write(&picture, &mut bands).unwrap();
+    let header = FilmFileHeader {
+        weights: mix(),
+        group_names: vec!["lamp".to_string(), "окно-2".to_string()],
+        display,
+        metadata: metadata(),
+        ..header(film)
+    };
+    ImageOutput::from_path(path).unwrap().write(&header, depth, &mut &*film).unwrap();
 }
 
 #[test]

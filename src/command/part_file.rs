@@ -39,7 +39,7 @@ impl FilmOutput {
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
-            Self::Picture(output, depth) => output.write_film(header, film, *depth),
+            Self::Picture(output, depth) => output.write(header, *depth, &mut &*film),
         }
     }
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
-use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::export::{Provenance, film_header, scene_hash};
 use zerkalo_render::image_file::ImageOutput;
 use zerkalo_render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo_render::session::{Report, Session, State};
@@ -122,8 +122,10 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     let writing = Instant::now();
     let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
-        let written = state.write(report, &provenance, depth, &output);
-        (report.clone(), state.world.info().precision, state.world.info().biases.clone(), written)
+        let header = film_header(state, report, &provenance);
+        let written = output.write(&header, depth, &mut &state.film);
+        let world = state.world.info();
+        (report.clone(), world.precision, world.biases.clone(), written)
     });
     let (report, precision, biased, written) = results.ok_or("the renderer has no picture")?;
     written?;

@@ -3,9 +3,8 @@
 use crate::features::row::*;
 use crate::harness::*;
 use std::time::SystemTime;
-use zerkalo_render::film::file::{
-    FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
-};
+use zerkalo_render::film::file::{encode_end, encode_tiles, tile_chunks, write_film_file};
+use zerkalo_render::film::testing::header;
 use zerkalo_render::plan::{Part, PartShard, PlannedTile, ShardRender, WatchedFilms, WatchedState};
 
 const SIZE: [u32; 2] = [100, 70];
@@ -98,14 +97,7 @@ fn e1_shards() {
 /// Returns the bytes of the film file of shard `number` with the samples of `film`. If `complete`
 /// is `false`, the file says that the shard is unfinished.
 fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
-    let mut header = FilmFileHeader {
-        film: film.header().clone(),
-        weights: LightWeights { weights: vec![[1.0; 3]; film.groups()] },
-        group_names: vec![String::new(); film.groups()],
-        display: Display::default(),
-        metadata: Vec::new(),
-        chunks: Default::default(),
-    };
+    let mut header = header(film);
     let shards = vec![PartShard { number, complete }];
     Part { plan: plan.clone(), shards, rays: 0 }.record(&mut header);
     let mut pieces = vec![header.encode()];

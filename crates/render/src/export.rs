@@ -3,12 +3,10 @@
 
 use crate::film::Display;
 use crate::film::file::FilmFileHeader;
-use crate::image_file::{Depth, ImageOutput};
 use crate::render_state::RenderState;
 use crate::session::Report;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_scene::Scene;
-use zerkalo_scene::disk::WriteError;
 use zerkalo_scene::value::Fnv1a64;
 
 /// Origin of a picture: the metadata that its [`RenderState`] does not have.
@@ -20,20 +18,6 @@ pub struct Provenance {
     pub scene_hash: String,
     pub sampler: SamplerKind,
     pub adaptive: bool,
-}
-
-impl RenderState {
-    /// Writes the current picture with its metadata to `output`. `report` is the latest report on
-    /// the film.
-    pub fn write(
-        &self,
-        report: &Report,
-        provenance: &Provenance,
-        depth: Depth,
-        output: &ImageOutput,
-    ) -> Result<(), WriteError> {
-        output.write_film(&film_header(self, report, provenance), &self.film, depth)
-    }
 }
 
 /// Returns the hash of a scene file's text and of the contents of its meshes and images, after the

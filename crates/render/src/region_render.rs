@@ -5,9 +5,10 @@
 //! therefore equals one of the whole picture, bit for bit. An adaptive render differs, because it
 //! allocates samples within each region.
 
-use crate::export::{Provenance, metadata};
-use crate::film::{Film, Noise, TileNoise};
-use crate::image_file::{Bands, Depth, ImageData, ImageOutput};
+use crate::export::{Provenance, film_header, metadata};
+use crate::film::file::FilmFileHeader;
+use crate::film::{Film, Header, Noise, TileNoise};
+use crate::image_file::{Bands, Depth, ImageOutput};
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
 use crate::{Options, RenderState, threads};
@@ -92,11 +93,10 @@ impl RegionRender {
         output: &ImageOutput,
         observer: Observer,
     ) -> Result<(Report, StoppedBy), WriteError> {
-        let state = self.state();
-        let (mix, group_names) = (&state.mix.clone(), &state.group_names());
-        let (size, display) = (state.scene().film.size, state.display());
-        let picture = ImageData { size, mix, group_names, display, depth };
-        output.write(&picture, &mut Rows { render: self, provenance, observer })?;
+        let height = self.state().scene().film.size[1] as usize;
+        let header = film_header(self.state(), &self.report, provenance);
+        let header = FilmFileHeader { film: Header { height, ..header.film }, ..header };
+        output.write(&header, depth, &mut Rows { render: self, provenance, observer })?;
         Ok((self.report.clone(), self.stopped_by))
     }
 
@@ -216,7 +216,7 @@ impl Bands for Rows<'_> {
         self.render.film_with_row(y, self.observer)
     }
 
-    fn metadata(&self) -> Vec<(String, String)> {
-        metadata(self.render.state(), &self.render.report, self.provenance)
+    fn final_metadata(&self) -> Option<Vec<(String, String)>> {
+        Some(metadata(self.render.state(), &self.render.report, self.provenance))
     }
 }

@@ -1,6 +1,7 @@
 //! Films with known contents, contents of films, and random numbers, for the tests of all crates.
 
-use crate::film::{Film, Header, LightWeights, Replicates, TILE, Tile};
+use crate::film::file::FilmFileHeader;
+use crate::film::{Display, Film, Header, LightWeights, Replicates, TILE, Tile};
 
 /// Returns an empty film of `width` x `height` pixels with a light group for each of `scales`.
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
@@ -11,6 +12,18 @@ pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
 /// Returns light weights of 1 for each of `groups` groups.
 pub fn white(groups: usize) -> LightWeights {
     LightWeights { weights: vec![[1.0; 3]; groups] }
+}
+
+/// Returns a header of the file of `film`, with light weights of 1 and without metadata.
+pub fn header(film: &Film) -> FilmFileHeader {
+    FilmFileHeader {
+        film: film.header().clone(),
+        weights: white(film.groups()),
+        group_names: vec![String::new(); film.groups()],
+        display: Display::default(),
+        metadata: Vec::new(),
+        chunks: Default::default(),
+    }
 }
 
 /// Returns light weights of 1 for the group `group` and 0 for the others of `groups`.

@@ -8,10 +8,11 @@
 //! The file consists of tiles, so that programs can read a part of a large picture. The header is
 //! written again at the end if metadata have changed.
 
+use crate::film::file::FilmFileHeader;
 use crate::film::{Replicates, Sums};
 use crate::image_file::bands::Bands;
 use crate::image_file::exr_header::Ordered;
-use crate::image_file::image_data::{ImageData, WriteSeek, replace_start};
+use crate::image_file::image_data::{Depth, WriteSeek, replace_start};
 use crate::image_file::metadata::padded;
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
@@ -32,7 +33,8 @@ const TILE: [usize; 2] = [64, 16];
 
 /// Writes a picture, one row of tiles after another.
 pub(super) fn encode(
-    picture: &ImageData,
+    picture: &FilmFileHeader,
+    _: Depth,
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> io::Result<()> {
@@ -54,13 +56,12 @@ enum Source {
 }
 
 fn encode_to(
-    picture: &ImageData,
+    picture: &FilmFileHeader,
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> Result<(), Error> {
-    let channels = channels(&layer_names(picture.group_names, picture.mix.weights.len()));
-    let metadata = bands.metadata();
-    let headers = headers(picture, &channels, &metadata);
+    let channels = channels(&layer_names(&picture.group_names, picture.weights.weights.len()));
+    let headers = headers(picture, &channels, &picture.metadata);
     exr::block::write(Ordered::new(&mut *sink), headers, true, |meta, writer| {
         let mut rows = TileRow::new(picture, channels.iter().map(|(_, source)| *source).collect());
         let mut compressor = writer.sequential_blocks_compressor(&meta);
@@ -73,16 +74,15 @@ fn encode_to(
             let block = UncompressedBlock::from_lines(channels, block, |line| {
                 let Vec2(x, y) = line.location.position;
                 let bytes = &rows.bytes[line.location.channel];
-                let start = ((y - top) * picture.size[0] as usize + x) * 4;
+                let start = ((y - top) * picture.film.width + x) * 4;
                 line.value.copy_from_slice(&bytes[start..start + line.value.len()]);
             });
             compressor.compress_block(index, block)?;
         }
         Ok(())
     })?;
-    let last = bands.metadata();
-    if last != metadata {
-        let [before, after] = [&metadata, &last].map(|m| header(picture, &channels, m));
+    if let Some(last) = bands.final_metadata() {
+        let [before, after] = [&picture.metadata, &last].map(|m| header(picture, &channels, m));
         replace_start(sink, &before?, &after?)?;
     }
     Ok(())
@@ -90,7 +90,7 @@ fn encode_to(
 
 /// Returns all bytes before the table of chunks.
 fn header(
-    picture: &ImageData,
+    picture: &FilmFileHeader,
     channels: &[(String, Source)],
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, Error> {
@@ -104,11 +104,11 @@ fn header(
 
 /// Returns the header of the only part of the file.
 fn headers(
-    picture: &ImageData,
+    picture: &FilmFileHeader,
     channels: &[(String, Source)],
     metadata: &[(String, String)],
 ) -> Headers {
-    let size = Vec2(picture.size[0] as usize, picture.size[1] as usize);
+    let size = Vec2(picture.film.width, picture.film.height);
     let mut image = ImageAttributes::with_size(size);
     image.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
@@ -180,14 +180,14 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
 
 /// Encoded pixels of a row of tiles.
 struct TileRow<'a> {
-    picture: &'a ImageData<'a>,
+    picture: &'a FilmFileHeader,
     sources: Vec<Source>,
     /// Encoded values of each channel, `[row][column]`.
     bytes: Vec<Vec<u8>>,
 }
 
 impl<'a> TileRow<'a> {
-    fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
+    fn new(picture: &'a FilmFileHeader, sources: Vec<Source>) -> Self {
         Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
@@ -196,7 +196,7 @@ impl<'a> TileRow<'a> {
         bytes.iter_mut().for_each(Vec::clear);
         for y in rows {
             let film = bands.film_with_row(y)?;
-            let mixed = &picture.mix.radiance_per_step(film.scales());
+            let mixed = &picture.weights.radiance_per_step(film.scales());
             let start = bytes.first().map_or(0, Vec::len);
             for bytes in bytes.iter_mut() {
                 bytes.resize(start + film.width() * 4, 0);
@@ -234,9 +234,8 @@ fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Display;
-    use crate::film::testing::{fill, film, white};
-    use crate::image_file::{Depth, ImageOutput, WholeFilm, read_exr};
+    use crate::film::testing::{fill, film, header};
+    use crate::image_file::{ImageOutput, read_exr};
     use exr::meta::MetaData;
 
     #[test]
@@ -247,15 +246,8 @@ mod tests {
         fill(&mut film, 2, |x, y, _| vec![2.0 * value(x, y); 3]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        let picture = ImageData {
-            size: size.map(|side| side as u32),
-            mix: &white(1),
-            group_names: &[],
-            display: Display::default(),
-            depth: Depth::Eight,
-        };
         let output = ImageOutput::from_path(&path).unwrap();
-        output.write(&picture, &mut WholeFilm { film: &film, metadata: &[] }).unwrap();
+        output.write(&header(&film), Depth::Eight, &mut &film).unwrap();
         let meta = MetaData::read_from_file(&path, true).unwrap();
         let BlockDescription::Tiles(tiles) = meta.headers[0].blocks else { panic!("{meta:?}") };
         assert_eq!(tiles.tile_size, Vec2(TILE[0], TILE[1]));

@@ -1,23 +1,6 @@
-//! Input of the encoders apart from rows.
+//! Bit depth and output of the encoders.
 
-use crate::film::Display;
-use crate::film::LightWeights;
 use std::io::{self, Seek, SeekFrom, Write};
-
-/// Size and settings of a picture file.
-#[derive(Clone, Copy, Debug)]
-pub struct ImageData<'a> {
-    /// Width and height of the image in pixels.
-    pub size: [u32; 2],
-    /// Weight of each light group: colour times intensity.
-    pub mix: &'a LightWeights,
-    /// Name of each light group, for OpenEXR.
-    pub group_names: &'a [String],
-    /// Exposure and tone curve, for PNG.
-    pub display: Display,
-    /// Bits per channel, for PNG.
-    pub depth: Depth,
-}
 
 /// Number of bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

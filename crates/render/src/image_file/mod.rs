@@ -11,9 +11,9 @@ mod output;
 mod png_reader;
 mod png_writer;
 
-pub use bands::{Bands, WholeFilm};
+pub use bands::Bands;
 pub use exr_reader::{ReadPicture, read_exr};
-pub use image_data::{Depth, ImageData};
+pub use image_data::Depth;
 pub use metadata::FileMetadata;
 pub use output::ImageOutput;
 pub use png_reader::read_png;

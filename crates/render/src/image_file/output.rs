@@ -1,9 +1,8 @@
 //! Output of picture files in the format of their extension.
 
-use crate::film::Film;
 use crate::film::file::FilmFileHeader;
-use crate::image_file::bands::{Bands, WholeFilm};
-use crate::image_file::image_data::{Depth, ImageData, WriteSeek};
+use crate::image_file::bands::Bands;
+use crate::image_file::image_data::{Depth, WriteSeek};
 use crate::image_file::{exr_writer, png_writer};
 use std::ffi::OsStr;
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -13,7 +12,7 @@ use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
 /// Picture file format with its encoder.
 struct Format {
     extension: &'static str,
-    encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
+    encode: fn(&FilmFileHeader, Depth, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
 /// Formats of the picture files that can be written.
@@ -73,39 +72,30 @@ impl ImageOutput {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
-    /// Writes the picture row by row to a temporary file, which replaces an old one when it is
-    /// complete and stored on the disk.
-    pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
-        replace_file(&self.path, self.existing, |file| {
-            let mut out = BufWriter::with_capacity(1 << 16, file);
-            (FORMATS[self.format].encode)(picture, bands, &mut out)?;
-            out.flush()
-        })
-    }
-
-    /// Writes the picture of `film` with its `header`.
-    pub fn write_film(
+    /// Writes the picture with its `header` row by row to a temporary file, which replaces an old
+    /// one when it is complete and stored on the disk. `depth` is that of a PNG.
+    ///
+    /// A key of the metadata has 1 to 79 printable ASCII characters without leading, trailing or
+    /// double spaces. It begins with an upper-case letter, because the keys of OpenEXR do not.
+    pub fn write(
         &self,
         header: &FilmFileHeader,
-        film: &Film,
         depth: Depth,
+        bands: &mut dyn Bands,
     ) -> Result<(), WriteError> {
-        let picture = ImageData {
-            size: [film.width(), film.height()].map(|n| n as u32),
-            mix: &header.weights,
-            group_names: &header.group_names,
-            display: header.display,
-            depth,
-        };
-        self.write(&picture, &mut WholeFilm { film, metadata: &header.metadata })
+        replace_file(&self.path, self.existing, |file| {
+            let mut out = BufWriter::with_capacity(1 << 16, file);
+            (FORMATS[self.format].encode)(header, depth, bands, &mut out)?;
+            out.flush()
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::{fill, film, white};
-    use crate::film::{Display, LightWeights};
+    use crate::film::Film;
+    use crate::film::testing::{fill, film, header};
     use crate::image_file::FileMetadata;
     use std::fs;
 
@@ -124,10 +114,9 @@ mod tests {
         assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
     }
 
-    /// Returns a picture of 40 x 20 pixels.
-    fn picture(mix: &LightWeights) -> ImageData<'_> {
-        let (display, depth) = (Display::default(), Depth::Eight);
-        ImageData { size: [40, 20], mix, group_names: &[], display, depth }
+    /// Returns the header of a picture of 40 x 20 pixels.
+    fn picture(noise: &str) -> FilmFileHeader {
+        FilmFileHeader { metadata: entries(noise), ..header(&film(40, 20, &[1.0])) }
     }
 
     #[test]
@@ -137,7 +126,8 @@ mod tests {
         fs::write(&path, "old").unwrap();
         let target = ImageOutput::from_path(&path).unwrap();
         let mut full = Failing(film(40, 20, &[1.0]), || ErrorKind::StorageFull.into());
-        let error = target.write(&picture(&white(1)), &mut full).unwrap_err().to_string();
+        let error =
+            target.write(&picture("unknown"), Depth::Eight, &mut full).unwrap_err().to_string();
         assert!(error.contains("no space is left"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -149,10 +139,7 @@ mod tests {
         let path = dir.path().join("a.png");
         let target = ImageOutput::from_path(&path).unwrap().create_new();
         let film = film(40, 20, &[1.0]);
-        let write = |noise: &str| {
-            let metadata = &entries(noise);
-            target.write(&picture(&white(1)), &mut WholeFilm { film: &film, metadata })
-        };
+        let write = |noise: &str| target.write(&picture(noise), Depth::Eight, &mut &film);
         write("new").unwrap();
         let error = write("newer").unwrap_err().to_string();
         assert!(error.contains("such a file already"), "{error}");
@@ -178,8 +165,9 @@ mod tests {
             Ok(self.film)
         }
 
-        fn metadata(&self) -> Vec<(String, String)> {
-            entries(if self.rows < self.film.height() { "unknown" } else { "0.5 8-bit levels" })
+        fn final_metadata(&self) -> Option<Vec<(String, String)>> {
+            assert_eq!(self.rows, self.film.height());
+            Some(entries("0.5 8-bit levels"))
         }
     }
 
@@ -188,21 +176,19 @@ mod tests {
         let mut film = film(40, 20, &[1.0]);
         fill(&mut film, 2, |x, y, _| vec![x as f64, y as f64, 1.0]);
         let folder = tempfile::tempdir().unwrap();
-        let mix = white(1);
-        let picture = picture(&mix);
         for name in ["a.png", "a.exr"] {
-            let write = |bands: &mut dyn Bands| {
+            let write = |noise: &str, bands: &mut dyn Bands| {
                 let path = folder.path().join(name);
-                ImageOutput::from_path(&path).unwrap().write(&picture, bands).unwrap();
+                let output = ImageOutput::from_path(&path).unwrap();
+                output.write(&picture(noise), Depth::Eight, bands).unwrap();
                 assert_eq!(
                     FileMetadata::read(&path).unwrap().get("Noise"),
                     Some("0.5 8-bit levels")
                 );
                 fs::read(path).unwrap()
             };
-            let late = write(&mut Late { film: &film, rows: 0 });
-            let known =
-                write(&mut WholeFilm { film: &film, metadata: &entries("0.5 8-bit levels") });
+            let late = write("unknown", &mut Late { film: &film, rows: 0 });
+            let known = write("0.5 8-bit levels", &mut &film);
             assert!(late == known, "{name}");
         }
     }
@@ -215,24 +201,19 @@ mod tests {
         fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
             if y < 10 { Ok(&self.0) } else { Err(self.1()) }
         }
-
-        fn metadata(&self) -> Vec<(String, String)> {
-            entries("unknown")
-        }
     }
 
     #[test]
     fn failed_bands_leave_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
-        let mix = white(1);
-        let picture = ImageData { depth: Depth::Sixteen, ..picture(&mix) };
         for name in ["a.png", "a.exr"] {
             let path = folder.path().join(name);
             fs::write(&path, "old").unwrap();
             let output = ImageOutput::from_path(&path).unwrap();
             let mut stopped =
                 Failing(film(40, 20, &[1.0]), || io::Error::other("stopped by a signal"));
-            let error = output.write(&picture, &mut stopped).unwrap_err();
+            let error =
+                output.write(&picture("unknown"), Depth::Sixteen, &mut stopped).unwrap_err();
             assert!(error.to_string().contains("stopped by a signal, and the old file"), "{error}");
             assert_eq!(fs::read(&path).unwrap(), b"old");
         }

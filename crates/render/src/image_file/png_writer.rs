@@ -1,9 +1,9 @@
 //! PNG writer: displayed pictures in 8 or 16 bits per channel, sRGB, with text metadata.
 
-use crate::film::Replicates;
-use crate::film::quantised_16;
+use crate::film::file::FilmFileHeader;
+use crate::film::{Film, Replicates, quantised_16};
 use crate::image_file::bands::Bands;
-use crate::image_file::image_data::{Depth, ImageData, WriteSeek, replace_start};
+use crate::image_file::image_data::{Depth, WriteSeek, replace_start};
 use crate::image_file::metadata::padded;
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
@@ -18,57 +18,62 @@ const END_CHUNK_BYTES: usize = 12;
 
 /// Writes a picture row by row.
 pub(super) fn encode(
-    picture: &ImageData,
+    header: &FilmFileHeader,
+    depth: Depth,
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> io::Result<()> {
-    encode_to(picture, bands, sink).map_err(|error| match error {
+    encode_to(header, depth, bands, sink).map_err(|error| match error {
         EncodingError::IoError(error) => error,
         other => io::Error::other(other),
     })
 }
 
 fn encode_to(
-    picture: &ImageData,
+    header: &FilmFileHeader,
+    depth: Depth,
     bands: &mut dyn Bands,
     sink: &mut dyn WriteSeek,
 ) -> Result<(), EncodingError> {
-    let metadata = bands.metadata();
-    let mut writer = start(picture, &metadata, &mut *sink)?;
+    let mut writer = start(header, depth, &header.metadata, &mut *sink)?;
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
     let mut row = Vec::new();
-    for y in 0..picture.size[1] as usize {
-        encode_row(picture, bands, y, &mut row)?;
+    for y in 0..header.film.height {
+        encode_row(header, depth, bands.film_with_row(y)?, y, &mut row);
         stream.write_all(&row)?;
     }
     stream.finish()?;
     writer.finish()?;
-    let last = bands.metadata();
-    if last != metadata {
-        replace_start(sink, &preamble(picture, &metadata)?, &preamble(picture, &last)?)?;
+    if let Some(last) = bands.final_metadata() {
+        let [before, after] = [&header.metadata, &last].map(|m| preamble(header, depth, m));
+        replace_start(sink, &before?, &after?)?;
     }
     Ok(())
 }
 
 /// Returns all bytes before the image data.
-fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
+fn preamble(
+    header: &FilmFileHeader,
+    depth: Depth,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     // The writer adds the last chunk when it is dropped.
-    drop(start(picture, metadata, &mut bytes)?);
+    drop(start(header, depth, metadata, &mut bytes)?);
     bytes.truncate(bytes.len() - END_CHUNK_BYTES);
     Ok(bytes)
 }
 
 /// Writes the part before the image data.
 fn start<W: Write>(
-    picture: &ImageData,
+    header: &FilmFileHeader,
+    depth: Depth,
     metadata: &[(String, String)],
     sink: W,
 ) -> Result<Writer<W>, EncodingError> {
-    let [width, height] = picture.size;
-    let mut encoder = Encoder::new(sink, width, height);
+    let mut encoder = Encoder::new(sink, header.film.width as u32, header.film.height as u32);
     encoder.set_color(ColorType::Rgb);
-    encoder.set_depth(match picture.depth {
+    encoder.set_depth(match depth {
         Depth::Eight => BitDepth::Eight,
         Depth::Sixteen => BitDepth::Sixteen,
     });
@@ -111,26 +116,19 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
 }
 
 /// Replaces `bytes` by those of row `y`. 16-bit levels are big-endian.
-fn encode_row(
-    picture: &ImageData,
-    bands: &mut dyn Bands,
-    y: usize,
-    bytes: &mut Vec<u8>,
-) -> io::Result<()> {
-    let film = bands.film_with_row(y)?;
+fn encode_row(header: &FilmFileHeader, depth: Depth, film: &Film, y: usize, bytes: &mut Vec<u8>) {
     let mut row = Vec::new();
-    film.row(y - film.first_row(), Replicates::Both, picture.mix, &mut row);
+    film.row(y - film.first_row(), Replicates::Both, &header.weights, &mut row);
     bytes.clear();
-    match picture.depth {
+    match depth {
         Depth::Eight => {
-            let to_8 = picture.display.to_8();
+            let to_8 = header.display.to_8();
             row.iter().for_each(|rgb| bytes.extend(to_8(*rgb)));
         }
         Depth::Sixteen => bytes.extend(
             row.iter()
-                .flat_map(|rgb| picture.display.levels(*rgb))
+                .flat_map(|rgb| header.display.levels(*rgb))
                 .flat_map(|value| quantised_16(value).to_be_bytes()),
         ),
     }
-    Ok(())
 }

@@ -51,7 +51,7 @@ impl Exporter {
         let header = picture.header(|scene| self.provenance(scene));
         let write = |path: &Path| {
             let output = ImageOutput::from_path(path)?.create_new();
-            output.write_film(&header, picture.film, Depth::Eight)
+            output.write(&header, Depth::Eight, &mut &*picture.film)
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;
