@@ -6,6 +6,7 @@ use crate::command::progress::style;
 use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
 use zerkalo_render::film::file::FilmReader;
@@ -89,7 +90,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
         .ok_or("the pilot has no estimate of its noise")?;
     let part = Part {
-        plan,
+        plan: Arc::new(plan),
         shards: vec![PartShard { number: BASE, complete: true }],
         rays: schedule.rays(),
     };
@@ -102,7 +103,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         schedule.rays(),
         pilot.seconds
     ))?;
-    Ok(part.plan)
+    Ok(Arc::unwrap_or_clone(part.plan))
 }
 
 /// Traces the pilot until it ends, and shows its noise.

@@ -8,6 +8,7 @@ use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
 use crate::command::{Failure, handle_signals, print_line, read_scene, warn};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_render::export::scene_hash;
@@ -50,7 +51,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         )));
     }
     let complete = numbers.iter().map(|number| PartShard { number: *number, complete: true });
-    let mut part = Part { plan, shards: complete.collect(), rays: 0 };
+    let mut part = Part { plan: Arc::new(plan), shards: complete.collect(), rays: 0 };
     let saved = match args.shard {
         Some(_) => saved(&args.output, &part)?,
         None => None,
@@ -129,7 +130,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     let Ok(reader) = FilmReader::open(path).inspect_err(report) else { return Ok(None) };
     let found = Part::of_header(path, reader.header())?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
-    if found.plan.checksum() != part.plan.checksum() {
+    if found.plan != part.plan {
         return Err(failed("belongs to another plan"));
     }
     let [shard] = found.shards[..] else { return Err(failed("holds several shards")) };

@@ -16,6 +16,10 @@ fn film(desk: &Desk, name: &str) -> Film {
     FilmReader::open(&desk.path(name)).and_then(FilmReader::read).unwrap().1
 }
 
+fn sum(films: &WatchedFilms) -> &Film {
+    &films.sum.as_ref().unwrap().1
+}
+
 fn rows(films: &WatchedFilms) -> Vec<WatchedShards> {
     films.shards(SystemTime::now())
 }
@@ -50,7 +54,7 @@ fn parts_are_added_as_they_appear() {
         ("0", WatchedState::Complete),
     ];
     assert_eq!(states(&films), expected.map(|(shards, state)| (shards.to_string(), state)));
-    assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());
+    assert!(sum(&films).bytes() == film(&desk, "job-0.zk").bytes());
     assert_eq!(films.complete_shards(), Some([1, 4]));
     assert!(!films.poll(), "nothing has changed");
     for shard in [2, 3, 1] {
@@ -62,19 +66,19 @@ fn parts_are_added_as_they_appear() {
     }
     let parts = ["job-0.zk", "job-1.zk", "job-2.zk", "job-3.zk"].map(str::to_string);
     merge(&desk, &parts, "merged.zk");
-    assert!(films.film().unwrap().bytes() == film(&desk, "merged.zk").bytes());
+    assert!(sum(&films).bytes() == film(&desk, "merged.zk").bytes());
     let merged = FilmReader::open(&desk.path("merged.zk")).unwrap();
     let entry = |header: &zerkalo_render::film::file::FilmFileHeader| {
         header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
     };
-    assert_eq!(entry(films.header().unwrap()), entry(merged.header()));
+    assert_eq!(entry(&films.sum.as_ref().unwrap().0), entry(merged.header()));
     assert!(entry(merged.header()).unwrap().1.starts_with("0-3 of 3, plan "));
     // The samples of a file that is removed no longer count. The names on the command line may have
     // any order.
     fs::remove_file(desk.path("job-2.zk")).unwrap();
     assert!(films.poll());
     let three = open(&desk, &["job-3.zk", "job-0.zk", "job-1.zk"]).unwrap();
-    assert!(films.film().unwrap().bytes() == three.film().unwrap().bytes());
+    assert!(sum(&films).bytes() == sum(&three).bytes());
     assert_eq!(states(&three)[0], ("2".to_string(), WatchedState::Missing));
     assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
 }
@@ -112,7 +116,7 @@ fn unfinished_shards_are_running_and_then_late() {
     // negative.
     let early = films.shards(SystemTime::UNIX_EPOCH);
     assert!(early.iter().all(|row| row.age.is_none_or(|age| age.is_zero())));
-    assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());
+    assert!(sum(&films).bytes() == film(&desk, "job-0.zk").bytes());
     // A film file of a shard is not used if it is marked complete but has no samples.
     header.chunks.insert(*b"PART", text.into_bytes());
     pieces[0] = header.encode();
@@ -152,11 +156,11 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
 
     // A single checkpoint can be watched. The displayed film has its samples.
     let single = open(&desk, &["a.zk"]).unwrap();
-    assert!(single.film().unwrap().bytes() == film(&desk, "a.zk").bytes());
+    assert!(sum(&single).bytes() == film(&desk, "a.zk").bytes());
     assert_eq!((single.complete_shards(), states(&single).len()), (None, 1));
     // A file that does not belong to the plan is left out if it replaces a watched file.
     let mut films = open(&desk, &["job.plan"]).unwrap();
-    let whole = films.film().unwrap().bytes();
+    let whole = sum(&films).bytes();
     let own = fs::read(desk.path("job-1.zk")).unwrap();
     for (foreign, expected) in [
         ("other-0.zk", "belong to different plans"),
@@ -167,11 +171,11 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
         replace(&desk, "job-1.zk", &fs::read(desk.path(foreign)).unwrap());
         assert!(films.poll());
         assert!(refusal(&films).contains(expected), "{foreign}: {}", refusal(&films));
-        assert!(films.film().unwrap().bytes() != whole);
+        assert!(sum(&films).bytes() != whole);
     }
     replace(&desk, "job-1.zk", &own);
     assert!(films.poll());
-    assert!(films.film().unwrap().bytes() == whole && refusal(&films).is_empty());
+    assert!(sum(&films).bytes() == whole && refusal(&films).is_empty());
     assert_eq!(parts.len(), 3);
 }
 
@@ -189,7 +193,7 @@ fn next_round_is_watched_with_the_merged_film_of_the_first() {
     assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
     // Without the base the picture has the samples of the shard only.
     let alone = open(&desk, &["next.plan"]).unwrap();
-    assert!(alone.film().unwrap().bytes() == film(&desk, "next-1.zk").bytes());
+    assert!(sum(&alone).bytes() == film(&desk, "next-1.zk").bytes());
 }
 
 #[test]
@@ -197,11 +201,11 @@ fn damaged_files_are_left_out() {
     let desk = Desk::new();
     traced(&desk, "job", 2);
     let mut films = open(&desk, &["job.plan"]).unwrap();
-    let whole = films.film().unwrap().bytes();
+    let whole = sum(&films).bytes();
     let part = fs::read(desk.path("job-2.zk")).unwrap();
     fs::remove_file(desk.path("job-2.zk")).unwrap();
     assert!(films.poll());
-    let without = films.film().unwrap().bytes();
+    let without = sum(&films).bytes();
     let mut random = 7u64;
     let mut next = |below: usize| {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -216,18 +220,18 @@ fn damaged_files_are_left_out() {
         }
         replace(&desk, "job-2.zk", &bytes);
         assert!(films.poll());
-        assert!(films.film().unwrap().bytes() == without, "round {round}");
+        assert!(sum(&films).bytes() == without, "round {round}");
         assert!(refusal(&films).contains("job-2.zk"), "round {round}: {}", refusal(&films));
         if round % 20 == 0 {
             replace(&desk, "job-2.zk", &part);
-            assert!(films.poll() && films.film().unwrap().bytes() == whole, "round {round}");
+            assert!(films.poll() && sum(&films).bytes() == whole, "round {round}");
         }
     }
     // A folder in the place of the file.
     fs::remove_file(desk.path("job-2.zk")).unwrap();
     fs::create_dir(desk.path("job-2.zk")).unwrap();
     assert!(films.poll() && !refusal(&films).is_empty());
-    assert!(films.film().unwrap().bytes() == without);
+    assert!(sum(&films).bytes() == without);
 }
 
 #[test]

@@ -99,7 +99,7 @@ fn e1_shards() {
 fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     let mut header = header(film);
     let shards = vec![PartShard { number, complete }];
-    Part { plan: plan.clone(), shards, rays: 0 }.record(&mut header);
+    Part { plan: Arc::new(plan.clone()), shards, rays: 0 }.record(&mut header);
     let mut pieces = vec![header.encode()];
     pieces.extend((0..tile_chunks(film)).map(|i| encode_tiles(film, i)));
     pieces.push(encode_end(film, &pieces));
@@ -120,7 +120,7 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     fs::write(folder.join("job.plan"), plan.text()).map_err(|e| e.to_string())?;
     (0..4).for_each(|number| drop(fs::remove_file(path(number))));
     let mut films = WatchedFilms::open(&[folder.join("job.plan")])?;
-    ensure(films.film().is_none(), || "a film without files".to_string())?;
+    ensure(films.sum.is_none(), || "a film without files".to_string())?;
     let mut sum = Film::new(one.header().clone());
     for (number, film) in (0..).zip(&parts) {
         let whole = part_file(&plan, number, true, film);
@@ -132,17 +132,17 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
         let empty = Film::new(film.header().clone());
         write(number, &part_file(&plan, number, false, &empty))?;
         films.poll();
-        ensure(films.film().is_some_and(|film| film.bytes() == sum.bytes()), || {
+        ensure(films.sum.as_ref().is_some_and(|(_, film)| film.bytes() == sum.bytes()), || {
             format!("samples of shard {number} before they are traced")
         })?;
         write(number, &whole)?;
         films.poll();
         sum.add(film).map_err(|e| e.to_string())?;
-        ensure(films.film().is_some_and(|film| film.bytes() == sum.bytes()), || {
+        ensure(films.sum.as_ref().is_some_and(|(_, film)| film.bytes() == sum.bytes()), || {
             format!("the sum lacks samples of shard {number}")
         })?;
     }
-    let film = films.film().ok_or("no film")?;
+    let (_, film) = films.sum.as_ref().ok_or("no film")?;
     ensure(film.bytes() == one.bytes(), || "another film".to_string())
 }
 
@@ -164,5 +164,8 @@ fn e2_watching() {
     // The samples of a film file that is removed no longer count.
     let mut films = WatchedFilms::open(&[folder.path().join("job.plan")]).unwrap();
     fs::remove_file(folder.path().join("job-2.zk")).unwrap();
-    assert!(films.poll() && films.film().unwrap().bytes() != one.bytes(), "a shard left out");
+    assert!(
+        films.poll() && films.sum.as_ref().unwrap().1.bytes() != one.bytes(),
+        "a shard left out"
+    );
 }

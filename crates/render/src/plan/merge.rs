@@ -1,11 +1,12 @@
-//! Merging: adds the films of the parts of a plan.
+//! Merging: adds the films of the parts of a plan. No shard may be in two of the files.
 
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
-use crate::plan::merge_inputs::shard_name;
-use crate::plan::part::{Part, ranges};
-use crate::plan::{BASE, WatchedFilms};
+use crate::plan::part::{Part, PartShard, ranges};
+use crate::plan::{BASE, Plan, WatchedFilms};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Sum of the films of the parts of a plan.
 pub struct Merged {
@@ -20,13 +21,13 @@ impl Merged {
     /// no shards of a plan, if the files belong to different plans, if two files hold the same
     /// shard, or, without `partial`, if shards are missing or unfinished.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
-        let mut films = WatchedFilms::parts(paths)?;
+        let mut films = WatchedFilms::of_parts(paths)?;
         let part = films.part().ok_or("no parts are named")?;
         if !partial {
             check_complete(&films, &part)?;
         }
         films.try_add().map_err(|(_, reason)| reason)?;
-        let (header, film) = films.into_sum().ok_or("there is nothing to merge")?;
+        let (header, film) = films.sum.ok_or("there is nothing to merge")?;
         if part.shards.iter().all(|shard| shard.complete) {
             let numbers: Vec<u32> = part.shards.iter().map(|shard| shard.number).collect();
             if let Some(tile) = part.plan.differing_tile(&film, &numbers) {
@@ -50,9 +51,9 @@ pub(super) fn without_plan(path: &Path) -> String {
 
 fn check_complete(films: &WatchedFilms, part: &Part) -> Result<(), String> {
     let mut faults = Vec::new();
-    for input in films.inputs() {
-        for shard in input.shards.iter().filter(|shard| !shard.complete) {
-            let (path, name) = (input.path.display(), shard_name(shard.number));
+    for (path, part) in films.parts() {
+        for shard in part.shards.iter().filter(|shard| !shard.complete) {
+            let (path, name) = (path.display(), shard_name(shard.number));
             faults.push(format!("{path} is an unfinished checkpoint of {name}"));
         }
     }
@@ -73,4 +74,70 @@ fn check_complete(films: &WatchedFilms, part: &Part) -> Result<(), String> {
         faults.join("; "),
         settings.source,
     ))
+}
+
+/// Checks that the films with `parts`, each with the path of its file, can be added, and returns
+/// their common plan. One part may be of the merged film that this plan started from. It becomes a
+/// part of this plan that holds only the shard [`BASE`].
+///
+/// # Errors
+/// Fails if there is no part, if the parts belong to different plans, if two of them hold the same
+/// shard, or if the merged film lacks shards of its own plan.
+pub(super) fn join(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String> {
+    let plan = common_plan(parts)?;
+    let mut holders: HashMap<u32, &Path> = HashMap::new();
+    for (path, part) in parts.iter() {
+        for shard in &part.shards {
+            if let Some(other) = holders.insert(shard.number, path) {
+                return Err(format!(
+                    "{} and {} both hold {}; name one of them",
+                    other.display(),
+                    path.display(),
+                    shard_name(shard.number)
+                ));
+            }
+        }
+    }
+    Ok(plan)
+}
+
+fn common_plan(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String> {
+    let latest = parts.iter().map(|(_, part)| &part.plan).find(|latest| {
+        let is_base = |plan: &Plan| latest.settings.base_plan == Some(plan.checksum());
+        parts.iter().all(|(_, part)| part.plan == **latest || is_base(&part.plan))
+    });
+    let Some(plan) = latest.cloned() else {
+        let Some((a, first)) = parts.first() else { return Err("no parts are named".to_string()) };
+        let other = parts.iter().find(|(_, part)| part.plan != first.plan);
+        let (b, other) = other.unwrap_or(&parts[0]);
+        return Err(format!(
+            "{} and {} belong to different plans ({}); name parts of one plan",
+            a.display(),
+            b.display(),
+            first.plan.difference(&other.plan)
+        ));
+    };
+    for (path, part) in parts.iter_mut() {
+        if part.plan != plan {
+            if !part.is_whole() {
+                return Err(format!(
+                    "cannot use {}: it is the base of a plan and lacks shards; merge it \
+                     completely first",
+                    path.display()
+                ));
+            }
+            part.shards = vec![PartShard { number: BASE, complete: true }];
+        }
+        // All parts share one copy of the plan.
+        part.plan = Arc::clone(&plan);
+    }
+    Ok(plan)
+}
+
+/// Returns the name of the shard `number` in messages, such as `shard 3`.
+fn shard_name(number: u32) -> String {
+    match number {
+        BASE => "the base (shard 0)".to_string(),
+        number => format!("shard {number}"),
+    }
 }

@@ -12,7 +12,6 @@
 mod division;
 mod file;
 mod merge;
-mod merge_inputs;
 mod part;
 mod shard_render;
 #[cfg(test)]

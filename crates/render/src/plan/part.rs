@@ -4,6 +4,7 @@ use crate::film::file::FilmFileHeader;
 use crate::plan::{BASE, Plan};
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Tag of the chunk with the text of the plan.
 const PLAN_TAG: [u8; 4] = *b"PLAN";
@@ -14,7 +15,7 @@ const PART_TAG: [u8; 4] = *b"PART";
 /// Plan that a film file contains, and the shards that its film holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    pub plan: Plan,
+    pub plan: Arc<Plan>,
     /// Shards in ascending order.
     pub shards: Vec<PartShard>,
     /// Number of rays of all samples in the film.
@@ -83,11 +84,13 @@ impl Part {
             }
             shards.push(shard);
         }
-        (!shards.is_empty()).then_some(Self { plan, shards, rays })
+        (!shards.is_empty()).then_some(Self { plan: Arc::new(plan), shards, rays })
     }
 
+    /// Returns `true` if the film holds all samples of its plan.
     pub fn is_whole(&self) -> bool {
-        self.plan.is_whole(&self.shards)
+        let numbers = self.shards.iter().map(|shard| shard.number);
+        numbers.eq(BASE..=self.plan.settings.shards) && self.shards.iter().all(|s| s.complete)
     }
 
     /// Returns the numbers of the shards that are missing or incomplete, such as `3, 5-7`. `None`
@@ -122,13 +125,6 @@ impl Plan {
     pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
         let all = BASE..=self.settings.shards;
         all.filter(|number| numbers.binary_search(number).is_err()).collect()
-    }
-
-    /// Returns `true` if `shards` are all samples of this plan.
-    pub(super) fn is_whole(&self, shards: &[PartShard]) -> bool {
-        let numbers = BASE..=self.settings.shards;
-        shards.iter().map(|shard| shard.number).eq(numbers)
-            && shards.iter().all(|shard| shard.complete)
     }
 }
 

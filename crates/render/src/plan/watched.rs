@@ -5,8 +5,7 @@ use crate::checkpoint::seconds_of;
 use crate::film::Film;
 use crate::film::file::{FilmFileHeader, FilmReader};
 use crate::memory_budget;
-use crate::plan::merge::without_plan;
-use crate::plan::merge_inputs::{MergeInput, Plans, join};
+use crate::plan::merge::{join, without_plan};
 use crate::plan::part::{Part, PartShard, ranges};
 use crate::plan::{BASE, Plan, is_plan_file};
 use std::fs::File;
@@ -25,14 +24,14 @@ const LATE: Duration = Duration::from_secs(180);
 #[derive(Debug, Default)]
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
-    plans: Plans,
     /// Plan file that the user named; it is joined like a film that holds no shard.
-    named: Option<MergeInput>,
+    named: Option<(PathBuf, Part)>,
     /// Plan that all files share. `None` before the first file, and for a checkpoint without a
     /// plan.
-    plan: Option<Arc<Plan>>,
-    /// Header and film of the sum. `None` if no file can be read.
-    sum: Option<(FilmFileHeader, Film)>,
+    pub plan: Option<Arc<Plan>>,
+    /// Sum of the films, with a header that has the plan and all shards. `None` if no file can be
+    /// read.
+    pub sum: Option<(FilmFileHeader, Film)>,
 }
 
 /// Film file that another process may replace at any time.
@@ -55,7 +54,7 @@ struct WatchedFile {
 enum Contents {
     Missing,
     Refused(String),
-    Part(MergeInput),
+    Part(Part),
     /// Checkpoint without a plan, with its seconds of rendering.
     Checkpoint(f64),
 }
@@ -111,16 +110,15 @@ impl WatchedFilms {
 
     /// Reads the headers of the parts at `paths`. Fails if one cannot be used, or if two films
     /// cannot be added.
-    pub(super) fn parts(paths: &[PathBuf]) -> Result<Self, String> {
-        let files = paths.iter().map(|path| WatchedFile::new(path.clone(), None)).collect();
-        let mut films = Self { files, ..Self::default() };
-        films.read_changed();
-        films.files.iter().try_for_each(|file| match &file.contents {
-            Contents::Part(_) => Ok(()),
-            Contents::Refused(reason) => Err(reason.clone()),
-            Contents::Missing => Contents::read(&file.path, &mut Plans::default()).map(drop),
-            Contents::Checkpoint(_) => Err(without_plan(&file.path)),
-        })?;
+    pub(super) fn of_parts(paths: &[PathBuf]) -> Result<Self, String> {
+        let mut films = Self::default();
+        for path in paths {
+            let contents = Contents::read(path)?;
+            if let Contents::Checkpoint(_) = contents {
+                return Err(without_plan(path));
+            }
+            films.files.push(WatchedFile { contents, ..WatchedFile::new(path.clone(), None) });
+        }
         films.try_join().map(|()| films)
     }
 
@@ -133,11 +131,11 @@ impl WatchedFilms {
         self.files.extend((first..=plan.settings.shards).map(|shard| {
             WatchedFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
         }));
-        let input = self.plans.input(path, Part { plan, shards: Vec::new(), rays: 0 });
-        match self.named.replace(input) {
+        let part = Part { plan: Arc::new(plan), shards: Vec::new(), rays: 0 };
+        match self.named.replace((path.to_path_buf(), part)) {
             None => Ok(()),
-            Some(other) => {
-                let [one, two] = [other.path.display(), path.display()];
+            Some((other, _)) => {
+                let [one, two] = [other.display(), path.display()];
                 Err(format!("{one} and {two} are two plans; name one of them"))
             }
         }
@@ -153,25 +151,8 @@ impl WatchedFilms {
         !changed.is_empty()
     }
 
-    pub fn film(&self) -> Option<&Film> {
-        self.sum.as_ref().map(|(_, film)| film)
-    }
-
-    /// Returns the header of the sum, with the plan and all shards.
-    pub fn header(&self) -> Option<&FilmFileHeader> {
-        self.sum.as_ref().map(|(header, _)| header)
-    }
-
-    pub(super) fn into_sum(self) -> Option<(FilmFileHeader, Film)> {
-        self.sum
-    }
-
-    pub fn plan(&self) -> Option<&Plan> {
-        self.plan.as_deref()
-    }
-
     pub fn rays(&self) -> u64 {
-        self.inputs().map(|input| input.rays).sum()
+        self.parts().map(|(_, part)| part.rays).sum()
     }
 
     /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
@@ -188,7 +169,7 @@ impl WatchedFilms {
 
     /// Returns the share of the plan's samples that the films hold, 0..=1.
     pub fn progress(&self) -> Option<f64> {
-        let (film, plan) = (self.film()?, self.plan()?);
+        let ((_, film), plan) = (self.sum.as_ref()?, self.plan.as_ref()?);
         let pixels = (film.width() * film.height()) as f64;
         Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
     }
@@ -222,29 +203,29 @@ impl WatchedFilms {
                 });
             }
         }
-        let share = |row: &WatchedShards| match (&row.state, row.total) {
-            (WatchedState::Late | WatchedState::Running, Some(total)) if total > 0 => {
-                row.samples as f64 / total as f64
-            }
-            _ => 0.0,
+        let share = |row: &WatchedShards| match row.total {
+            Some(total) if total > 0 => row.samples as f64 / total as f64,
+            Some(_) | None => 0.0,
         };
-        sort_by_number(&mut rows, |row| total_order(share(row)));
-        sort_by_number(&mut rows, |row| match row.state {
-            WatchedState::Refused(_) => 0,
-            WatchedState::Missing => 1,
-            WatchedState::Late => 2,
-            WatchedState::Running => 3,
-            WatchedState::Complete => 4,
+        sort_by_number(&mut rows, |row| {
+            total_order(match row.state {
+                WatchedState::Refused(_) => 0.0,
+                WatchedState::Missing => 1.0,
+                WatchedState::Late => 2.0 + share(row),
+                WatchedState::Running => 4.0 + share(row),
+                WatchedState::Complete => 6.0,
+            })
         });
         rows
     }
 
-    pub(super) fn inputs(&self) -> impl Iterator<Item = &MergeInput> {
-        self.files.iter().filter_map(WatchedFile::input)
+    /// Iterates over the parts, with the paths of their files.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (&Path, &Part)> {
+        self.files.iter().filter_map(|file| Some((&*file.path, file.part()?)))
     }
 
     fn shards_held(&self) -> impl Iterator<Item = &PartShard> {
-        self.inputs().flat_map(|input| &input.shards)
+        self.parts().flat_map(|(_, part)| &part.shards)
     }
 
     /// Reads the headers of the files whose stamps have changed. Returns their indices.
@@ -255,7 +236,7 @@ impl WatchedFilms {
             let stamp = FileStamp::of(&file.path);
             if stamp != file.stamp {
                 let contents = match stamp {
-                    Some(_) => Contents::read(&file.path, &mut self.plans),
+                    Some(_) => Contents::read(&file.path),
                     None => Ok(Contents::Missing),
                 };
                 let contents = contents.unwrap_or_else(Contents::Refused);
@@ -286,16 +267,17 @@ impl WatchedFilms {
 
     fn try_join(&mut self) -> Result<(), String> {
         let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
-        let mut inputs: Vec<&mut MergeInput> = self.named.iter_mut().collect();
+        let named = self.named.iter_mut().map(|(path, part)| (&**path, part));
+        let mut parts: Vec<(&Path, &mut Part)> = named.collect();
         for file in &mut self.files {
             match &mut file.contents {
-                Contents::Part(input) => inputs.push(input),
+                Contents::Part(part) => parts.push((&file.path, part)),
                 Contents::Checkpoint(_) if !is_alone => return Err(without_plan(&file.path)),
                 Contents::Checkpoint(_) | Contents::Missing | Contents::Refused(_) => {}
             }
         }
-        if !inputs.is_empty() {
-            self.plan = Some(join(&mut inputs)?);
+        if !parts.is_empty() {
+            self.plan = Some(join(&mut parts)?);
         }
         Ok(())
     }
@@ -333,9 +315,9 @@ impl WatchedFilms {
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
         let file = &mut self.files[i];
         file.samples = film.samples() - before;
-        if let (Contents::Part(input), None) = (&file.contents, file.total) {
-            let samples = |shard: &PartShard| input.plan.samples(shard.number);
-            file.total = Some(input.shards.iter().map(samples).sum());
+        if let (Contents::Part(part), None) = (&file.contents, file.total) {
+            let samples = |shard: &PartShard| part.plan.samples(shard.number);
+            file.total = Some(part.shards.iter().map(samples).sum());
         }
         let (samples, expected) = (file.samples, file.total.unwrap_or(file.samples));
         if samples > expected || file.is_complete() && samples != expected {
@@ -355,7 +337,7 @@ impl WatchedFilms {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
         let plan = self.plan.as_ref().filter(|_| !shards.is_empty())?;
-        Some(Part { plan: Plan::clone(plan), shards, rays: self.rays() })
+        Some(Part { plan: Arc::clone(plan), shards, rays: self.rays() })
     }
 }
 
@@ -368,12 +350,10 @@ fn empty(header: &FilmFileHeader) -> Result<Film, String> {
 }
 
 impl Contents {
-    fn read(path: &Path, plans: &mut Plans) -> Result<Self, String> {
+    fn read(path: &Path) -> Result<Self, String> {
         let reader = FilmReader::open(path).map_err(|error| error.to_string())?;
-        Ok(match Part::of_header(path, reader.header())? {
-            Some(part) => Self::Part(plans.input(path, part)),
-            None => Self::Checkpoint(seconds_of(reader.header())),
-        })
+        let part = Part::of_header(path, reader.header())?;
+        Ok(part.map_or_else(|| Self::Checkpoint(seconds_of(reader.header())), Self::Part))
     }
 }
 
@@ -383,9 +363,9 @@ impl WatchedFile {
         Self { path, shard, stamp: None, contents, samples: 0, total: None }
     }
 
-    fn input(&self) -> Option<&MergeInput> {
+    fn part(&self) -> Option<&Part> {
         match &self.contents {
-            Contents::Part(input) => Some(input),
+            Contents::Part(part) => Some(part),
             Contents::Missing | Contents::Refused(_) | Contents::Checkpoint(_) => None,
         }
     }
@@ -393,24 +373,22 @@ impl WatchedFile {
     /// Returns the shard by which usable files are ordered.
     fn first_shard(&self) -> Option<u32> {
         match &self.contents {
-            Contents::Part(input) => Some(input.shards[0].number),
+            Contents::Part(part) => Some(part.shards[0].number),
             Contents::Checkpoint(_) => Some(BASE),
             Contents::Missing | Contents::Refused(_) => None,
         }
     }
 
     fn is_complete(&self) -> bool {
-        self.input().is_some_and(|input| input.shards.iter().all(|shard| shard.complete))
+        self.part().is_some_and(|part| part.shards.iter().all(|shard| shard.complete))
     }
 
     fn row(&self, now: SystemTime) -> WatchedShards {
         // The clocks of two machines may differ: a modification in the future has the age 0.
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
         let age = self.stamp.map(age);
-        let shards = match self.input() {
-            Some(input) => {
-                ranges(&input.shards.iter().map(|shard| shard.number).collect::<Vec<_>>())
-            }
+        let shards = match self.part() {
+            Some(part) => ranges(&part.shards.iter().map(|s| s.number).collect::<Vec<_>>()),
             None => self.shard.map_or(String::new(), |shard| shard.to_string()),
         };
         let state = match &self.contents {

@@ -111,13 +111,14 @@ impl Watcher {
     }
 
     fn picture(&self) -> Option<Picture<'_>> {
-        let (film, Shown { header, report, .. }) = self.films.film().zip(self.shown.as_ref())?;
+        let ((_, film), Shown { header, report, .. }) =
+            self.films.sum.as_ref().zip(self.shown.as_ref())?;
         Some(Picture { film, mix: &header.weights, report, source: Source::Files(header) })
     }
 
     /// Estimates the noise of the picture that the sum of all films shows.
     fn estimate(&mut self) {
-        self.shown = self.films.film().zip(self.films.header()).and_then(|(film, header)| {
+        self.shown = self.films.sum.as_ref().and_then(|(header, film)| {
             let mut header = header.clone();
             header.display = self.display.unwrap_or(header.display);
             let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
@@ -138,7 +139,7 @@ impl Watcher {
     }
 
     fn publish(&mut self) {
-        let Some((film, shown)) = self.films.film().zip(self.shown.as_ref()) else { return };
+        let (Some((_, film)), Some(shown)) = (&self.films.sum, &self.shown) else { return };
         let Shown { header, report, tiles } = shown;
         let frame = Frame {
             view: self.context.view,
@@ -169,9 +170,9 @@ impl WatchReport {
             let unit = if seconds < 60 { 1 } else { 60 };
             *age = Duration::from_secs(seconds / unit * unit);
         }
-        let settings = films.plan().map(|plan| &plan.settings);
-        let (size, display, source) = match (films.header(), settings) {
-            (Some(header), _) => {
+        let settings = films.plan.as_ref().map(|plan| &plan.settings);
+        let (size, display, source) = match (&films.sum, settings) {
+            (Some((header, _)), _) => {
                 let size = [header.film.width, header.film.height].map(|n| n as u32);
                 (Some(size), header.display, header.source().unwrap_or_default())
             }
