@@ -284,7 +284,7 @@ pub struct MeasureArgs {
     #[arg(long, value_name = "FILE.csv")]
     pub csv: Option<PathBuf>,
     /// Plot error against time
-    #[arg(long, value_name = "FILE.svg|png")]
+    #[arg(long, value_name = "FILE.svg", value_parser = svg_file)]
     pub plot: Option<PathBuf>,
 }
 
@@ -480,6 +480,12 @@ fn memory(text: &str) -> Result<u64, String> {
     };
     let bytes = MEMORY_UNITS.iter().find_map(of_unit);
     bytes.ok_or_else(|| "expected a size with KB, MB, GB, KiB, MiB or GiB, such as 4GB".to_string())
+}
+
+fn svg_file(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    let is_svg = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
+    if is_svg { Ok(path) } else { Err("expected a name that ends in .svg".to_string()) }
 }
 
 fn bits(text: &str) -> Result<Depth, String> {

@@ -38,26 +38,13 @@ const TARGET: RGBColor = RGBColor(150, 150, 150);
 
 type Drawn = Result<(), Box<dyn Error>>;
 
-/// Returns the width and height of the plot of a measurement, in pixels.
-pub fn size(measurement: &Measurement) -> (u32, u32) {
-    let (cols, rows) = grid(panels(measurement).len());
-    ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32)
-}
-
 /// Draws the plot of error against time as SVG.
 pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Error>> {
+    let (cols, rows) = grid(panels(measurement).len());
+    let size = ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32);
     let mut text = String::new();
-    draw(SVGBackend::with_string(&mut text, size(measurement)), measurement, title)?;
+    draw(SVGBackend::with_string(&mut text, size), measurement, title)?;
     Ok(text)
-}
-
-/// Draws the plot of error against time as an RGB image of 8 bits per channel and of [`size`], row
-/// by row.
-pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn Error>> {
-    let (width, height) = size(measurement);
-    let mut bytes = vec![0; width as usize * height as usize * 3];
-    draw(BitMapBackend::with_buffer(&mut bytes, (width, height)), measurement, title)?;
-    Ok(bytes)
 }
 
 /// Returns the experiments with their variants, each of which has a panel that also shows the
@@ -124,10 +111,7 @@ fn text<'a>(size: u32, color: RGBColor) -> TextStyle<'a> {
     ("sans-serif", size).into_font().color(&color)
 }
 
-fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+fn draw(backend: SVGBackend, measurement: &Measurement, title: &str) -> Drawn {
     // An error means that the font is registered already.
     let _ = register_font("sans-serif", FontStyle::Normal, FONT);
     let root = backend.into_drawing_area();
@@ -147,15 +131,12 @@ where
 }
 
 /// Draws the panel of one experiment: the curves of the default settings and of `variants`.
-fn panel<B: DrawingBackend>(
-    area: &DrawingArea<B, Shift>,
+fn panel(
+    area: &DrawingArea<SVGBackend, Shift>,
     measurement: &Measurement,
     experiment: &Experiment,
     variants: &[&Measured],
-) -> Drawn
-where
-    B::ErrorType: 'static,
-{
+) -> Drawn {
     let all = measurement.measured.first().into_iter().chain(variants.iter().copied());
     let curves: Vec<(&str, Vec<(f64, f64)>)> =
         all.map(|measured| (measured.name.as_str(), points(measured))).collect();

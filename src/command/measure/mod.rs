@@ -19,9 +19,6 @@ use zerkalo_world::{self as world, AnyWorld};
 const SHORT: [&str; 3] = ["adaptivity", "precision", "threads"];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
-    if let Some(path) = &args.plot {
-        drawing(path).map_err(Failure::Usage)?;
-    }
     [&args.json, &args.csv, &args.plot]
         .into_iter()
         .flatten()
@@ -61,7 +58,9 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         disk::write(path, &data::csv(&measurement))?;
     }
     if let Some(path) = &args.plot {
-        plot(path, &report)?;
+        let drawn = measure::plot::svg(&measurement, &report.title());
+        let svg = drawn.map_err(|error| format!("cannot draw: {error}"))?;
+        disk::write(path, svg.as_bytes())?;
     }
     printed?;
     match signals.caught() {
@@ -88,32 +87,6 @@ fn plan(args: &MeasureArgs) -> Plan {
         seed: args.compute.seed,
         display: args.picture.display(),
     }
-}
-
-enum Drawing {
-    Svg,
-    Png,
-}
-
-fn drawing(path: &Path) -> Result<Drawing, String> {
-    match path.extension() {
-        Some(e) if e.eq_ignore_ascii_case("svg") => Ok(Drawing::Svg),
-        Some(e) if e.eq_ignore_ascii_case("png") => Ok(Drawing::Png),
-        _ => Err(format!("--plot {}: expected a name that ends in .svg or .png", path.display())),
-    }
-}
-
-fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
-    let title = report.title();
-    let drawn = match drawing(path).map_err(Failure::Usage)? {
-        Drawing::Svg => measure::plot::svg(report.measurement, &title).map(String::into_bytes),
-        Drawing::Png => measure::plot::pixels(report.measurement, &title).and_then(|pixels| {
-            let (width, height) = measure::plot::size(report.measurement);
-            Ok(image_file::png_of_rgb([width, height], &pixels)?)
-        }),
-    };
-    let bytes = drawn.map_err(|error| format!("cannot draw: {error}"))?;
-    Ok(disk::write(path, &bytes)?)
 }
 
 /// Reads the reference picture, an EXR file of the given size.
