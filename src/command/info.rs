@@ -9,10 +9,17 @@ use zerkalo_render::image_file::FileMetadata;
 use zerkalo_render::plan::{BASE, Part, Plan, is_plan_file};
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let origin = match is_plan_file(&args.file) {
-        true => Origin::of_plan(&Plan::read(&args.file)?),
-        false => Origin::of_picture(&args.file)?,
+    let mut origin = match is_plan_file(&args.file) {
+        true => of_plan(&Plan::read(&args.file)?),
+        false => FileMetadata::read(&args.file)?,
     };
+    if let Some(film) = &origin.film {
+        origin.entries.push(("Light groups".to_string(), film.group_names.join(", ")));
+        if let Some(part) = Part::of_header(&args.file, film)? {
+            origin.entries.push(("Rays".to_string(), part.rays.to_string()));
+            origin.entries.push(("Plan".to_string(), target(&part.plan)));
+        }
+    }
     let [width, height] = origin.size;
     let (path, format) = (args.file.display(), origin.format);
     print_line(&format!("{path}: {format}, {width} x {height} pixels"))?;
@@ -26,63 +33,30 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Metadata on the origin of a picture, film or plan file.
-struct Origin {
-    /// `PNG`, `OpenEXR`, `film` or `plan`.
-    format: &'static str,
-    size: [usize; 2],
-    entries: Vec<(String, String)>,
-    /// Hash of the rendered scene. `None` if another program wrote the file.
-    scene_hash: Option<String>,
-    /// Inputs that determine the samples of a checkpoint.
-    inputs: Option<SampleInputs>,
-}
-
-impl Origin {
-    fn of_picture(path: &Path) -> Result<Self, Failure> {
-        let metadata = FileMetadata::read(path)?;
-        let scene_hash = metadata.get("Scene hash").map(str::to_string);
-        let mut entries = metadata.entries;
-        if let Some(film) = &metadata.film {
-            entries.push(("Light groups".to_string(), film.group_names.join(", ")));
-            if let Some(part) = Part::of_header(path, film)? {
-                entries.push(("Rays".to_string(), part.rays.to_string()));
-                entries.push(("Plan".to_string(), target(&part.plan)));
-            }
-        }
-        let inputs = metadata.film.as_ref().and_then(SampleInputs::of);
-        Ok(Self { format: metadata.format, size: metadata.size, entries, scene_hash, inputs })
-    }
-
-    fn of_plan(plan: &Plan) -> Self {
-        let settings = &plan.settings;
-        let base = match settings.base_plan {
-            Some(merged) => format!("merged film of the plan {merged:016x}"),
-            None => "pilot".to_string(),
-        };
-        let (total, base_rays) = (plan.all_rays(), plan.rays(BASE));
-        let each = (total - base_rays) / f64::from(settings.shards);
-        let rays = format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}");
-        let sampler = settings.sampler.name();
-        let method = settings_text(sampler, &settings.precision, true, &settings.display);
-        let entries = [
-            ("Source", settings.source.clone()),
-            ("Scene hash", settings.scene_hash.clone()),
-            ("Seed", settings.seed.to_string()),
-            ("Settings", method),
-            ("Plan", target(plan)),
-            ("Base", base),
-            ("Expected rays", rays),
-            ("Checksum", format!("{:016x}", plan.checksum())),
-        ];
-        Self {
-            format: "plan",
-            size: settings.size.map(|n| n as usize),
-            entries: entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect(),
-            scene_hash: Some(settings.scene_hash.clone()),
-            inputs: None,
-        }
-    }
+/// Returns what a plan says about its picture.
+fn of_plan(plan: &Plan) -> FileMetadata {
+    let settings = &plan.settings;
+    let base = match settings.base_plan {
+        Some(merged) => format!("merged film of the plan {merged:016x}"),
+        None => "pilot".to_string(),
+    };
+    let (total, base_rays) = (plan.all_rays(), plan.rays(BASE));
+    let each = (total - base_rays) / f64::from(settings.shards);
+    let rays = format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}");
+    let sampler = settings.sampler.name();
+    let method = settings_text(sampler, &settings.precision, true, &settings.display);
+    let entries = [
+        ("Source", settings.source.clone()),
+        ("Scene hash", settings.scene_hash.clone()),
+        ("Seed", settings.seed.to_string()),
+        ("Settings", method),
+        ("Plan", target(plan)),
+        ("Base", base),
+        ("Expected rays", rays),
+        ("Checksum", format!("{:016x}", plan.checksum())),
+    ];
+    let entries = entries.map(|(key, value)| (key.to_string(), value)).to_vec();
+    FileMetadata { format: "plan", size: settings.size.map(|n| n as usize), entries, film: None }
 }
 
 /// Formats shards, samples per pixel, noise target and expected noise of a plan.
@@ -100,15 +74,15 @@ fn target(plan: &Plan) -> String {
 /// Compares `origin` with the scene file at `path`.
 ///
 /// # Errors Fails if the file of `origin` shows another scene, or has no scene hash.
-fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
+fn compare(origin: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
     let document = read_scene(path)?;
     let scene = document.scene();
     let [file, shown] = [&args.file, path].map(|path| path.display());
-    let Some(hash) = &origin.scene_hash else {
+    let Some(hash) = origin.get("Scene hash") else {
         let what = format!("{file} has no scene hash; zerkalo did not write it");
         return Err(Failure::Failed(what));
     };
-    if *hash == scene_hash(document.text(), scene) {
+    if hash == scene_hash(document.text(), scene) {
         return print_line(&format!(
             "scene: {shown} and the files that it names are those of {file}"
         ));
@@ -116,7 +90,7 @@ fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure>
     // `render --size` overrides the size in the scene file.
     let mut sized = scene.clone();
     sized.film.size = origin.size.map(|n| n as u32);
-    match origin.inputs.as_ref().map(|inputs| inputs.fit(&sized)) {
+    match origin.film.as_ref().and_then(SampleInputs::of).map(|inputs| inputs.fit(&sized)) {
         Some(true) => print_line(&format!(
             "scene: the pictures of {shown} and {file} differ in light weights, names or layout of \
              the text only; --resume keeps the samples"

@@ -26,13 +26,13 @@ fn unpadded((key, value): (String, String)) -> (String, String) {
 /// Metadata of a picture file (PNG, OpenEXR) or film file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
-    /// Name of the file's format: `PNG`, `OpenEXR` or `film`.
+    /// Name of the file's format: `PNG`, `OpenEXR`, `film`, or `plan` for a plan.
     pub format: &'static str,
     /// Width and height of the picture in pixels.
     pub size: [usize; 2],
     /// Keys and values in the order of the file; sorted in OpenEXR files.
     pub entries: Vec<(String, String)>,
-    /// Header of a film file; `None` for a picture file.
+    /// Header of a film file; `None` for other files.
     pub film: Option<FilmFileHeader>,
 }
 

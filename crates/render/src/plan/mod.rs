@@ -26,7 +26,7 @@ pub use watched::{WatchedFilms, WatchedShards, WatchedState};
 
 use crate::film::{Display, Estimator, Film, TILE};
 pub use crate::schedule::PlannedTile;
-use crate::schedule::{Prediction, Schedule, Settings, TileSamples};
+use crate::schedule::{Prediction, Schedule, Settings};
 use zerkalo_kernel::sampling::SamplerKind;
 
 /// Largest number of shards of a plan.
@@ -139,18 +139,14 @@ impl Plan {
         estimator: &Estimator,
         settings: Settings,
     ) -> Option<Schedule> {
-        let sample = |(index, planned): (usize, &PlannedTile)| {
-            let tile = film.tile(index)?;
-            Some(TileSamples {
-                pixels: pixels_of(self.settings.size, index) as u32,
-                count: tile.counts()[0],
-                rays_per_sample: f64::from(planned.rays_per_sample),
-                glossy: planned.glossy,
-                error: estimator.tile(tile)?,
-            })
-        };
-        let samples: Option<Vec<_>> = self.tiles.iter().enumerate().map(sample).collect();
-        Some(Schedule::of_samples(&samples?, settings))
+        let all = 0..self.tiles.len();
+        let error = |tile: usize| film.tile(tile).and_then(|tile| estimator.tile(tile));
+        let errors: Vec<_> = all.clone().map(error).collect();
+        if errors.contains(&None) {
+            return None;
+        }
+        let pixels: Vec<u32> = all.map(|tile| film.tile_pixels(tile) as u32).collect();
+        Some(Schedule::of_planned(&self.tiles, &pixels, &errors, settings))
     }
 
     /// Quotes the first line that is not the same in the texts of two plans.

@@ -23,7 +23,7 @@ mod tile;
 use crate::film::{Noise, TileNoise};
 use crate::wave::{Job, Wave, WaveReport};
 use convergence_fit::ConvergenceFit;
-pub use prediction::{PlannedTile, Prediction, TileSamples, USUAL_SLOPE};
+pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 

@@ -37,33 +37,25 @@ pub struct PlannedTile {
     pub glossy: bool,
 }
 
-/// Samples that a film holds in one tile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TileSamples {
-    /// Number of the tile's pixels inside the picture.
-    pub pixels: u32,
-    /// Samples per pixel and replicate.
-    pub count: u32,
-    pub rays_per_sample: f64,
-    pub glossy: bool,
-    pub error: TileNoise,
-}
-
 impl Schedule {
-    /// Creates the schedule of a film that holds `samples` in its tiles, in row order.
-    pub fn of_samples(samples: &[TileSamples], settings: Settings) -> Self {
-        let pixels: Vec<u32> = samples.iter().map(|s| s.pixels).collect();
-        let mut schedule = Self::new(&pixels, settings);
-        for (tile, s) in schedule.tiles.iter_mut().zip(samples) {
-            let traced = 2 * u64::from(s.count) * u64::from(s.pixels);
-            tile.done = s.count;
-            tile.rays = (traced as f64 * s.rays_per_sample) as u64;
-            tile.glossy = s.glossy;
+    /// Creates the schedule of a film that holds the samples of the planned `tiles`, which have
+    /// `pixels` pixels inside the picture and the error `errors`, in row order.
+    pub fn of_planned(
+        tiles: &[PlannedTile],
+        pixels: &[u32],
+        errors: &[Option<TileNoise>],
+        settings: Settings,
+    ) -> Self {
+        let mut schedule = Self::new(pixels, settings);
+        for (tile, planned) in schedule.tiles.iter_mut().zip(tiles) {
+            let traced = 2 * u64::from(planned.end) * u64::from(tile.pixels);
+            tile.done = planned.end;
+            tile.rays = (traced as f64 * f64::from(planned.rays_per_sample)) as u64;
+            tile.glossy = planned.glossy;
             schedule.samples += traced;
             schedule.rays += tile.rays;
         }
-        let estimates: Vec<_> = samples.iter().map(|s| Some(s.error)).collect();
-        schedule.set_estimates(&estimates);
+        schedule.set_estimates(errors);
         schedule
     }
 

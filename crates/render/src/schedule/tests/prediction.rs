@@ -76,19 +76,19 @@ fn schedule_of_samples_predicts_what_the_schedule_does() {
     let mut model = Model::exact(clustered(100, 0.5));
     let (mut schedule, _) = model.finish(until(noise(1.0), true));
     schedule.set_stop(noise(0.5));
-    let samples: Vec<TileSamples> = schedule
-        .tiles
-        .iter()
-        .map(|tile| TileSamples {
-            pixels: tile.pixels,
-            count: tile.done,
-            rays_per_sample: tile.rays_per_sample(),
-            glossy: tile.glossy,
-            error: tile.error.unwrap(),
-        })
-        .collect();
-    let again = Schedule::of_samples(&samples, until(noise(0.5), true));
-    assert_eq!((again.rays(), again.samples()), (schedule.rays(), schedule.samples()));
+    let planned = |tile: &Tile| PlannedTile {
+        base: 0,
+        end: tile.done,
+        rays_per_sample: tile.rays_per_sample() as f32,
+        glossy: tile.glossy,
+    };
+    let tiles: Vec<_> = schedule.tiles.iter().map(planned).collect();
+    let pixels: Vec<_> = schedule.tiles.iter().map(|tile| tile.pixels).collect();
+    let errors: Vec<_> = schedule.tile_estimates().collect();
+    let again = Schedule::of_planned(&tiles, &pixels, &errors, until(noise(0.5), true));
+    assert_eq!(again.samples(), schedule.samples());
+    let ratio = again.rays() as f64 / schedule.rays() as f64;
+    assert!((ratio - 1.0).abs() < 1e-6, "`rays_per_sample` has 24 bits: {ratio}");
     assert_eq!(again.noise(), schedule.noise());
     let slopes = schedule.predict([0.5; 2]).unwrap().slopes;
     let (a, b) = (schedule.predict(slopes).unwrap(), again.predict(slopes).unwrap());
