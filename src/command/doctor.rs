@@ -6,10 +6,8 @@ use crate::dashboard::run::{Colors, TerminalReport, diagnose};
 use crate::dashboard::text::wrapped;
 use std::env;
 use std::io::{self, IsTerminal};
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
-use zerkalo_scene::{kept_in, state_folder};
 use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
 use zerkalo_terminal::image::Protocol;
 use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
@@ -34,7 +32,6 @@ pub fn run(rate_requested: bool) -> Result<(), Failure> {
         None => Ok(diagnose(environment.clone(), rate_requested)
             .map_err(|error| format!("the terminal cannot be used: {error}"))?),
     };
-    let state = state_folder(|name| env::var_os(name));
     let report = DoctorReport {
         environment,
         diagnosis,
@@ -42,8 +39,6 @@ pub fn run(rate_requested: bool) -> Result<(), Failure> {
         locale: ["LC_ALL", "LC_CTYPE", "LANG"]
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),
-        unsaved_files: state.as_deref().map(kept_in).unwrap_or_default(),
-        state,
     };
     print_line(&report.report())
 }
@@ -56,8 +51,6 @@ struct DoctorReport {
     rate_requested: bool,
     /// Environment variable that sets the character encoding, and its value.
     locale: Option<(&'static str, String)>,
-    state: Option<PathBuf>,
-    unsaved_files: Vec<PathBuf>,
 }
 
 impl DoctorReport {
@@ -72,17 +65,12 @@ impl DoctorReport {
             lines.push(row("size", &size(*cells, terminal.cell_px)));
             lines.push(row("whole frames", whole_frames(terminal)));
             lines.push(row("still pictures", &stills(terminal)));
-            lines.push(row("keyboard", "plain key sequences; nothing special is needed"));
             lines.push(row("acknowledgement", acknowledgement(*mode)));
             lines.push(row("round trip", &round_trip(terminal)));
             lines.push(row("rate", &self.rate(*mode, *rate)));
         }
         lines.push(row("connection", &self.connection()));
         lines.push(row("text", &self.text()));
-        lines.push(row("unsaved edits", &self.unsaved()));
-        lines.extend(
-            self.unsaved_files.iter().map(|path| row("", &format!("file: {}", shown(path)))),
-        );
         let hints = self.hints();
         if !hints.is_empty() {
             lines.extend([String::new(), "hints".to_string()]);
@@ -118,20 +106,15 @@ impl DoctorReport {
     }
 
     fn multiplexer(&self) -> String {
-        match self.environment.multiplexer {
-            None => "none".to_string(),
-            Some(multiplexer) => {
-                let name = match multiplexer {
-                    Multiplexer::Tmux => "tmux",
-                    Multiplexer::Screen => "GNU Screen",
-                };
-                let passes = self.capabilities().map(|terminal| terminal.passthrough.is_some());
-                match passes {
-                    None => name.to_string(),
-                    Some(true) => format!("{name}, which passes queries through"),
-                    Some(false) => format!("{name}, which passes no queries through"),
-                }
-            }
+        let name = match self.environment.multiplexer {
+            None => return "none".to_string(),
+            Some(Multiplexer::Tmux) => "tmux",
+            Some(Multiplexer::Screen) => "GNU Screen",
+        };
+        match self.capabilities().map(|terminal| terminal.passthrough) {
+            None => name.to_string(),
+            Some(Some(_)) => format!("{name}, which passes queries through"),
+            Some(None) => format!("{name}, which passes no queries through"),
         }
     }
 
@@ -186,48 +169,42 @@ impl DoctorReport {
         }
     }
 
-    fn unsaved(&self) -> String {
-        let state = match &self.state {
-            Some(state) => format!("without a file, or where that cannot be, in {}", shown(state)),
-            None => "without a file nowhere: neither XDG_STATE_HOME nor HOME is set".to_string(),
-        };
-        format!("beside the scene as .NAME.unsaved; {state}")
-    }
-
-    fn hints(&self) -> Vec<String> {
+    fn hints(&self) -> Vec<&'static str> {
         let Environment { color_term, no_color, ssh, multiplexer, .. } = &self.environment;
-        let capabilities = self.capabilities();
+        let is_remote = ssh.is_some();
         let few_colors = self.level() != Colors::True && !no_color;
         let tmux = *multiplexer == Some(Multiplexer::Tmux);
-        let mut hints = Vec::new();
-        if ssh.is_some() {
-            hints
-                .push("ssh -C: a quarter of the bytes, on a slow connection four times the frames");
-            if multiplexer.is_none() {
-                hints.push("tmux on this machine keeps the session when the connection drops");
-            }
-            if color_term.is_empty() && few_colors {
-                hints.push(
-                    "SendEnv COLORTERM in ~/.ssh/config on your machine, AcceptEnv COLORTERM in \
-                     /etc/ssh/sshd_config here: transmits the number of colours",
-                );
-            }
-        }
-        if tmux && capabilities.is_some_and(|terminal| terminal.passthrough.is_none()) {
-            hints.push(
+        let screen = *multiplexer == Some(Multiplexer::Screen);
+        let is_opaque = self.capabilities().is_some_and(|terminal| terminal.passthrough.is_none());
+        let hints = [
+            (
+                is_remote,
+                "ssh -C: a quarter of the bytes, on a slow connection four times the frames",
+            ),
+            (
+                is_remote && multiplexer.is_none(),
+                "tmux on this machine keeps the session when the connection drops",
+            ),
+            (
+                is_remote && color_term.is_empty() && few_colors,
+                "SendEnv COLORTERM in ~/.ssh/config on your machine, AcceptEnv COLORTERM in \
+                 /etc/ssh/sshd_config here: transmits the number of colours",
+            ),
+            (
+                tmux && is_opaque,
                 "set -g allow-passthrough on in ~/.tmux.conf: replies come from the terminal",
-            );
-        }
-        if tmux && few_colors {
-            hints.push("set -as terminal-features ',*:RGB' in ~/.tmux.conf: 24-bit colour");
-        }
-        if *multiplexer == Some(Multiplexer::Screen) && few_colors {
-            hints.push("truecolor on in ~/.screenrc (GNU Screen 5): 24-bit colour");
-        }
-        if !self.is_utf8() {
-            hints.push("a UTF-8 locale, such as LANG=C.UTF-8: the picture is made of half blocks");
-        }
-        hints.into_iter().map(String::from).collect()
+            ),
+            (
+                tmux && few_colors,
+                "set -as terminal-features ',*:RGB' in ~/.tmux.conf: 24-bit colour",
+            ),
+            (screen && few_colors, "truecolor on in ~/.screenrc (GNU Screen 5): 24-bit colour"),
+            (
+                !self.is_utf8(),
+                "a UTF-8 locale, such as LANG=C.UTF-8: the picture is made of half blocks",
+            ),
+        ];
+        hints.into_iter().filter(|(applies, _)| *applies).map(|(_, hint)| hint).collect()
     }
 }
 
@@ -294,10 +271,6 @@ fn round_trip(terminal: &Capabilities) -> String {
     }
 }
 
-fn shown(path: &Path) -> String {
-    sanitized(&path.display().to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -315,8 +288,6 @@ mod tests {
             diagnosis: if queried { Ok(diagnosis) } else { Err("stdin or stdout is no terminal") },
             rate_requested: false,
             locale: Some(("LANG", "en_US.UTF-8".into())),
-            state: Some("/home/ada/.local/state/zerkalo".into()),
-            unsaved_files: Vec::new(),
         }
     }
 
@@ -356,7 +327,6 @@ mod tests {
             "UTF-8: LANG=",
             "1.2 ms",
             "2500 KB/s, measured",
-            "/home/ada/.local/state/zerkalo",
         ];
         check(&report, &present, &["hints", "ssh -C", "unknown"]);
     }
@@ -406,12 +376,10 @@ mod tests {
             [("TERM", evil), ("COLORTERM", evil), ("SSH_CONNECTION", evil), ("STY", evil)];
         let mut report = report(&variables, true);
         report.locale = Some(("LANG", evil.into()));
-        report.state = Some(evil.into());
-        report.unsaved_files = vec![evil.into()];
         diagnosis(&mut report).terminal.version = Some(evil.into());
         let text = report.report();
         let has_control_characters = |line: &str| sanitized(line) != line;
         assert!(!text.lines().any(has_control_characters), "{text:?}");
-        assert!(text.matches("u{1b}]52").count() >= 5, "{text}");
+        assert!(text.matches("u{1b}]52").count() >= 4, "{text}");
     }
 }

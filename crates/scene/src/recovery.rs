@@ -318,15 +318,6 @@ fn read(kept: Saved) -> io::Result<Orphan> {
     Ok(Orphan { kept, text, base, written })
 }
 
-/// Returns the paths of the recovery files in `folder`.
-pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");
-    let mut kept: Vec<_> = entries.filter(is_kept).map(|entry| entry.path()).collect();
-    kept.sort_unstable();
-    kept
-}
-
 /// Removes the incomplete temporary files of killed processes in `folder`.
 pub fn remove_stale(folder: &Path) {
     let [prefix, suffix] = TEMPORARY;
