@@ -337,20 +337,14 @@ const SAMPLERS: [Choice<SamplerKind>; 2] = [
     ("random", Some("Independent random numbers"), SamplerKind::Random),
 ];
 
-/// Largest number of threads per processor. More wait for each other: with 4,096 threads on two
-/// processors, a render of 64 x 48 pixels takes half a minute.
-const THREADS_PER_PROCESSOR: usize = 4;
-
-/// Number of threads that every machine accepts.
-const THREADS_ANYWHERE: usize = 16;
-
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Returns the number to which `--threads` is limited.
+/// Returns the number to which `--threads` is limited. More threads wait for each other: with 4,096
+/// threads on two processors, a render of 64 x 48 pixels takes half a minute.
 fn max_threads() -> usize {
-    THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
+    usize::max(16, 4 * processors())
 }
 
 impl TerminalArgs {
@@ -364,34 +358,6 @@ impl ComputeArgs {
     /// Returns the number of threads that trace rays.
     pub fn threads(&self) -> usize {
         self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
-    }
-
-    /// Returns a warning if `--threads` requests more threads than are used.
-    fn warning(&self) -> Option<String> {
-        let given = self.threads.map(usize::from).filter(|given| *given > self.threads())?;
-        let number = match processors() {
-            1 => "1 processor".to_string(),
-            n => format!("{n} processors"),
-        };
-        let threads = self.threads();
-        Some(format!(
-            "warning: --threads {given}: {threads} threads are used, since this machine has {number}; \
-             more would only wait"
-        ))
-    }
-}
-
-impl Cli {
-    /// Returns a warning about `--threads`, of a subcommand or the dashboard.
-    pub fn warning(&self) -> Option<String> {
-        let compute = match &self.command {
-            Some(Command::Render(args)) => &args.compute,
-            Some(Command::Plan(args)) => &args.compute,
-            Some(Command::Measure(args)) => &args.compute,
-            Some(_) => return None,
-            None => &self.edit.compute,
-        };
-        compute.warning()
     }
 }
 
@@ -444,19 +410,21 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
 }
 
+fn number(text: &str, is_valid: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| is_valid(*x));
+    number.ok_or_else(|| format!("expected {expected}"))
+}
+
 fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "expected a number greater than 0".to_string())
+    number(text, |x| x.is_finite() && x > 0.0, "a number greater than 0")
 }
 
 fn bandwidth(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| (1.0..=1e6).contains(x));
-    number.ok_or_else(|| "expected a number from 1 to 1000000".to_string())
+    number(text, |x| (1.0..=1e6).contains(&x), "a number from 1 to 1000000")
 }
 
 fn exposure(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|x: &f64| x.abs() <= 64.0);
-    number.ok_or_else(|| "expected a number from -64 to 64".to_string())
+    number(text, |x| x.abs() <= 64.0, "a number from -64 to 64")
 }
 
 /// Units of memory sizes in bytes.
@@ -570,13 +538,8 @@ mod tests {
     #[test]
     fn threads_are_limited_to_a_multiple_of_the_processors() {
         let compute = |n: &str| render(&["--threads", n]).unwrap().compute;
-        assert_eq!((compute("16").threads(), compute("16").warning()), (16, None));
+        assert_eq!(compute("16").threads(), 16);
         assert_eq!(compute("4096").threads(), max_threads().min(4096));
-        if max_threads() < 4096 {
-            let warning = compute("4096").warning().unwrap();
-            let expected = format!("--threads 4096: {} threads are used", max_threads());
-            assert!(warning.contains(&expected), "{warning}");
-        }
     }
 
     #[test]

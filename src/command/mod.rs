@@ -62,9 +62,6 @@ impl<E: Display> From<E> for Failure {
 pub fn main() -> ExitCode {
     let started = Instant::now();
     let cli = parse_command_line();
-    if let Some(warning) = cli.warning() {
-        warn(&warning);
-    }
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),
