@@ -1,8 +1,8 @@
 //! Progress of a render on stderr: a bar in a terminal, otherwise lines for a log.
 
+use crate::dashboard::text::durations;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
-use std::time::Duration;
 use zerkalo_render::session::Report;
 
 /// Seconds of rendering before the first output.
@@ -74,7 +74,7 @@ pub fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).expect("the template is well-formed")
 }
 
-/// Formats the progress, such as `33 spp (32-210) 41.2 Msamples/s noise 0.81 3-5 s left`.
+/// Formats the progress, such as `33 spp (32-210) 41.2 Msamples/s noise 0.81 3–5 s left`.
 fn status(report: &Report) -> String {
     let mut text = counts(report);
     text += &format!("  {:.1} Msamples/s", report.samples_per_second() * 1e-6);
@@ -82,7 +82,7 @@ fn status(report: &Report) -> String {
         text += &format!("  noise {:.2}", noise.rmse_levels);
     }
     if let Some((low, high)) = report.eta_seconds {
-        text += &format!("  {} left", span(low, high));
+        text += &format!("  {} left", durations(low, high));
     }
     text
 }
@@ -102,51 +102,5 @@ pub fn noise(report: &Report) -> String {
     match report.noise {
         Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_levels),
         None => "noise unknown".to_string(),
-    }
-}
-
-/// Formats a range of seconds, such as `3-5 s`.
-fn span(low: f64, high: f64) -> String {
-    let [low_text, high_text] = [low, high].map(duration);
-    if low_text == high_text {
-        return low_text;
-    }
-    match (low_text.split_once(' '), high_text.split_once(' ')) {
-        (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
-        _ => format!("{low_text} - {high_text}"),
-    }
-}
-
-/// Formats seconds, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
-fn duration(seconds: f64) -> String {
-    const MINUTE: f64 = 60.0;
-    const HOUR: f64 = 60.0 * MINUTE;
-    const DAY: f64 = 24.0 * HOUR;
-    match seconds {
-        s if s < 9.95 => format!("{s:.1} s"),
-        s if s < 2.0 * MINUTE => format!("{s:.0} s"),
-        s if s < 2.0 * HOUR => format!("{:.0} min", s / MINUTE),
-        s if s < 2.0 * DAY => format!("{:.1} h", s / HOUR),
-        s => format!("{:.1} d", Duration::from_secs_f64(s.min(1e15)).as_secs_f64() / DAY),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn time_ranges_share_their_unit() {
-        for (low, high, text) in [
-            (0.4, 0.4, "0.4 s"),
-            (3.0, 5.0, "3.0-5.0 s"),
-            (9.0, 15.0, "9.0-15 s"),
-            (90.0, 150.0, "90 s - 2 min"),
-            (300.0, 420.0, "5-7 min"),
-            (7200.0, 10_800.0, "2.0-3.0 h"),
-            (864_000.0, f64::MAX, "10.0-11574074074.1 d"),
-        ] {
-            assert_eq!(span(low, high), text);
-        }
     }
 }
