@@ -56,7 +56,7 @@ fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
     let mut render = ShardRender::new(state, &plan.ranges(number), 0, THREADS).unwrap();
     while render.step() {}
     assert_eq!(render.progress(), 1.0);
-    let rays = render.rays();
+    let rays = render.rays;
     (render.state, rays)
 }
 
@@ -94,7 +94,7 @@ fn interrupted_shard_equals_uninterrupted() {
             break;
         }
         starts += 1;
-        rays = render.rays();
+        rays = render.rays;
         film = render.state.film;
     }
     assert!(starts > 1, "the shard ended in its first step");
@@ -119,10 +119,10 @@ struct Planned {
 
 fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planned {
     let scene = scene(name, size);
-    let reference = adaptive(&scene, seed, target).schedule.rays() as f64;
+    let reference = adaptive(&scene, seed, target).schedule.rays as f64;
     let pilot = adaptive(&scene, seed, 2.0 * target);
     let plan = plan(&scene, &pilot, seed, target, 8);
-    let pilot_rays = pilot.schedule.rays() as f64;
+    let pilot_rays = pilot.schedule.rays as f64;
     let (sum, shards) = merged(&scene, &plan, pilot);
     let total: u64 = shards.iter().sum();
     let largest = shards.iter().max().copied().unwrap_or(0) as f64;

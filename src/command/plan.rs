@@ -92,7 +92,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let part = Part {
         plan: Arc::new(plan),
         shards: vec![PartShard { number: BASE, complete: true }],
-        rays: schedule.rays(),
+        rays: schedule.rays,
     };
     let report = Report::of_film(&state.film, &state.mix, &options.display);
     part_file::write_film(&base_file, &state.film, &part_file::header(state, &part, &report))?;
@@ -100,7 +100,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
         base_file.display(),
         part_file::summary(&report),
-        schedule.rays(),
+        schedule.rays,
         pilot.seconds
     ))?;
     Ok(Arc::unwrap_or_clone(part.plan))
@@ -123,7 +123,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
     let reader = FilmReader::open(path)?;
-    let part = Part::of_header(path, reader.header())?;
+    let part = Part::of_header(path, &reader.header)?;
     let part = part.ok_or_else(|| {
         failed("it belongs to no plan; name a film that `zerkalo merge` has written")
     })?;
@@ -139,7 +139,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     print_line(&format!(
         "{}  noise {:.3} 8-bit levels (the base of the plan)",
         path.display(),
-        schedule.noise().map_or(0.0, |noise: Noise| noise.rmse_levels)
+        schedule.noise.map_or(0.0, |noise: Noise| noise.rmse_levels)
     ))?;
     let settings = PlanSettings {
         noise_levels: args.noise,

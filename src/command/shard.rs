@@ -65,7 +65,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let (render, signal) = trace(render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
     part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
-    part.rays = render.rays();
+    part.rays = render.rays;
     let state = &render.state;
     let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
     output.write(&state.film, &part_file::header(state, &part, &report))?;
@@ -79,7 +79,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         "{}  {}  {} rays{share}",
         args.output.display(),
         part_file::summary(&report),
-        render.rays(),
+        render.rays,
     ))?;
     match signal {
         Some(status) if unfinished => Err(Failure::Signalled(status)),
@@ -128,7 +128,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     };
     let report = |error: &FileError| warn(&format!("warning: {error}; the shard starts again"));
     let Ok(reader) = FilmReader::open(path).inspect_err(report) else { return Ok(None) };
-    let found = Part::of_header(path, reader.header())?;
+    let found = Part::of_header(path, &reader.header)?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
     if found.plan != part.plan {
         return Err(failed("belongs to another plan"));
@@ -206,7 +206,7 @@ fn trace(
         {
             let start = Instant::now();
             part.shards.iter_mut().for_each(|shard| shard.complete = false);
-            part.rays = render.rays();
+            part.rays = render.rays;
             let state = &render.state;
             let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
             output.write(&state.film, &part_file::header(state, part, &report))?;

@@ -77,10 +77,10 @@ pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<
         if changed || done || timed_out {
             last_estimate = estimate.unwrap_or(last_estimate);
             let errors = reference.errors(&render.state.film, &render.state.mix);
-            if points.last().is_none_or(|last| last.samples < render.schedule.samples()) {
+            if points.last().is_none_or(|last| last.samples < render.schedule.samples) {
                 points.push(Point {
                     step,
-                    samples: render.schedule.samples(),
+                    samples: render.schedule.samples,
                     spp: render.schedule.spp().mean,
                     seconds: vec![render.seconds],
                     estimated_levels: estimate,

@@ -71,8 +71,8 @@ fn parts_are_added_as_they_appear() {
     let entry = |header: &zerkalo_render::film::file::FilmFileHeader| {
         header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
     };
-    assert_eq!(entry(&films.sum.as_ref().unwrap().0), entry(merged.header()));
-    assert!(entry(merged.header()).unwrap().1.starts_with("0-3 of 3, plan "));
+    assert_eq!(entry(&films.sum.as_ref().unwrap().0), entry(&merged.header));
+    assert!(entry(&merged.header).unwrap().1.starts_with("0-3 of 3, plan "));
     // The samples of a file that is removed no longer count. The names on the command line may have
     // any order.
     fs::remove_file(desk.path("job-2.zk")).unwrap();
@@ -90,7 +90,7 @@ fn unfinished_shards_are_running_and_then_late() {
     trace(&desk, "job", 1);
     // Film file of shard 1 as it remains when a signal stops its render: the chunk PART says that
     // the shard is unfinished.
-    let whole = FilmReader::open(&desk.path("job-1.zk")).unwrap().header().clone();
+    let whole = FilmReader::open(&desk.path("job-1.zk")).unwrap().header;
     let mut header = whole.clone();
     let text = String::from_utf8(header.chunks[b"PART"].clone()).unwrap();
     header.chunks.insert(*b"PART", text.replace("complete", "unfinished").into_bytes());

@@ -137,7 +137,7 @@ fn survey_of_rays() {
             .iter()
             .map(|seed| {
                 let (rendering, schedule, _) = run(&sample, *seed, true, stop, |_, schedule| {
-                    schedule.rays() > MAX_RAYS && schedule.spp().mean >= 64.0
+                    schedule.rays > MAX_RAYS && schedule.spp().mean >= 64.0
                 });
                 (rendering, schedule)
             })
@@ -145,13 +145,13 @@ fn survey_of_rays() {
         let spp = pictures.iter().map(|(_, s)| s.spp().mean).sum::<f64>() / seeds.len() as f64;
         let pixels: f64 = pictures
             .iter()
-            .map(|(_, s)| s.noise().expect("an estimate").effective_pixels.levels)
+            .map(|(_, s)| s.noise.expect("an estimate").effective_pixels.levels)
             .sum();
         let count = (REFERENCE_FACTOR * spp as u32 / 2).clamp(256, 4096);
         let reference = Reference::new(&sample, count);
         let points: Vec<Point> = pictures
             .iter()
-            .map(|(r, s)| Point { rays: s.rays() as f64, square: reference.square(r) })
+            .map(|(r, s)| Point { rays: s.rays as f64, square: reference.square(r) })
             .collect();
         let RayRatio { ratio, error } = ray_ratio(&sample, &seeds, &reference, &points);
         let Point { rays, square } = Point::mean(points.into_iter());

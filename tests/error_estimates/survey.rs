@@ -112,10 +112,10 @@ fn examine(number: u64, reference_count: u32, seeds: u64, uniform_seeds: usize) 
     while used.is_empty() || (used.len() as u64) < seeds && pixels < ENOUGH {
         let seed = number + 1 + 1000 * used.len() as u64;
         let (rendering, schedule, _) = run(&sample, seed, true, stop, |_, _| false);
-        let noise = schedule.noise().expect("an estimate");
+        let noise = schedule.noise.expect("an estimate");
         truths.push(reference.square(&rendering));
         reports.push(noise.rmse_levels.powi(2));
-        rays.push(schedule.rays() as f64);
+        rays.push(schedule.rays as f64);
         pixels += noise.effective_pixels.levels;
         used.push(seed);
     }
@@ -231,7 +231,7 @@ fn single_ball_ends_with_few_samples() {
         assert_eq!(reason, Some(StoppedBy::Noise));
         let (_, adaptive, reason) = run(&sample, seed, true, stop, |_, _| false);
         assert_eq!(reason, Some(StoppedBy::Noise), "seed {seed}");
-        let [adaptive, uniform] = [&adaptive, &uniform].map(Schedule::rays);
+        let [adaptive, uniform] = [&adaptive, &uniform].map(|schedule: &Schedule| schedule.rays);
         assert!(
             adaptive as f64 <= 1.5 * uniform as f64,
             "seed {seed}: {adaptive} rays, uniform {uniform}"

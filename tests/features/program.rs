@@ -238,7 +238,7 @@ fn a15_user_edits() {
         let settings = settings(false, 0, SPP);
         let mut render = SyncRender::new(scene, &options(), settings, 2).unwrap();
         while render.step().is_none() {}
-        render.schedule.samples()
+        render.schedule.samples
     };
     assert!(sample_count(&capped) < sample_count(history.scene()));
     // Undoing all edits restores the scene and its picture.

@@ -74,7 +74,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, max_rays: u64) -> 
     let ended = loop {
         match schedule.next(0.0) {
             Step::Finished(_) => break true,
-            Step::Trace(_) if schedule.rays() > max_rays => break false,
+            Step::Trace(_) if schedule.rays > max_rays => break false,
             Step::Trace(wave) => {
                 let report = trace(&mut rendering, &wave, &pool);
                 schedule.complete(&wave, &report);
@@ -85,7 +85,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, max_rays: u64) -> 
     Shot {
         picture: picture(&rendering, Replicates::Both),
         counts: counts(&rendering),
-        rays: schedule.rays() as f64,
+        rays: schedule.rays as f64,
         reported: noise.map_or(0.0, |n| n.rmse_levels.powi(2)),
         effective_pixels: noise.map_or(0.0, |n| n.effective_pixels.levels),
         ended,

@@ -26,7 +26,7 @@ fn render(scene: &Scene, threads: usize) -> Outcome {
     loop {
         match schedule.next(0.0) {
             Step::Finished(reason) => {
-                let (noise, rays) = (schedule.noise(), schedule.rays());
+                let (noise, rays) = (schedule.noise, schedule.rays);
                 return Outcome { bytes: rendering.film.bytes(), noise, waves, rays, reason };
             }
             Step::Trace(wave) => {

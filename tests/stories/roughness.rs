@@ -60,7 +60,7 @@ fn roughness_changes_only_pixels_of_the_mirror() {
     let seen = FirstHitBuffer::new(size, size, look, &pool(2));
     let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
     let others = changed(&before, &marked(&smooth, |name| name != "mirror"));
-    let shows = |i: &usize| seen.texels()[*i].object == Some(mirror) && others[*i];
+    let shows = |i: &usize| seen.texels[*i].object == Some(mirror) && others[*i];
     let reflections: Vec<usize> = (0..by_keys.len()).filter(shows).collect();
     let blurred = reflections.iter().filter(|i| by_keys[**i]).count();
     println!("{blurred} of {} reflections of objects changed", reflections.len());

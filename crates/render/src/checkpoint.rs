@@ -105,7 +105,7 @@ impl EncodedCheckpoint {
         pool: &rayon::ThreadPool,
     ) -> Self {
         let film = &state.film;
-        let compiled = state.lighting().compiled();
+        let compiled = &state.lighting.compiled;
         let mut header = film_header(state, report, provenance);
         header.chunks.extend([
             SampleInputs::new(compiled, provenance.sampler).encode(),

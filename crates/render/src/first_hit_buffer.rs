@@ -13,7 +13,7 @@ pub struct FirstHitBuffer {
     pub columns: usize,
     pub rows: usize,
     /// First hits, `[row][column]`.
-    texels: Vec<FirstHit>,
+    pub texels: Vec<FirstHit>,
 }
 
 impl FirstHitBuffer {
@@ -48,10 +48,5 @@ impl FirstHitBuffer {
             return None;
         }
         self.texels.get(row * self.columns + column)
-    }
-
-    /// Returns the first hits of all cells, `[row][column]`.
-    pub fn texels(&self) -> &[FirstHit] {
-        &self.texels
     }
 }

@@ -136,7 +136,7 @@ impl RegionRender {
                 Step::Trace(wave) => wave,
             };
             let (samples, spent) =
-                (self.report.samples + schedule.samples(), self.report.seconds + seconds);
+                (self.report.samples + schedule.samples, self.report.seconds + seconds);
             let piece = match spent > 0.0 {
                 true => (PIECE_SECONDS * samples as f64 / spent) as u64,
                 false => FIRST_PIECE_SAMPLES,
@@ -152,8 +152,8 @@ impl RegionRender {
         self.finished_rows = rows.end;
         let (spp, film) = (schedule.spp(), &state.film);
         let report = &mut self.report;
-        report.samples += schedule.samples();
-        report.rays += schedule.rays();
+        report.samples += schedule.samples;
+        report.rays += schedule.rays;
         report.seconds += seconds;
         report.bad_samples += film.bad_samples().count;
         report.saturated_samples += film.saturated_samples();
@@ -190,14 +190,14 @@ fn progress(
         (f64::from(rows.start) + share.unwrap_or(0.0) * rows.len() as f64) / f64::from(height);
     let seconds = finished.seconds + seconds;
     let left = seconds * (1.0 - done) / done;
-    let samples = finished.samples + schedule.samples();
+    let samples = finished.samples + schedule.samples;
     Report {
         state: State::Tracing,
         spp: schedule.spp(),
         samples,
-        rays: finished.rays + schedule.rays(),
+        rays: finished.rays + schedule.rays,
         seconds,
-        noise: schedule.noise(),
+        noise: schedule.noise,
         eta_seconds: share.filter(|_| done > 0.0).map(|_| (left, left)),
         progress: Some(done),
         ..finished.clone()

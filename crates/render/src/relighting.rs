@@ -8,19 +8,11 @@ use zerkalo_world::LightGroups;
 /// Light groups of a film, and the scene for which its samples were traced.
 #[derive(Clone, Debug)]
 pub struct Relighting {
-    compiled: Arc<Scene>,
-    groups: LightGroups,
+    pub compiled: Arc<Scene>,
+    pub groups: LightGroups,
 }
 
 impl Relighting {
-    pub fn new(compiled: Arc<Scene>, groups: LightGroups) -> Self {
-        Self { compiled, groups }
-    }
-
-    pub fn compiled(&self) -> &Arc<Scene> {
-        &self.compiled
-    }
-
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
     /// new samples, because it differs in more than the colours, intensities and switches of
     /// sources that have light groups of their own.

@@ -29,7 +29,8 @@ pub struct RenderState {
     /// Weight of each light group in the current picture.
     pub mix: LightWeights,
     scene: Arc<Scene>,
-    lighting: Arc<Relighting>,
+    /// Light groups of the film, with the scene for which its samples were traced.
+    pub lighting: Arc<Relighting>,
     sampling: SampleSettings,
     display: Display,
     estimator: Estimator,
@@ -103,7 +104,8 @@ impl RenderState {
         };
         let film = film.map_err(|_| memory_budget::refused(size, groups))?;
         let film = film.starting_at(rows.start as usize);
-        let lighting = Relighting::new(Arc::clone(&scene), world.info().groups.clone());
+        let groups = world.info().groups.clone();
+        let lighting = Relighting { compiled: Arc::clone(&scene), groups };
         Ok(Self {
             world,
             film,
@@ -136,11 +138,6 @@ impl RenderState {
     /// Returns the name of each light group.
     pub fn group_names(&self) -> Vec<String> {
         self.world.info().groups.names(&self.scene)
-    }
-
-    /// Returns the light groups of the film, with the scene for which its samples were traced.
-    pub fn lighting(&self) -> &Arc<Relighting> {
-        &self.lighting
     }
 
     pub fn display(&self) -> Display {

@@ -51,7 +51,7 @@ impl Dashboard {
     /// the program, and `None` if the user quits.
     pub fn event_loop(&mut self) -> io::Result<Option<u8>> {
         let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
-        let wakeup = self.effects.session.wakeup().clone();
+        let wakeup = self.effects.session.wakeup.clone();
         let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();

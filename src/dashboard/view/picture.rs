@@ -74,7 +74,7 @@ impl PictureView {
             }
             DisplayChannel::Normals => hit_colors(snapshot, size, |hit| normal_color(hit.normal)),
             DisplayChannel::Depth => {
-                let hits = snapshot.first_hits.as_deref()?.texels().iter();
+                let hits = snapshot.first_hits.as_deref()?.texels.iter();
                 let depths = hits.filter(|hit| hit.object.is_some()).map(|hit| hit.depth.into());
                 let scale = Scale { reversed: true, ..Scale::logarithmic(depths) };
                 self.legend = Some(Legend::magnitude(scale, "from the eye"));
@@ -172,7 +172,7 @@ fn hit_colors(
     color: impl Fn(&FirstHit) -> [u8; 3],
 ) -> Option<Raster> {
     let hits = snapshot.first_hits.as_deref()?;
-    let pixel = |i: usize| match &hits.texels()[i] {
+    let pixel = |i: usize| match &hits.texels[i] {
         hit if hit.object.is_some() => color(hit),
         _ => NO_HIT,
     };

@@ -7,8 +7,8 @@ use crate::film::store::Film;
 /// Linear radiance of every pixel of a film at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
-    width: usize,
-    height: usize,
+    /// Number of columns and rows of pixels.
+    pub size: [usize; 2],
     /// Pixels in linear radiance, `[row][column]`.
     pixels: Vec<[f32; 3]>,
 }
@@ -31,17 +31,12 @@ impl LinearImage {
         if !known.iter().all(|k| *k) {
             fill_gaps(pixels.as_flattened_mut(), &mut known, width, height, 3);
         }
-        Self { width, height, pixels }
-    }
-
-    /// Returns the number of columns and rows of pixels.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.height]
+        Self { size: [width, height], pixels }
     }
 
     /// Returns the mean over each of `cols` x `rows` equal cells, `[row][column]`.
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
-        let means = box_means(self.size(), [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
+        let means = box_means(self.size, [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()
     }
 }
@@ -54,7 +49,7 @@ mod tests {
     use crate::film::testing::{each_tile, fill, film, white};
 
     fn pixel(image: &LinearImage, x: usize, y: usize) -> [f32; 3] {
-        image.pixels[y * image.width + x]
+        image.pixels[y * image.size[0] + x]
     }
 
     #[test]
@@ -66,7 +61,7 @@ mod tests {
         });
         let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
         let image = LinearImage::of_film(&film, &mix);
-        assert_eq!(image.size(), [37, 29]);
+        assert_eq!(image.size, [37, 29]);
         assert_eq!(pixel(&image, 36, 28), film.pixel(36, 28, &mix).map(|c| c as f32));
         for (cols, rows) in [(1, 1), (5, 4), (37, 29), (80, 45)] {
             let expected = Thumbnail::of_film(&film, cols, rows).mixed(&mix);

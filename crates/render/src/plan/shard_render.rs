@@ -30,7 +30,7 @@ pub struct ShardRender {
     remaining: VecDeque<Job>,
     /// Samples of the complete shard, and those in the film, over all pixels and both replicates.
     samples: [u64; 2],
-    rays: u64,
+    pub rays: u64,
     /// Samples and seconds of tracing in all steps so far.
     measured: (u64, f64),
 }
@@ -112,10 +112,6 @@ impl ShardRender {
         // The rest of each cut job is traced next, while its tile is still in the cache.
         cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
         true
-    }
-
-    pub fn rays(&self) -> u64 {
-        self.rays
     }
 
     /// Returns the share of the shard's samples that the film holds, 0..=1.

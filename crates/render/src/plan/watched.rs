@@ -298,7 +298,7 @@ impl WatchedFilms {
         }
         order.sort_unstable();
         let Some((_, first)) = order.first() else { return Ok(()) };
-        let mut header = self.open_film(*first)?.header().clone();
+        let mut header = self.open_film(*first)?.header;
         let mut film = empty(&header).map_err(|reason| (*first, reason))?;
         for (_, i) in order {
             self.add_file(i, &mut film)?;
@@ -352,8 +352,8 @@ fn empty(header: &FilmFileHeader) -> Result<Film, String> {
 impl Contents {
     fn read(path: &Path) -> Result<Self, String> {
         let reader = FilmReader::open(path).map_err(|error| error.to_string())?;
-        let part = Part::of_header(path, reader.header())?;
-        Ok(part.map_or_else(|| Self::Checkpoint(seconds_of(reader.header())), Self::Part))
+        let part = Part::of_header(path, &reader.header)?;
+        Ok(part.map_or_else(|| Self::Checkpoint(seconds_of(&reader.header)), Self::Part))
     }
 }
 

@@ -80,9 +80,10 @@ pub struct Schedule {
     remaining: Vec<Job>,
     convergence: ConvergenceFit,
     /// Number of samples traced, over all pixels and both replicates.
-    samples: u64,
-    rays: u64,
-    noise: Option<Noise>,
+    pub samples: u64,
+    pub rays: u64,
+    /// Latest estimate of the picture's error. `None` before the first.
+    pub noise: Option<Noise>,
     /// Samples per pixel and replicate after the latest uniform round that ended with an estimate.
     estimated_at: u32,
     /// See [`Schedule::with_light_period`].
@@ -209,23 +210,9 @@ impl Schedule {
         }
     }
 
-    /// Returns the latest estimate of the picture's error. Returns `None` before the first.
-    pub fn noise(&self) -> Option<Noise> {
-        self.noise
-    }
-
     /// Returns the latest error estimates of the tiles, in row order; `None` before the first.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
         self.tiles.iter().map(|tile| tile.error)
-    }
-
-    /// Returns the number of samples traced, over all pixels and both replicates.
-    pub fn samples(&self) -> u64 {
-        self.samples
-    }
-
-    pub fn rays(&self) -> u64 {
-        self.rays
     }
 
     pub fn spp(&self) -> Spp {

@@ -182,7 +182,7 @@ impl ActiveRender {
             let report = self.state.trace_wave(&wave, &context.pool, &flags.cancel_wave);
             self.traced_for += start.elapsed();
             self.schedule.complete(&wave, &report);
-            self.throughput.record(self.seconds(), self.schedule.samples());
+            self.throughput.record(self.seconds(), self.schedule.samples);
             return;
         }
         self.update_first_hits(context, FIRST_HITS_SECONDS);
@@ -207,7 +207,7 @@ impl ActiveRender {
         match report {
             Some(report) => {
                 self.schedule.complete(&wave, &report);
-                self.throughput.record(self.seconds(), self.schedule.samples());
+                self.throughput.record(self.seconds(), self.schedule.samples);
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
             // Either a newer command is waiting, or the client raised the flag for this scene only
@@ -231,7 +231,7 @@ impl ActiveRender {
     /// before the first measurement.
     fn speed(&self) -> Option<f64> {
         let seconds = self.seconds();
-        let mean = || (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds);
+        let mean = || (seconds > 0.0).then(|| self.schedule.samples as f64 / seconds);
         self.throughput.samples_per_second().or_else(mean)
     }
 
@@ -261,7 +261,7 @@ impl ActiveRender {
             view: context.view,
             mix: self.state.mix.clone(),
             display: self.state.display(),
-            lighting: Some(Arc::clone(self.state.lighting())),
+            lighting: Some(Arc::clone(&self.state.lighting)),
             first_hits: self.first_hits.clone(),
         }
     }
@@ -289,12 +289,12 @@ impl ActiveRender {
             generation: context.generation,
             state,
             spp: self.schedule.spp(),
-            samples: self.schedule.samples(),
-            rays: self.schedule.rays(),
+            samples: self.schedule.samples,
+            rays: self.schedule.rays,
             seconds,
             compile_seconds: self.compiled_in.as_secs_f64(),
             first_picture_seconds: self.first_picture_after.map(|time| time.as_secs_f64()),
-            noise: self.schedule.noise(),
+            noise: self.schedule.noise,
             eta_seconds: self.schedule.eta_seconds(seconds),
             quality_seconds: QUALITIES
                 .map(|levels| self.schedule.seconds_to_noise(levels, seconds)),

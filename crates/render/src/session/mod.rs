@@ -83,7 +83,8 @@ struct Shared {
 pub struct Session {
     commands: Sender<Command>,
     shared: Arc<Shared>,
-    wakeup: Receiver<()>,
+    /// Channel that receives a message for each new snapshot.
+    pub wakeup: Receiver<()>,
     generations: u64,
     /// Rendering thread, whose end the handle awaits. `None` for a thread that watches: it may be
     /// reading from a slow disk.
@@ -216,11 +217,6 @@ impl Session {
             }
         });
         receiver.recv().ok()
-    }
-
-    /// Returns the channel that receives a message for each new snapshot.
-    pub fn wakeup(&self) -> &Receiver<()> {
-        &self.wakeup
     }
 
     /// Waits at most `limit` for a snapshot that has not been taken yet. Panics if the rendering

@@ -30,7 +30,8 @@ pub fn is_film_file(path: &Path) -> bool {
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
-    header: FilmFileHeader,
+    /// Everything before the tiles.
+    pub header: FilmFileHeader,
     /// First chunk after the header.
     next: Chunk,
     checksums: crc32fast::Hasher,
@@ -108,11 +109,6 @@ impl<R: Read> FilmReader<R> {
             .ok_or_else(|| input.damaged("its metadata are not readable"))?;
         header.chunks = chunks;
         Ok(Self { input, header, next, checksums })
-    }
-
-    /// Returns everything before the tiles.
-    pub fn header(&self) -> &FilmFileHeader {
-        &self.header
     }
 
     /// Reads header and film.

@@ -43,8 +43,8 @@ fn pieces_do_not_change_rounds() {
             assert_eq!(finish_in_pieces(&mut model, &mut schedule, tiles, longest), reason);
             let done = |s: &Schedule| s.tiles.iter().map(|t| t.done).collect::<Vec<_>>();
             assert_eq!(done(&schedule), done(&whole), "{tiles} x {longest}, adaptive {adaptive}");
-            assert_eq!((schedule.samples(), schedule.rays()), (whole.samples(), whole.rays()));
-            assert_eq!(schedule.noise(), whole.noise());
+            assert_eq!((schedule.samples, schedule.rays), (whole.samples, whole.rays));
+            assert_eq!(schedule.noise, whole.noise);
         }
     }
 }
@@ -93,24 +93,24 @@ fn new_estimates_replace_the_old_ones() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(noise(0.6), true));
     finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES);
-    let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
+    let (before, samples) = (schedule.noise.unwrap(), schedule.samples);
     schedule.forget_estimates();
-    assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
+    assert_eq!((schedule.noise, schedule.eta_seconds(1.0)), (None, None));
     // The picture becomes three times as bright on the display, and its error three times as large.
     model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
     let estimates: Vec<_> = (0..36).map(|tile| Some(model.estimate(tile))).collect();
     schedule.set_estimates(&estimates);
-    let after = schedule.noise().unwrap();
+    let after = schedule.noise.unwrap();
     assert!((after.rmse_levels / before.rmse_levels - 3.0).abs() < 1e-9);
-    assert_eq!(schedule.samples(), samples);
+    assert_eq!(schedule.samples, samples);
     // The convergence of the new picture is unknown. The estimated range is wide, but contains the
     // true time.
     let (low, high) = schedule.eta_seconds(1.0).unwrap();
     assert!(high > 2.0 * low, "{low}..{high}");
-    let rays = schedule.rays() as f64;
+    let rays = schedule.rays as f64;
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);
     assert!((model.rmse() / 0.6 - 1.0).abs() < 0.1);
-    let needed = schedule.rays() as f64 / rays - 1.0;
+    let needed = schedule.rays as f64 / rays - 1.0;
     assert!((low..high).contains(&needed), "{needed} not in {low}..{high}");
 }
 

@@ -158,7 +158,7 @@ impl Model {
     fn finish(&mut self, settings: Settings) -> (Schedule, StoppedBy) {
         let mut schedule = self.schedule(settings);
         for _ in 0..100_000 {
-            match schedule.next(schedule.rays() as f64 * 1e-9) {
+            match schedule.next(schedule.rays as f64 * 1e-9) {
                 Step::Finished(reason) => return (schedule, reason),
                 Step::Trace(wave) => {
                     let report = self.run(&wave);

@@ -86,10 +86,10 @@ fn schedule_of_samples_predicts_what_the_schedule_does() {
     let pixels: Vec<_> = schedule.tiles.iter().map(|tile| tile.pixels).collect();
     let errors: Vec<_> = schedule.tile_estimates().collect();
     let again = Schedule::of_planned(&tiles, &pixels, &errors, until(noise(0.5), true));
-    assert_eq!(again.samples(), schedule.samples());
-    let ratio = again.rays() as f64 / schedule.rays() as f64;
+    assert_eq!(again.samples, schedule.samples);
+    let ratio = again.rays as f64 / schedule.rays as f64;
     assert!((ratio - 1.0).abs() < 1e-6, "`rays_per_sample` has 24 bits: {ratio}");
-    assert_eq!(again.noise(), schedule.noise());
+    assert_eq!(again.noise, schedule.noise);
     let slopes = schedule.predict([0.5; 2]).unwrap().slopes;
     let (a, b) = (schedule.predict(slopes).unwrap(), again.predict(slopes).unwrap());
     let total = |p: &Prediction| p.tiles.iter().map(|tile| tile.end).sum::<u32>() as f64;

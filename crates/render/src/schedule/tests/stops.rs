@@ -18,8 +18,8 @@ fn waves_are_aligned_to_the_sequence() {
     assert_eq!(seen, expected);
     assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
     assert_eq!(schedule.spp(), Spp { min: 100, mean: 100.0, max: 100 });
-    assert_eq!(schedule.samples(), 100 * 4 * 256);
-    assert!(schedule.noise().is_some(), "the last wave ends with an estimate");
+    assert_eq!(schedule.samples, 100 * 4 * 256);
+    assert!(schedule.noise.is_some(), "the last wave ends with an estimate");
 }
 
 #[test]
@@ -30,7 +30,7 @@ fn spp_rounds_up_to_even_and_two_samples_have_a_noise() {
             let (schedule, reason) = model.finish(until(spp(requested), adaptive));
             assert_eq!(reason, StoppedBy::Spp);
             assert_eq!(schedule.spp().mean, f64::from(traced), "{requested} adaptive {adaptive}");
-            assert!(schedule.noise().is_some());
+            assert!(schedule.noise.is_some());
         }
     }
 }
@@ -46,7 +46,7 @@ fn caps_hold_for_glossy_tiles_only() {
         assert!(schedule.tiles.iter().all(|t| !t.glossy || t.done == 20));
         assert!(schedule.tiles.iter().any(|t| !t.glossy && t.done > 200));
         assert!(
-            schedule.noise().unwrap().rmse_levels > 1.0,
+            schedule.noise.unwrap().rmse_levels > 1.0,
             "the noise is that of the whole picture"
         );
 
@@ -83,7 +83,7 @@ fn time_is_overshot_by_little() {
             let mut model = Model::exact(vec![NOISY; tiles]);
             let (schedule, _) = model.finish(until(stop, adaptive));
             // One ray takes a nanosecond.
-            let seconds = schedule.rays() as f64 * 1e-9;
+            let seconds = schedule.rays as f64 * 1e-9;
             assert!(seconds < 0.66, "{tiles} tiles, adaptive {adaptive}: {seconds} s");
         }
     }
@@ -126,7 +126,7 @@ fn cancelled_jobs_are_traced_later() {
     }
     assert!(cancelled > 0);
     assert_eq!(model.counts, whole.counts);
-    assert_eq!(schedule.samples(), expected.samples());
+    assert_eq!(schedule.samples, expected.samples);
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn estimated_time_left_is_a_range_that_holds() {
             let settings = until(noise(0.05), adaptive);
             let mut schedule = model.schedule(settings);
             let mut estimates = Vec::new();
-            let seconds = |s: &Schedule| s.rays() as f64 * 1e-9;
+            let seconds = |s: &Schedule| s.rays as f64 * 1e-9;
             while let Step::Trace(wave) = schedule.next(seconds(&schedule)) {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
@@ -180,5 +180,5 @@ fn p95_is_the_percentile_of_tiles() {
     let (schedule, _) = model.finish(until(spp(32), false));
     // The 95th of 100 tiles by error is tile 94, with sigma 94. Both replicates have 16 samples, so
     // that the RMSE of their mean is 94 / sqrt(32).
-    assert!((schedule.noise().unwrap().p95_levels - 94.0 / 32f64.sqrt()).abs() < 1e-9);
+    assert!((schedule.noise.unwrap().p95_levels - 94.0 / 32f64.sqrt()).abs() < 1e-9);
 }
