@@ -8,7 +8,7 @@ const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Reference picture, with an estimate of its own error.
 pub struct Reference {
-    size: [usize; 2],
+    /// Pixels in linear radiance, `[row][column]`.
     pixels: Vec<[f64; 3]>,
     levels: Vec<[f64; 3]>,
     /// Half the difference between the replicates in each pixel, in 8-bit levels. Empty if the
@@ -68,7 +68,7 @@ impl Bias {
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
     let mut squares = Squares::default();
     for (a, b) in a.iter().zip(b) {
-        let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+        let mean = mean(a, b);
         let [level_a, level_b, level] = [*a, *b, mean].map(|x| display.levels(x));
         let mut half_sum = 0.0;
         for c in 0..3 {
@@ -90,47 +90,39 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
     }
 }
 
-fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
-    [Replicates::A, Replicates::B].map(|replicates| {
-        let mut all = Vec::with_capacity(film.width() * film.height());
-        let mut row = Vec::new();
-        for y in 0..film.height() {
-            film.row(y, replicates, mix, &mut row);
-            all.extend_from_slice(&row);
-        }
-        all
-    })
+/// Returns the pixels of the picture of `film`, `[row][column]`.
+fn pixels(film: &Film, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
+    let mut all = Vec::with_capacity(film.width() * film.height());
+    let mut row = Vec::new();
+    for y in 0..film.height() {
+        film.row(y, replicates, weights, &mut row);
+        all.extend_from_slice(&row);
+    }
+    all
 }
 
 impl Reference {
     /// Creates a reference from the picture of `film`, whose replicates must hold equal numbers of
     /// samples.
-    pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
-        let [a, b] = replicates(film, mix);
-        Self::of_replicates([film.width(), film.height()], &a, &b, display)
+    pub fn of_film(film: &Film, weights: &LightWeights, display: &Display) -> Self {
+        let [a, b] = [Replicates::A, Replicates::B].map(|r| pixels(film, r, weights));
+        Self::of_replicates(&a, &b, display)
     }
 
-    /// Creates a reference from the mean of two independent pictures, row by row.
-    pub fn of_replicates(
-        size: [usize; 2],
-        a: &[[f64; 3]],
-        b: &[[f64; 3]],
-        display: &Display,
-    ) -> Self {
+    /// Creates a reference from the mean of two independent pictures.
+    pub fn of_replicates(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Self {
+        let pairs = || a.iter().zip(b);
         let own = own_error(a, b, display);
-        let mean = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
-        let pixels = a.iter().zip(b).map(mean).collect();
-        let halves = a.iter().zip(b).map(|(a, b)| half(a, b, display)).collect();
-        Self { halves, ..Self::new(size, pixels, own, *display) }
+        let halves = pairs().map(|(a, b)| half(a, b, display)).collect();
+        let pixels = pairs().map(|(a, b)| mean(a, b)).collect();
+        Self { own, halves, ..Self::of_pixels(pixels, display) }
     }
 
-    pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
-        Self::new(size, pixels, Squares::default(), *display)
-    }
-
-    fn new(size: [usize; 2], pixels: Vec<[f64; 3]>, own: Squares, display: Display) -> Self {
+    /// Creates an exact reference.
+    pub fn of_pixels(pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         let levels = pixels.iter().map(|x| display.levels(*x)).collect();
-        Self { size, pixels, levels, halves: Vec::new(), own, display }
+        let own = Squares::default();
+        Self { pixels, levels, halves: Vec::new(), own, display: *display }
     }
 
     /// Returns the RMSE of the reference itself, estimated from its replicates, in 8-bit levels.
@@ -145,29 +137,23 @@ impl Reference {
 
     /// Returns the errors of `film`: its mean squared differences, less the mean squared error of
     /// the reference.
-    pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
-        self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
+    pub fn errors(&self, film: &Film, weights: &LightWeights) -> Errors {
+        self.errors_of(&pixels(film, Replicates::Both, weights))
     }
 
-    /// Returns the errors of a picture whose rows `fill(y, row)` writes.
-    fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
+    fn errors_of(&self, pixels: &[[f64; 3]]) -> Errors {
         let mut sum = Squares::default();
         let mut crossed = 0.0;
-        let mut row = Vec::new();
-        for y in 0..self.size[1] {
-            fill(y, &mut row);
-            for (x, i) in row.iter().zip(y * self.size[0]..) {
-                let (r, level_r, level_x) =
-                    (self.pixels[i], self.levels[i], self.display.levels(*x));
-                let difference: [f64; 3] = std::array::from_fn(|c| level_x[c] - level_r[c]);
-                for c in 0..3 {
-                    let d = x[c] - r[c];
-                    sum.linear += d * d;
-                    sum.levels += difference[c] * difference[c];
-                    sum.relative += d * d / (r[c] * r[c] + RELATIVE_FLOOR);
-                }
-                crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
+        for (i, (x, r)) in pixels.iter().zip(&self.pixels).enumerate() {
+            let level = self.display.levels(*x);
+            let difference = std::array::from_fn(|c| level[c] - self.levels[i][c]);
+            sum.levels += dot(&difference, &difference);
+            for c in 0..3 {
+                let square = (x[c] - r[c]).powi(2);
+                sum.linear += square;
+                sum.relative += square / (r[c] * r[c] + RELATIVE_FLOOR);
             }
+            crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
         }
         let values = (3 * self.pixels.len()) as f64;
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
@@ -183,12 +169,12 @@ impl Reference {
         }
     }
 
-    pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
-        let [a, b] = replicates(film, mix);
+    pub fn bias(&self, film: &Film, weights: &LightWeights) -> Bias {
+        let [a, b] = [Replicates::A, Replicates::B].map(|r| pixels(film, r, weights));
         let own = own_error(&a, &b, &self.display);
         let (mut sum, mut squares, mut crossed) = (0.0, 0.0, 0.0);
         for (i, (a, b)) in a.iter().zip(&b).enumerate() {
-            let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
+            let mean = mean(a, b);
             sum += (0..3).map(|c| mean[c] - self.pixels[i][c]).sum::<f64>();
             let level = self.display.levels(mean);
             let difference = std::array::from_fn(|c| level[c] - self.levels[i][c]);
@@ -210,6 +196,10 @@ impl Reference {
 
 fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn mean(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| 0.5 * (a[c] + b[c]))
 }
 
 /// Returns half the difference between two displayed colours, in 8-bit levels.
@@ -240,7 +230,7 @@ mod tests {
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);
         let [a, b] = [0; 2].map(|_| noisy_pixels(&mut rng, 10_000, 0.01));
-        let reference = Reference::of_replicates([100, 100], &a, &b, &Display::default());
+        let reference = Reference::of_replicates(&a, &b, &Display::default());
         let expected = 0.01 * (1.0f64 + 1.0 / 9.0).sqrt() / 2f64.sqrt();
         assert!((reference.noise_linear() / expected - 1.0).abs() < 0.02);
         // The slope of the sRGB curve at 0.5 is 1.055 / 2.4 x 0.5^(1/2.4 - 1).
@@ -253,17 +243,13 @@ mod tests {
     #[test]
     fn spread_is_that_between_references() {
         let mut rng = Rng(2);
-        let size = [40, 30];
         for (own, theirs) in [(0.01, 0.003), (0.01, 0.01), (0.004, 0.01)] {
             let picture = noisy_pixels(&mut rng, 1200, own);
             let errors: Vec<Errors> = (0..200)
                 .map(|_| {
                     let [a, b] = [0; 2].map(|_| noisy_pixels(&mut rng, 1200, theirs * 2f64.sqrt()));
-                    let reference = Reference::of_replicates(size, &a, &b, &Display::default());
-                    reference.errors_of(&mut |y, row| {
-                        row.clear();
-                        row.extend_from_slice(&picture[y * size[0]..(y + 1) * size[0]]);
-                    })
+                    let reference = Reference::of_replicates(&a, &b, &Display::default());
+                    reference.errors_of(&picture)
                 })
                 .collect();
             let n = errors.len() as f64;
@@ -281,18 +267,12 @@ mod tests {
     #[test]
     fn exact_reference_has_no_spread_and_equal_pictures_no_error() {
         let mut rng = Rng(3);
-        let pixels = noisy_pixels(&mut rng, 1200, 0.01);
-        let same = |row: &mut Vec<[f64; 3]>, y: usize| {
-            row.clear();
-            row.extend_from_slice(&pixels[y * 40..(y + 1) * 40]);
-        };
-        let truth = Reference::of_pixels([40, 30], pixels.clone(), &Display::default());
-        let errors = truth.errors_of(&mut |y, row| same(row, y));
+        let mut pixels = noisy_pixels(&mut rng, 1200, 0.01);
+        let truth = Reference::of_pixels(pixels.clone(), &Display::default());
+        let errors = truth.errors_of(&pixels);
         assert_eq!((errors.rmse_levels, errors.spread), (0.0, 0.0));
-        let off = truth.errors_of(&mut |y, row| {
-            same(row, y);
-            row.iter_mut().for_each(|p| p[1] += 0.02);
-        });
+        pixels.iter_mut().for_each(|p| p[1] += 0.02);
+        let off = truth.errors_of(&pixels);
         assert!(off.rmse_levels > 1.0 && off.spread == 0.0, "{off:?}");
     }
 }

@@ -102,7 +102,7 @@ fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Ref
         )));
     }
     Ok(match &read.replicates {
-        Some([a, b]) => Reference::of_replicates(read.size, a, b, display),
-        None => Reference::of_pixels(read.size, read.pixels, display),
+        Some([a, b]) => Reference::of_replicates(a, b, display),
+        None => Reference::of_pixels(read.pixels, display),
     })
 }

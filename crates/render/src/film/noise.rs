@@ -56,8 +56,12 @@ impl Mse {
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, levels: f64::MIN_POSITIVE };
 
     fn add(&mut self, weight: f64, other: Self) {
-        self.linear += weight * other.linear;
-        self.levels += weight * other.levels;
+        *self = self.zip(other, |sum, value| sum + weight * value);
+    }
+
+    /// Combines both measures of the error with those of `other`.
+    pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self { linear: f(self.linear, other.linear), levels: f(self.levels, other.levels) }
     }
 }
 
@@ -154,10 +158,8 @@ impl Estimator {
             }
         }
         let pixels = width * height;
-        let mean_over = |sums: Mse, pixels: usize| {
-            let values = (3 * pixels) as f64;
-            Mse { linear: sums.linear / values, levels: sums.levels / values }
-        };
+        let mean_over =
+            |sums: Mse, pixels: usize| sums.zip(sums, |sum, _| sum / (3 * pixels) as f64);
         // In a tile with a single pixel, both estimates come from this pixel.
         let black = mean_over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { mean_over(halves[1], pixels / 2) } else { black };
@@ -191,13 +193,9 @@ impl TileNoise {
     /// Returns the estimate from all pixels, black and white.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
-        let mean = |black_mse: f64, white_mse: f64| {
+        self.allocation.zip(self.reported, |black_mse, white_mse| {
             (black * black_mse + white * white_mse) / (black + white).max(1.0)
-        };
-        Mse {
-            linear: mean(self.allocation.linear, self.reported.linear),
-            levels: mean(self.allocation.levels, self.reported.levels),
-        }
+        })
     }
 }
 
@@ -250,21 +248,17 @@ impl Noise {
         let p95_levels = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
         // `sum` is of means over three channels, `squares` of sums over them.
-        let effective = |sum: f64, squares: f64| {
+        let effective_pixels = all.zip(squares, |sum, squares| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }
-        };
-        let effective_pixels = Mse {
-            linear: effective(all.linear, squares.linear),
-            levels: effective(all.levels, squares.levels),
-        };
-        let rmse = |white: f64, all: f64| {
+        });
+        let rmse = reported.zip(all, |white, all| {
             let sum = if is_uniform { all } else { white.max(all) };
             (sum / pixels).sqrt()
-        };
+        });
         Some(Self {
-            rmse_linear: rmse(reported.linear, all.linear),
-            rmse_levels: rmse(reported.levels, all.levels),
+            rmse_linear: rmse.linear,
+            rmse_levels: rmse.levels,
             p95_levels,
             worst_levels: worst.sqrt(),
             effective_pixels,
