@@ -1,7 +1,6 @@
 //! Error curve: the error of a variant at increasing numbers of samples, until it reaches the
 //! target noise.
 
-use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
 use crate::measure::reference_image::{Errors, Reference};
 use std::io;
@@ -41,22 +40,9 @@ pub struct End {
 /// while the error halves.
 const POINT_RATIO: f64 = 0.84;
 
-/// Returns the share of the processors' time that other programs used while `threads` threads ran
-/// for `seconds` since `before`. Returns `None` if it is unknown, as with more threads than
-/// processors, which wait for each other.
-fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
-    if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
-        return None;
-    }
-    let waited = RunQueueDelay::now()?.seconds_since(before?);
-    Some((waited / (threads as f64 * seconds)).min(1.0))
-}
-
 /// Render that has reached the end of its error curve.
 pub struct Followed {
     pub points: Vec<Point>,
-    /// Share of the processors' time that other programs used meanwhile. `None` if unknown.
-    pub stolen: Option<f64>,
     pub render: SyncRender,
 }
 
@@ -64,7 +50,6 @@ pub struct Followed {
 /// picture. Returns the error of the system if a thread cannot be started.
 pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<Followed> {
     let mut render = variant.start()?;
-    let before = RunQueueDelay::now();
     let mut points: Vec<Point> = Vec::new();
     let mut last_estimate = f64::INFINITY;
     for step in 1.. {
@@ -94,16 +79,13 @@ pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<
             }
         }
     }
-    let stolen = stolen_share(before.as_ref(), variant.threads, render.seconds);
-    Ok(Followed { points, stolen, render })
+    Ok(Followed { points, render })
 }
 
 /// Renders with the settings of `variant` again, and adds the seconds to each point of its error
-/// curve. Returns the share of the processors' time that other programs used meanwhile, or `None`
-/// if unknown.
-pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
+/// curve.
+pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<()> {
     let mut render = variant.start()?;
-    let before = RunQueueDelay::now();
     let mut step = 0;
     for point in points {
         while step < point.step {
@@ -112,5 +94,5 @@ pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>
         }
         point.seconds.push(render.seconds);
     }
-    Ok(stolen_share(before.as_ref(), variant.threads, render.seconds))
+    Ok(())
 }

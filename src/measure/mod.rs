@@ -3,12 +3,10 @@
 //!
 //! Errors are exactly reproducible, because the random seed is fixed. Seconds are medians of
 //! repetitions. The repetitions of all settings are interleaved, so that a slow moment of the
-//! machine affects all of them alike. Repetitions in which other programs used the processors are
-//! left out.
+//! machine affects all of them alike.
 
 #![allow(missing_docs, reason = "fields and functions whose names say it")]
 
-mod contention;
 mod convergence_order;
 mod error_curve;
 mod experiment;
@@ -21,7 +19,5 @@ pub use convergence_order::Slope;
 pub use error_curve::Point;
 pub use experiment::{DEFAULT, EXPERIMENTS, Experiment, Plan, Variant};
 pub use reference_image::{Bias, Errors, Reference};
-pub use result::{
-    Expected, Measured, Measurement, Median, Steadiness, TimeToTarget, median, spread,
-};
+pub use result::{Expected, Measured, Measurement, Median, TimeToTarget, median, spread};
 pub use run::{Progress, measure};

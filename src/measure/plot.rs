@@ -78,8 +78,7 @@ fn grid(panels: usize) -> (i32, i32) {
 /// Returns the points (seconds, RMSE in 8-bit levels) of a variant's error curve at which both
 /// numbers are positive.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
-    let coordinates =
-        |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_levels);
+    let coordinates = |p: &crate::measure::Point| (median(&p.seconds), p.errors.rmse_levels);
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 

@@ -48,9 +48,6 @@ pub struct Measured {
     pub threads: usize,
     /// Error curve, in ascending order of sample count.
     pub points: Vec<Point>,
-    /// Share of the processors' time that other programs used in each repetition. `None` if
-    /// unknown.
-    pub stolen: Vec<Option<f64>>,
     /// Bias at the end of the error curve, for settings that change the expectation of the picture.
     pub bias: Option<Bias>,
 }
@@ -84,15 +81,8 @@ pub struct Steadiness {
     pub repetitions: usize,
     /// Largest relative spread of a reported time.
     pub spread: f64,
-    /// Largest share of the processors' time that other programs used. `None` if unknown.
-    pub stolen: Option<f64>,
 }
 
-/// Largest share of the processors' time that other programs use in an undisturbed repetition.
-const MAX_STOLEN: f64 = 0.05;
-/// Smallest number of repetitions from which a result is computed: the least disturbed ones, if
-/// fewer are undisturbed.
-const MIN_COUNTED: usize = 5;
 /// Largest relative uncertainty of a measured error by the error of the reference. Points with a
 /// larger one are ignored.
 const MAX_SPREAD: f64 = 0.05;
@@ -134,26 +124,6 @@ pub fn spread(values: &[f64]) -> f64 {
 }
 
 impl Measured {
-    /// Returns the repetitions that count: the undisturbed ones, at least [`MIN_COUNTED`] of the
-    /// least disturbed.
-    fn counted(&self) -> Vec<usize> {
-        let stolen = |i: &usize| self.stolen[*i].unwrap_or(0.0);
-        let mut all: Vec<usize> = (0..self.stolen.len()).collect();
-        all.sort_by(|a, b| stolen(a).total_cmp(&stolen(b)));
-        let undisturbed = all.iter().filter(|i| stolen(i) <= MAX_STOLEN).count();
-        all.truncate(undisturbed.max(MIN_COUNTED));
-        all
-    }
-
-    /// Returns the seconds of tracing until `point` in each repetition that counts.
-    pub fn seconds(&self, point: &Point) -> Vec<f64> {
-        self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
-    }
-
-    fn max_stolen(&self) -> Option<f64> {
-        self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
-    }
-
     /// Returns the time at which the true error fell to `levels` 8-bit levels, interpolated in
     /// log-log coordinates. Returns `None` if it stayed larger. Points with an uncertain error are
     /// ignored.
@@ -191,9 +161,8 @@ impl Measured {
             _ => (1.0, to),
         };
         let between = |a: f64, b: f64| a * (b / a).powf(weight);
-        let (seconds_from, seconds_to) = (self.seconds(from), self.seconds(to));
-        let seconds: Vec<f64> =
-            seconds_from.iter().zip(&seconds_to).map(|(a, b)| between(*a, *b)).collect();
+        let both = from.seconds.iter().zip(&to.seconds);
+        let seconds: Vec<f64> = both.map(|(a, b)| between(*a, *b)).collect();
         Some(TimeToTarget {
             levels,
             seconds: median(&seconds),
@@ -207,7 +176,7 @@ impl Measured {
     /// without points.
     pub fn samples_per_second(&self) -> Option<Median> {
         let last = self.points.last()?;
-        let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
+        let speeds: Vec<f64> = last.seconds.iter().map(|s| last.samples as f64 / s).collect();
         Some(Median { value: median(&speeds), spread: spread(&speeds) })
     }
 
@@ -224,7 +193,7 @@ impl Measured {
     /// infinite.
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
-        let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
+        let cost = last.errors.rmse_linear.powi(2) * median(&last.seconds);
         (cost > 0.0).then(|| 1.0 / cost)
     }
 }
@@ -233,15 +202,15 @@ impl Measurement {
     /// Returns how steady the measured times are: those of the default settings to each target, and
     /// those of all variants to the noise at which they are compared.
     pub fn steadiness(&self) -> Steadiness {
-        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
+        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0 };
         for (i, measured) in self.measured.iter().enumerate() {
             let targets = self.targets.iter().filter(|_| i == 0).copied();
             for levels in targets.chain([self.compared_at]) {
                 let Some(time_to) = measured.true_time_to(levels) else { continue };
                 all.spread = all.spread.max(time_to.spread);
-                all.repetitions = all.repetitions.min(measured.counted().len());
+                let repetitions = measured.points.first().map_or(0, |p| p.seconds.len());
+                all.repetitions = all.repetitions.min(repetitions);
             }
-            all.stolen = [all.stolen, measured.max_stolen()].into_iter().flatten().reduce(f64::max);
         }
         if all.repetitions == usize::MAX {
             all.repetitions = 0;
@@ -284,7 +253,6 @@ mod tests {
             name: String::new(),
             threads: 1,
             points: points.iter().enumerate().map(point).collect(),
-            stolen: vec![None; 3],
             bias: None,
         }
     }
@@ -336,23 +304,14 @@ mod tests {
         }
     }
 
-    /// Checks that disturbed repetitions of a render do not count. First, two of nine are
-    /// disturbed. Then all nine are disturbed: the five least disturbed ones count, and their
-    /// disturbance is reported.
     #[test]
-    fn disturbed_repetitions_do_not_count() {
+    fn steadiness_is_that_of_the_reported_times() {
         let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
         for point in &mut curve.points {
             let first = point.spp * 1e-3;
-            point.seconds = (0..9).map(|i| first * [1.0, 3.0, 1.0, 1.1][i % 4]).collect();
+            point.seconds = (0..9).map(|i| first * [1.0, 1.0, 1.0, 1.1][i % 4]).collect();
         }
-        curve.stolen = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
-        let target = curve.time_to(1.0).unwrap();
-        assert!(
-            (target.seconds - 0.064).abs() < 1e-12 && (target.spread - 0.05).abs() < 1e-9,
-            "{target:?}"
-        );
-        let mut measurement = Measurement {
+        let measurement = Measurement {
             size: [1, 1],
             reference_spp: 0.0,
             reference_levels: 0.0,
@@ -365,12 +324,8 @@ mod tests {
             measured: vec![curve],
         };
         let steady = measurement.steadiness();
-        assert_eq!((steady.repetitions, steady.stolen), (7, Some(0.01)));
-        measurement.measured[0].stolen = (0..9).map(|i| Some(0.1 + 0.1 * f64::from(i))).collect();
-        let steady = measurement.steadiness();
-        assert_eq!(steady.repetitions, 5);
-        assert!((steady.stolen.unwrap() - 0.5).abs() < 1e-12);
-        assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
+        assert_eq!(steady.repetitions, 9);
+        assert!((steady.spread - 0.05).abs() < 1e-9, "1 seven times, 1.1 twice: {steady:?}");
     }
 
     /// Checks that a measured error never counts as having reached a target if the reference

@@ -126,14 +126,13 @@ impl<'a> Course<'a> {
             let levels = if i == 0 { least } else { measurement.compared_at };
             let use_estimate = !variant.experiment.is_unbiased;
             let end = End { levels, seconds: longest, use_estimate };
-            let Followed { points, stolen, render } = follow(variant, reference, end)?;
+            let Followed { points, render } = follow(variant, reference, end)?;
             let bias = use_estimate.then(|| reference.bias(&render.state.film, &render.state.mix));
             let result = Measured {
                 experiment: variant.experiment,
                 name: variant.name.clone(),
                 threads: variant.threads,
                 points,
-                stolen: vec![stolen],
                 bias,
             };
             if i == 0 {
@@ -173,7 +172,7 @@ impl<'a> Course<'a> {
                 if !self.keep_going {
                     break;
                 }
-                result.stolen.push(repeat(variant, &mut result.points)?);
+                repeat(variant, &mut result.points)?;
             }
             round_seconds = self.started.elapsed().as_secs_f64() - passed;
             round += 1;
@@ -208,7 +207,7 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
 /// Returns `true` if the times to the noise `levels`, or else to the end of the curve, have a
 /// relative spread of at most [`STEADY`].
 fn is_steady(measured: &Measured, levels: f64) -> bool {
-    let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
+    let end = || measured.points.last().map_or(0.0, |p| spread(&p.seconds));
     measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY
 }
 
@@ -261,7 +260,6 @@ mod tests {
             name: String::new(),
             threads: 1,
             points: points.iter().map(point).collect(),
-            stolen: vec![None; 3],
             bias: None,
         }
     }

@@ -31,8 +31,8 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
     measured.points.iter().map(|p| Point {
         samples: p.samples,
         spp: p.spp,
-        seconds: median(&measured.seconds(p)),
-        seconds_spread: spread(&measured.seconds(p)),
+        seconds: median(&p.seconds),
+        seconds_spread: spread(&p.seconds),
         estimated_levels: p.estimated_levels,
         rmse_levels: p.errors.rmse_levels,
         rmse_levels_spread: p.errors.spread,
@@ -66,7 +66,6 @@ fn variation(measured: &Measured, targets: &[f64]) -> Value {
 
 pub fn json(report: &MeasureReport) -> String {
     let m = report.measurement;
-    let steadiness = m.steadiness();
     let document = json!({
         "scene": report.scene.display().to_string(),
         "version": env!("CARGO_PKG_VERSION"),
@@ -82,9 +81,7 @@ pub fn json(report: &MeasureReport) -> String {
         // Largest relative uncertainty of a measured error by the noise of the reference.
         "errors_spread": m.reference_uncertainty(),
         // Largest relative spread of a time over the repetitions of its render.
-        "times_spread": steadiness.spread,
-        // Largest fraction of the processors' time that other programs used. Null if unknown.
-        "taken_by_others": steadiness.stolen,
+        "times_spread": m.steadiness().spread,
         // Noise targets that were not reached, with ranges of extrapolated times.
         "expected": m.expected,
         "variations": m.measured.iter().map(|v| variation(v, &m.targets)).collect::<Vec<_>>(),

@@ -1,8 +1,6 @@
 //! Results of `zerkalo measure` as a text table.
 
-use crate::measure::{
-    DEFAULT, Experiment, Measured, Measurement, Median, Steadiness, TimeToTarget, median,
-};
+use crate::measure::{DEFAULT, Experiment, Measured, Measurement, Median, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
@@ -63,36 +61,6 @@ fn reached(target: &TimeToTarget) -> String {
 
 /// Spread of a time over repeated renders above which the table warns.
 const UNSTEADY: f64 = 0.1;
-/// Fraction of the processors' time of other programs above which the table warns.
-const STOLEN: f64 = 0.03;
-
-/// Returns a warning about unsteady times and other programs.
-fn caution(steadiness: &Steadiness) -> Option<String> {
-    let Steadiness { spread, stolen, .. } = steadiness;
-    let others = stolen.filter(|share| *share > STOLEN).map(|share| {
-        format!("other programs used up to {:.0} % of the processors meanwhile", 100.0 * share)
-    });
-    match (*spread > UNSTEADY, others) {
-        (false, None) => None,
-        (false, Some(others)) => {
-            Some(format!("These times are steady, but {others}: without them it is faster."))
-        }
-        (true, others) => {
-            let reason = others.unwrap_or_else(|| {
-                "there were too few runs, or the speed of the machine varies (a virtual machine, heat, \
-                 a battery)"
-                    .to_string()
-            });
-            Some(format!(
-                "Do not trust these times beyond their spread, up to {}: {reason}.\n\
-                 Measure again when the machine has nothing else to do, or longer (--seconds). Errors and\n\
-                 samples per pixel do not depend on that.",
-                percent(*spread)
-            ))
-        }
-    }
-}
-
 impl fmt::Display for MeasureReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
@@ -123,8 +91,15 @@ impl fmt::Display for MeasureReport<'_> {
             "Times are medians of {} runs or more, ± their spread.",
             steadiness.repetitions
         )?;
-        if let Some(warning) = caution(&steadiness) {
-            writeln!(f, "{warning}")?;
+        if steadiness.spread > UNSTEADY {
+            writeln!(
+                f,
+                "Do not trust these times beyond their spread, up to {}: there were too few runs, other programs \
+                 used the\nprocessors, or the speed of the machine varies (a virtual machine, heat, a battery).\n\
+                 Measure again when the machine has nothing else to do, or longer (--seconds). Errors and\n\
+                 samples per pixel do not depend on that.",
+                percent(steadiness.spread)
+            )?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
         self.times(f, default)?;
@@ -205,7 +180,7 @@ impl MeasureReport<'_> {
         let levels = self.measurement.compared_at;
         let default = self.measurement.measured[0].time_to(levels);
         let reached_at = measured.true_time_to(levels);
-        let followed = || measured.points.last().map_or(0.0, |p| median(&measured.seconds(p)));
+        let followed = || measured.points.last().map_or(0.0, |p| median(&p.seconds));
         let (time, speed) = match (&reached_at, &default) {
             (Some(target), Some(default)) => {
                 (reached(target), format!("{:.2}x", default.seconds / target.seconds))
@@ -239,18 +214,5 @@ mod tests {
             shown,
             ["1.23 ms", "35.1 ms", "1.00 s", "1.23 s", "12.3 s", "119 s", "10.0 min"]
         );
-    }
-
-    #[test]
-    fn unsteady_times_are_reported_with_the_reason() {
-        let warning = |spread, stolen| caution(&Steadiness { repetitions: 3, spread, stolen });
-        assert_eq!(warning(0.04, Some(0.01)), None);
-        assert_eq!(warning(0.1, None), None);
-        let words = warning(0.04, Some(0.5)).unwrap();
-        assert!(words.contains("50 %") && words.contains("steady"), "{words}");
-        let words = warning(0.18, Some(0.23)).unwrap();
-        assert!(words.contains("±18 %") && words.contains("other programs used up to 23 %"));
-        let words = warning(0.18, Some(0.0)).unwrap();
-        assert!(words.contains("±18 %") && !words.contains("other programs"), "{words}");
     }
 }
