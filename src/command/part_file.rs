@@ -38,7 +38,12 @@ impl FilmOutput {
     /// `header`.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
-            Self::Film(path) => write_film(path, film, header),
+            Self::Film(path) => {
+                let mut pieces = vec![header.encode()];
+                pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));
+                pieces.push(encode_end(film, &pieces));
+                write_film_file(path, &pieces, Existing::Replace)
+            }
             Self::Picture(output, depth) => output.write(header, *depth, &mut &*film),
         }
     }
@@ -48,8 +53,8 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Creates the header of the film of `state`, which holds the samples of `part`.
-pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
+/// Writes the film of `state`, which holds the samples of `part`. Returns the report on it.
+pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Report, WriteError> {
     let settings = &part.plan.settings;
     let provenance = Provenance {
         source: settings.source.clone(),
@@ -57,20 +62,14 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
         sampler: settings.sampler,
         adaptive: true,
     };
-    let mut header = film_header(state, report, &provenance);
+    let report = Report::of_film(&state.film, &state.mix, &settings.display);
+    let mut header = film_header(state, &report, &provenance);
     part.record(&mut header);
-    header
+    output.write(&state.film, &header).map(|()| report)
 }
 
 /// Formats sample counts and noise, such as `212 spp (32-900) noise 0.250 8-bit levels`.
 pub fn summary(report: &Report) -> String {
     let spp = &report.spp;
     format!("{:.0} spp ({}-{})  {}", spp.mean, spp.min, spp.max, noise(report))
-}
-
-pub fn write_film(path: &Path, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
-    let mut pieces = vec![header.encode()];
-    pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));
-    pieces.push(encode_end(film, &pieces));
-    write_film_file(path, &pieces, Existing::Replace)
 }

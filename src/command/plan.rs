@@ -1,7 +1,7 @@
 //! `zerkalo plan`: divides a render among shards.
 
 use crate::command::args::PlanArgs;
-use crate::command::part_file;
+use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::style;
 use crate::command::{Failure, print_line, read_scene_and_warn, warn_of_precision};
 use indicatif::ProgressBar;
@@ -13,7 +13,6 @@ use zerkalo_render::film::file::FilmReader;
 use zerkalo_render::film::{Estimator, Noise};
 use zerkalo_render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
 use zerkalo_render::schedule::{Settings, Stop, USUAL_SLOPE};
-use zerkalo_render::session::Report;
 use zerkalo_render::{Options, SyncRender};
 use zerkalo_scene::disk::{self, check_writable};
 
@@ -94,8 +93,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         shards: vec![PartShard { number: BASE, complete: true }],
         rays: schedule.rays,
     };
-    let report = Report::of_film(&state.film, &state.mix, &options.display);
-    part_file::write_film(&base_file, &state.film, &part_file::header(state, &part, &report))?;
+    let report = part_file::write(&FilmOutput::Film(base_file.clone()), state, &part)?;
     print_line(&format!(
         "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
         base_file.display(),

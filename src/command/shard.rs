@@ -18,6 +18,7 @@ use zerkalo_render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use zerkalo_render::session::Report;
 use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::Document;
+use zerkalo_scene::disk::WriteError;
 use zerkalo_terminal::Signals;
 use zerkalo_world::{self as world, Precision};
 
@@ -60,15 +61,11 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
     let signals = handle_signals()?;
-    let render =
+    let mut render =
         start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
-    let (render, signal) = trace(render, &mut part, &output, &signals)?;
+    let signal = trace(&mut render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
-    part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
-    part.rays = render.rays;
-    let state = &render.state;
-    let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
-    output.write(&state.film, &part_file::header(state, &part, &report))?;
+    let report = write(&render, &mut part, &output, !unfinished)?;
     let share = match unfinished {
         true => {
             format!("  {:.0} % of the samples (stopped by a signal)", 100.0 * render.progress())
@@ -184,37 +181,45 @@ fn start(
     Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
-/// Traces samples until the shards of `part` are complete or a signal arrives. Writes checkpoints
-/// to `output` if it is a film file.
+/// Traces samples until the shards of `part` are complete or a signal arrives, whose exit status it
+/// returns. Writes checkpoints to `output` if it is a film file.
 fn trace(
-    mut render: ShardRender,
+    render: &mut ShardRender,
     part: &mut Part,
     output: &FilmOutput,
     signals: &Signals,
-) -> Result<(ShardRender, Option<u8>), Failure> {
+) -> Result<Option<u8>, Failure> {
     let mut progress = Progress::on_stderr();
     let mut interval = FIRST_CHECKPOINT;
     let mut written = Instant::now();
     while render.step() {
         if let Some(status) = signals.caught() {
             progress.finish();
-            return Ok((render, Some(status)));
+            return Ok(Some(status));
         }
         progress.show(&render.report());
         if let FilmOutput::Film(_) = output
             && written.elapsed() >= interval
         {
             let start = Instant::now();
-            part.shards.iter_mut().for_each(|shard| shard.complete = false);
-            part.rays = render.rays;
-            let state = &render.state;
-            let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
-            output.write(&state.film, &part_file::header(state, part, &report))?;
+            write(render, part, output, false)?;
             interval =
                 (2 * interval).min(LONGEST_INTERVAL).max(WRITES_PER_INTERVAL * start.elapsed());
             written = Instant::now();
         }
     }
     progress.finish();
-    Ok((render, None))
+    Ok(None)
+}
+
+/// Writes the samples so far. Returns the report on them.
+fn write(
+    render: &ShardRender,
+    part: &mut Part,
+    output: &FilmOutput,
+    complete: bool,
+) -> Result<Report, WriteError> {
+    part.shards.iter_mut().for_each(|shard| shard.complete = complete);
+    part.rays = render.rays;
+    part_file::write(output, &render.state, part)
 }

@@ -324,7 +324,7 @@ fn finished_or_paused_session_stays_asleep() {
     resting(&session, generation);
     let idle_switches = switches_in(&session);
     session.set_stop(Stop::default());
-    session.pause();
+    session.set_paused(true);
     wait(&session, |s| s.report.state == State::Paused);
     assert_eq!((idle_switches, switches_in(&session)), (0, 0));
 }
@@ -379,8 +379,8 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
         let mut samples = 0;
         for _ in 0..20 {
             samples = session.with(|_, report| report.samples).unwrap().max(samples);
-            session.pause();
-            session.resume();
+            session.set_paused(true);
+            session.set_paused(false);
         }
         let report = resting(&session, generation).report;
         assert!(report.samples >= samples);

@@ -1,5 +1,6 @@
 //! Results of `zerkalo measure` as a text table.
 
+use crate::dashboard::text::number;
 use crate::measure::{DEFAULT, Experiment, Measured, Measurement, Median, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
@@ -32,21 +33,9 @@ impl MeasureReport<'_> {
 /// Formats seconds with three significant digits, such as `1.23 s` or `35.1 ms`.
 fn time(seconds: f64) -> String {
     match seconds {
-        s if s < 0.9995 => format!("{:.*} ms", digits(1e3 * s), 1e3 * s),
-        s if s < 120.0 => format!("{:.*} s", digits(s), s),
+        s if s < 0.9995 => format!("{} ms", number(1e3 * s)),
+        s if s < 120.0 => format!("{} s", number(s)),
         s => format!("{:.1} min", s / 60.0),
-    }
-}
-
-/// Returns the number of decimals, at most 2, with which a positive `value` has three significant
-/// digits.
-fn digits(value: f64) -> usize {
-    if value >= 99.95 {
-        0
-    } else if value >= 9.995 {
-        1
-    } else {
-        2
     }
 }
 

@@ -282,8 +282,7 @@ impl Dashboard {
         let is_silent = silent_at.is_some_and(|at| at <= now);
         let rests = is_silent || self.model.paused;
         if std::mem::replace(&mut self.resting, rests) != rests {
-            let session = &self.effects.session;
-            if rests { session.pause() } else { session.resume() }
+            self.effects.session.set_paused(rests);
         }
         silent_at.filter(|_| !is_silent)
     }

@@ -181,12 +181,8 @@ impl Session {
         Ok(())
     }
 
-    pub fn pause(&self) {
-        self.send(Command::Pause(true));
-    }
-
-    pub fn resume(&self) {
-        self.send(Command::Pause(false));
+    pub fn set_paused(&self, paused: bool) {
+        self.send(Command::Pause(paused));
     }
 
     /// Sets the contents of snapshots; initially neither picture nor probe.

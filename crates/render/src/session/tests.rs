@@ -166,7 +166,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
     let mut session = session(endless());
     session.set_scene(scene(256));
     wait_for(&session, |s| s.report.samples > 0);
-    session.pause();
+    session.set_paused(true);
     let paused = wait_for(&session, |s| s.report.state == State::Paused);
     // The target is the next multiple of 64 above the number of samples per pixel at the pause.
     // This number depends on the load of the machine.
@@ -175,7 +175,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
     std::thread::sleep(Duration::from_millis(30));
     // A task on the film runs during a pause.
     assert_eq!(session.with(|_, report| report.samples), Some(paused.report.samples));
-    session.resume();
+    session.set_paused(false);
     let end = wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
     assert_eq!(end.report.state, State::Finished(StoppedBy::Spp));
     assert_eq!(end.report.spp, Spp { min: spp, mean: f64::from(spp), max: spp });
@@ -187,7 +187,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
 #[test]
 fn paused_session_publishes_the_first_picture_of_a_new_scene() {
     let mut session = session(endless());
-    session.pause();
+    session.set_paused(true);
     let generation = session.set_scene(scene(64));
     let first = wait_for(&session, |s| s.report.state == State::Paused);
     assert_eq!(first.report.generation, generation);

@@ -84,27 +84,22 @@ impl<R: Read> FilmReader<R> {
         checksums.update(&VERSION.to_le_bytes());
         let mut next = input.chunk()?;
         let mut chunks = BTreeMap::new();
-        let mut head = None;
-        let mut metadata = None;
         while ![TILES, DONE].contains(&next.tag) {
             checksums.update(&next.tag);
             checksums.update(&(next.contents.len() as u64).to_le_bytes());
             checksums.update(&next.contents);
             checksums.update(&next.checksum);
-            let twice = match next.tag {
-                HEAD => head.replace(next.contents).is_some(),
-                META => metadata.replace(next.contents).is_some(),
-                tag => chunks.insert(tag, next.contents).is_some(),
-            };
-            if twice {
+            if chunks.insert(next.tag, next.contents).is_some() {
                 return Err(input.damaged("a part of it occurs twice"));
             }
             next = input.chunk()?;
         }
-        let mut header = head
+        let mut header = chunks
+            .remove(&HEAD)
             .and_then(|head| decode_head(&mut Fields::new(&head), length))
             .ok_or_else(|| input.damaged("its header has invalid values"))?;
-        header.metadata = metadata
+        header.metadata = chunks
+            .remove(&META)
             .and_then(|metadata| decode_metadata(&mut Fields::new(&metadata)))
             .ok_or_else(|| input.damaged("its metadata are not readable"))?;
         header.chunks = chunks;
