@@ -308,13 +308,13 @@ impl Film {
     /// Returns the invalid samples since the last restart.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
-        self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
+        self.touched().for_each(|(_, tile)| all.merge(&tile.bad));
         all
     }
 
-    /// Returns the number of saturated samples, see [`Tile::saturated_samples`].
+    /// Returns the number of saturated samples, see `Tile::saturated_samples`.
     pub fn saturated_samples(&self) -> u64 {
-        self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
+        self.touched().map(|(_, tile)| tile.saturated_samples).sum()
     }
 
     /// Returns the number of saturated pixels, see [`Tile::saturated_pixels`].
@@ -332,7 +332,7 @@ impl Film {
         for (index, theirs) in other.touched() {
             let ours = &mut self.tiles[index];
             ours.clear_if_stale(self.epoch);
-            ours.add_tile(theirs).map_err(|()| overlap(index))?;
+            ours.add_tile(theirs);
         }
         Ok(())
     }
@@ -345,13 +345,13 @@ impl Film {
     }
 
     /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index`.
-    pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), String> {
+    pub(super) fn add_at(&mut self, index: usize, tile: Tile) {
         let ours = &mut self.tiles[index];
-        if !ours.is_of(self.epoch) {
+        if ours.is_of(self.epoch) {
+            ours.add_tile(&tile);
+        } else {
             *ours = tile;
-            return Ok(());
         }
-        ours.add_tile(&tile).map_err(|()| overlap(index))
     }
 
     /// Checks that a film with the properties `theirs` can be added to this film.
@@ -383,15 +383,13 @@ impl Film {
         let both = other.touched().find(|(index, theirs)| {
             is_partial(theirs) && self.tile(*index).is_some_and(is_partial)
         });
-        both.map_or(Ok(()), |(index, _)| Err(overlap(index)))
+        both.map_or(Ok(()), |(index, _)| {
+            Err(format!(
+                "these films cannot be added: both hold the first sample of tile {index}; \
+                 only films of disjoint sample ranges can"
+            ))
+        })
     }
-}
-
-fn overlap(tile: usize) -> String {
-    format!(
-        "these films cannot be added: both hold the first sample of tile {tile}; \
-         only films of disjoint sample ranges can"
-    )
 }
 
 #[cfg(test)]
@@ -495,7 +493,8 @@ mod tests {
             film
         };
         let mut ours = lattice();
-        assert_eq!(ours.add(&lattice()), Err(overlap(0)));
+        let error = ours.add(&lattice()).unwrap_err();
+        assert!(error.contains("both hold the first sample of tile 0"), "{error}");
         let mut others = film(16, 16, &[1.0]);
         fill(&mut others, 4, |_, _, _| vec![4.0; 3]);
         others.add(&ours).unwrap();

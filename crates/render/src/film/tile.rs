@@ -29,12 +29,14 @@ pub struct Tile {
     /// Number of integer sums of a pixel and replicate: `groups * 3`.
     stride: usize,
     extent: [usize; 2],
-    counts: [u32; 2],
+    pub(super) counts: [u32; 2],
     lattice_px: u8,
     /// `true` if an integer sum has reached `i64::MAX`.
-    full: bool,
-    saturated_samples: u64,
-    bad: InvalidSamples,
+    pub(super) full: bool,
+    /// Number of samples above the largest value that the film can store, to which they were
+    /// clamped.
+    pub(super) saturated_samples: u64,
+    pub(super) bad: InvalidSamples,
     /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
     /// Bits of the pixels written since the film's last restart: bit `p % 64` of `[replicate][p /
@@ -220,45 +222,15 @@ impl Tile {
         self.saturated_samples += samples;
     }
 
-    /// Returns the number of saturated samples: above the largest value that the film can store, to
-    /// which they were clamped.
-    pub fn saturated_samples(&self) -> u64 {
-        self.saturated_samples
-    }
-
     /// Records an invalid sample, in whose place the caller adds black.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    /// Sets the tile's counters to the values in a film file. `full`: a sum has reached `i64::MAX`.
-    pub(super) fn restore(
-        &mut self,
-        counts: [u32; 2],
-        saturated_samples: u64,
-        bad: InvalidSamples,
-        full: bool,
-    ) {
-        self.counts = counts;
-        self.saturated_samples = saturated_samples;
-        self.bad = bad;
-        self.full = full;
-    }
-
-    pub(super) fn bad(&self) -> &InvalidSamples {
-        &self.bad
-    }
-
-    /// Adds the samples of `other`, a tile at the same position of another film.
-    ///
-    /// # Errors
-    ///
-    /// Fails if both tiles hold the first sample of only a part of their pixels.
-    pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
-        if self.lattice_px != 0 && other.lattice_px != 0 {
-            return Err(());
-        }
+    /// Adds the samples of `other`, a tile at the same position of another film. Not both may hold
+    /// the first sample of only a part of their pixels.
+    pub(super) fn add_tile(&mut self, other: &Self) {
         for (replicate, pixel) in other.written() {
             self.add(replicate, pixel, other.pixel(replicate, pixel));
         }
@@ -269,7 +241,6 @@ impl Tile {
             self.advance(replicate, other.counts[replicate]);
         }
         self.bad.merge(&other.bad);
-        Ok(())
     }
 }
 
@@ -359,10 +330,10 @@ mod tests {
         tile.record_saturated(3);
         tile.clear_if_stale(1);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
-        assert_eq!(tile.saturated_samples(), 3);
+        assert_eq!(tile.saturated_samples, 3);
         tile.clear_if_stale(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
-        assert_eq!(tile.saturated_samples(), 0);
+        assert_eq!(tile.saturated_samples, 0);
         // The first access to the cleared tile is a write. Below, tiles with 1 and 3 groups reuse
         // memory of a tile with another number of groups.
         tile.add(0, 0, &[2; 6]);

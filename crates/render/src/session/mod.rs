@@ -100,8 +100,8 @@ impl Session {
         })
     }
 
-    /// Starts a thread that shows the sum of `films`. It calls `on_report` with each report that
-    /// differs from the previous one. Returns an error for the user if a thread cannot be started.
+    /// Starts a thread that shows the sum of `films`. It calls `on_report` each time it has
+    /// checked their files. Returns an error for the user if a thread cannot be started.
     pub fn watch(
         films: WatchedFilms,
         threads: usize,

@@ -24,8 +24,7 @@ const REST: u32 = 2;
 /// file; before the first film they are those of the plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchReport {
-    /// Rows of [`WatchedFilms::shards`], with ages in whole seconds below a minute, and else in
-    /// whole minutes.
+    /// Rows of [`WatchedFilms::shards`].
     pub shards: Vec<WatchedShards>,
     /// Value of [`WatchedFilms::complete_shards`].
     pub complete: Option<[usize; 2]>,
@@ -50,8 +49,6 @@ pub(super) struct Watcher {
     /// `None` without a film.
     shown: Option<Shown>,
     downsample: Option<IncrementalDownsample>,
-    /// Latest report that was sent to the client.
-    reported: Option<WatchReport>,
 }
 
 /// Header, report and noise estimates of the sum of all films, under the present display transform.
@@ -63,7 +60,7 @@ struct Shown {
 
 impl Watcher {
     pub fn new(films: WatchedFilms, context: WorkContext) -> Self {
-        Self { films, context, display: None, shown: None, downsample: None, reported: None }
+        Self { films, context, display: None, shown: None, downsample: None }
     }
 
     pub fn run(mut self, inbox: &Receiver<Command>, on_report: &dyn Fn(WatchReport)) {
@@ -99,7 +96,7 @@ impl Watcher {
                         self.estimate();
                         changed = true;
                     }
-                    self.report(on_report);
+                    on_report(WatchReport::new(&self.films));
                     due = Instant::now() + POLL.max(REST * start.elapsed());
                 }
             }
@@ -151,25 +148,10 @@ impl Watcher {
         let (downsample, pool) = (&mut self.downsample, &self.context.pool);
         self.context.put(frame.snapshot(film, tiles, report.clone(), downsample, pool));
     }
-
-    /// Sends a report to the client if it differs from the latest one.
-    fn report(&mut self, on_report: &dyn Fn(WatchReport)) {
-        let report = WatchReport::new(&self.films);
-        if self.reported.as_ref() != Some(&report) {
-            on_report(report.clone());
-            self.reported = Some(report);
-        }
-    }
 }
 
 impl WatchReport {
     fn new(films: &WatchedFilms) -> Self {
-        let mut shards = films.shards(SystemTime::now());
-        for age in shards.iter_mut().filter_map(|row| row.age.as_mut()) {
-            let seconds = age.as_secs();
-            let unit = if seconds < 60 { 1 } else { 60 };
-            *age = Duration::from_secs(seconds / unit * unit);
-        }
         let settings = films.plan.as_ref().map(|plan| &plan.settings);
         let (size, display, source) = match (&films.sum, settings) {
             (Some((header, _)), _) => {
@@ -180,7 +162,7 @@ impl WatchReport {
             (None, None) => (None, Display::default(), ""),
         };
         Self {
-            shards,
+            shards: films.shards(SystemTime::now()),
             complete: films.complete_shards(),
             progress: films.progress(),
             target_levels: settings.map(|plan| plan.noise_levels),

@@ -126,7 +126,7 @@ impl<R: Read> FilmReader<R> {
                 }
                 let mut tile = film.new_tile(index);
                 tile_record::decode(&mut tile, groups, fields)?;
-                film.add_at(index, tile).ok()?;
+                film.add_at(index, tile);
             }
             fields.is_empty().then_some(())
         })

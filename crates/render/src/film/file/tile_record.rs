@@ -17,8 +17,8 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
         return out.extend([0; 8]);
     };
     tile.counts().iter().for_each(|count| out.extend(count.to_le_bytes()));
-    out.extend(tile.saturated_samples().to_le_bytes());
-    let bad = tile.bad();
+    out.extend(tile.saturated_samples.to_le_bytes());
+    let bad = &tile.bad;
     out.extend(bad.count.to_le_bytes());
     out.push(bad.first.len() as u8);
     for sample in &bad.first {
@@ -58,16 +58,15 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
 
 /// Reads a record into `tile`, which must be empty. `None` if it is invalid.
 pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
-    let counts = [fields.u32()?, fields.u32()?];
-    let saturated_samples = fields.u64()?;
-    let bad = InvalidSamples { count: fields.u64()?, first: invalid_samples(fields)? };
-    if bad.count < bad.first.len() as u64 {
+    tile.counts = [fields.u32()?, fields.u32()?];
+    tile.saturated_samples = fields.u64()?;
+    tile.bad = InvalidSamples { count: fields.u64()?, first: invalid_samples(fields)? };
+    if tile.bad.count < tile.bad.first.len() as u64 {
         return None;
     }
     let extent = tile.extent();
     let pixels = extent[0] * extent[1];
-    let mut full = false;
-    for (replicate, count) in counts.into_iter().enumerate() {
+    for (replicate, count) in tile.counts.into_iter().enumerate() {
         let limit = (u64::from(count).saturating_mul(LARGEST_SAMPLE)).min(i64::MAX as u64);
         for i in 0..3 * groups {
             let bytes = usize::from(fields.u8()?);
@@ -93,12 +92,11 @@ pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Opt
                 if sum > limit {
                     return None;
                 }
-                full |= sum == i64::MAX as u64;
+                tile.full |= sum == i64::MAX as u64;
                 tile.pixel_mut(replicate, pixel)[i] = sum as i64;
             }
         }
     }
-    tile.restore(counts, saturated_samples, bad, full);
     Some(())
 }
 
