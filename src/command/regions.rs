@@ -46,7 +46,7 @@ impl Division {
             Some(regions) => Self { merge_lights: false, regions },
             None => Self {
                 merge_lights: merged < groups,
-                regions: divided(merged).map_err(too_little(cap, limit))?,
+                regions: divided(merged).map_err(|least| too_little(least, cap, limit))?,
             },
         };
         if separate.is_none() && (args.checkpoint.is_some() || args.resume.is_some()) {
@@ -91,24 +91,20 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns the constructor of the error for the least number of bytes with which the picture can be
-/// rendered.
-fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
-    move |least| {
-        // The resident memory differs by up to a megabyte from run to run.
-        let least = (least + 1_000_000).div_ceil(1_000_000);
-        let expected = match limit {
-            OPTION => format!("expected at least {OPTION} {least}MB"),
-            _ => "expected that much memory, or a smaller scene".to_string(),
-        };
-        Failure::Failed(format!(
-            "{limit} allows {}, but the scene and a region of the least size need {least} MB; {expected}",
-            small(cap),
-        ))
-    }
-}
-
-/// Formats bytes in kilobytes below 1 MB, otherwise as [`megabytes`] does.
-fn small(bytes: u64) -> String {
-    if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
+/// Returns the error for `least`, the least number of bytes with which the picture can be rendered.
+fn too_little(least: u64, cap: u64, limit: &'static str) -> Failure {
+    // The resident memory differs by up to a megabyte from run to run.
+    let least = (least + 1_000_000).div_ceil(1_000_000);
+    let expected = match limit {
+        OPTION => format!("expected at least {OPTION} {least}MB"),
+        _ => "expected that much memory, or a smaller scene".to_string(),
+    };
+    let allowed = match cap {
+        0..1_000_000 => format!("{} KB", cap / 1000),
+        _ => megabytes(cap),
+    };
+    Failure::Failed(format!(
+        "{limit} allows {allowed}, but the scene and a region of the least size need {least} MB; \
+         {expected}"
+    ))
 }

@@ -71,10 +71,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     if let Some(Err(error)) = rendered.kept {
         return Err(error.into());
     }
-    match end {
-        End::Done(_) => Ok(()),
-        End::Signal(status) => Err(Failure::Signalled(status)),
-    }
+    end.map(drop).map_err(Failure::Signalled)
 }
 
 /// Inputs of a render to a picture file.
@@ -87,6 +84,9 @@ struct Job<'a> {
     signals: Signals,
     started: Instant,
 }
+
+/// Stop criterion that ended a render, or the exit status of the signal that did.
+pub type End = Result<StoppedBy, u8>;
 
 /// Results of a render whose picture has been written.
 pub struct Rendered {
@@ -158,7 +158,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
         (Ok((report, stopped_by, precision, biased)), _) => {
             let traced = report.seconds + report.compile_seconds;
             let write_seconds = (started.elapsed() - set_after).as_secs_f64() - traced;
-            let end = End::Done(stopped_by);
+            let end = Ok(stopped_by);
             Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
         }
         (Err(_), Some(status)) => {
@@ -172,14 +172,6 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     }
 }
 
-/// Reason for the end of a render.
-#[derive(Clone, Copy)]
-pub enum End {
-    Done(StoppedBy),
-    /// Signal with this exit status.
-    Signal(u8),
-}
-
 /// Shows the progress of the render until it ends.
 fn watch(
     session: &Session,
@@ -189,14 +181,14 @@ fn watch(
     let mut progress = Progress::on_stderr();
     let end = loop {
         if let Some(status) = signals.caught() {
-            break Ok(End::Signal(status));
+            break Ok(Err(status));
         }
         if let Some(checkpoints) = &mut checkpoints {
             checkpoints.poll(session);
         }
         let Some(snapshot) = session.wait(POLL) else { continue };
         match &snapshot.report.state {
-            State::Finished(reason) => break Ok(End::Done(*reason)),
+            State::Finished(reason) => break Ok(Ok(*reason)),
             State::Failed(reason) => break Err(Failure::Failed(reason.clone())),
             State::Idle | State::Tracing | State::Paused => progress.show(&snapshot.report),
         }
@@ -283,9 +275,9 @@ fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
     let mut text = format!("{path}  {width}x{height}  {counts}  {noise}  {seconds:.2} s");
     report.warnings().iter().for_each(|warning| text += &format!("  {warning}"));
     match end {
-        End::Signal(_) => text += "  (stopped by a signal: the picture so far)",
-        End::Done(StoppedBy::RaysPerPixel) => text += "  (the cap on rays per pixel is reached)",
-        End::Done(_) => {}
+        Err(_) => text += "  (stopped by a signal: the picture so far)",
+        Ok(StoppedBy::RaysPerPixel) => text += "  (the cap on rays per pixel is reached)",
+        Ok(_) => {}
     }
     text
 }

@@ -1,9 +1,10 @@
 //! Statistics of a render as JSON, written for `--stats`.
 
 use crate::command::args::RenderArgs;
-use crate::command::render::{End, Rendered};
+use crate::command::render::Rendered;
 use serde_json::json;
 use std::time::Duration;
+use zerkalo_render::schedule::StoppedBy;
 use zerkalo_scene::process_memory::resident_memory;
 
 /// Returns the contents of the file. Scripts rely on the keys.
@@ -54,10 +55,7 @@ pub fn json(
         "biased": rendered.biased,
         // Null if the system does not report it.
         "peak_rss_bytes": resident_memory().map(|resident| resident.peak),
-        "stopped_by": match rendered.end {
-            End::Done(reason) => reason.name(),
-            End::Signal(_) => "signal",
-        },
+        "stopped_by": rendered.end.map_or("signal", StoppedBy::name),
     });
     format!("{stats:#}\n")
 }

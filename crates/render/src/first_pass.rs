@@ -7,24 +7,7 @@ use crate::wave::{JobReport, Wave, WaveReport};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 use zerkalo_kernel::lanes::SimdFloat;
-use zerkalo_world::{AnyWorld, Counts, TileTracer, World};
-
-/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A: first every 8th
-/// pixel in x and y, then in three stages the pixels between, with steps of 4, 2 and 1. Calls
-/// `on_stage` with the film after every stage except the last. A cancelled pass completes its first
-/// stage, starts no jobs of later ones, and returns `None`.
-pub fn run(
-    world: &AnyWorld,
-    film: &mut Film,
-    wave: &Wave,
-    context: PassContext,
-    on_stage: &mut dyn FnMut(&Film),
-) -> Option<WaveReport> {
-    match world {
-        AnyWorld::Single(world) => trace_first_pass(world, film, wave, context, on_stage),
-        AnyWorld::Double(world) => trace_first_pass(world, film, wave, context, on_stage),
-    }
-}
+use zerkalo_world::{Counts, TileTracer, World};
 
 /// Number of adjacent tiles that share packets in stages with few pixels for each tile.
 const STRIP_TILES: usize = 8;
@@ -32,7 +15,11 @@ const STRIP_TILES: usize = 8;
 /// Largest step \[pixels\] of a stage in which one tile has enough pixels to fill packets.
 const SHARED_ABOVE: usize = 2;
 
-fn trace_first_pass<L: SimdFloat>(
+/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A: first every 8th
+/// pixel in x and y, then in three stages the pixels between, with steps of 4, 2 and 1. Calls
+/// `on_stage` with the film after every stage except the last. A cancelled pass completes its first
+/// stage, starts no jobs of later ones, and returns `None`.
+pub fn run<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
     wave: &Wave,

@@ -175,7 +175,11 @@ impl RenderState {
         on_refined: &mut dyn FnMut(&Film),
     ) -> Option<WaveReport> {
         let context = PassContext { sampling: &self.sampling, pool, cancel: cancel_first_pass };
-        first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
+        let film = &mut self.film;
+        match &self.world {
+            AnyWorld::Single(world) => first_pass::run(world, film, wave, context, on_refined),
+            AnyWorld::Double(world) => first_pass::run(world, film, wave, context, on_refined),
+        }
     }
 
     /// Traces a wave. Once `cancel_wave` is `true`, no further job starts.

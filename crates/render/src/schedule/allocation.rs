@@ -12,7 +12,7 @@
 //! gets only a few too many.
 
 use crate::film::TILE_PIXELS;
-use crate::schedule::tile::Tile;
+use crate::schedule::tile::{FLATTEST, Tile};
 use crate::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::wave::Job;
 use std::cmp::Ordering;
@@ -200,7 +200,8 @@ impl Schedule {
     /// [`Schedule::min_samples`].
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
-        let models = self.tile_models([self.pooled_slope(false), self.pooled_slope(true)]);
+        let pooled = [false, true].map(|glossy| self.fitted_slope(glossy).unwrap_or(FLATTEST));
+        let models = self.tile_models(pooled);
         let expected = self.calibrated(&models);
 
         let mut allocation = Allocation::new(self);

@@ -57,13 +57,7 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Returns the slope p of the fit RMSE ~ rays^-p; 0.5, that of independent samples, before
-    /// there are two points.
-    pub fn slope(&self) -> f64 {
-        self.fitted_slope().unwrap_or(0.5)
-    }
-
-    /// Returns the slope through the first and the last point. Returns `None` before there are two
+    /// Returns the slope p of the fit RMSE ~ rays^-p, through the first and the last point. Returns `None` before there are two
     /// points.
     pub fn fitted_slope(&self) -> Option<f64> {
         let (r0, n0) = *self.points.first()?;

@@ -25,7 +25,7 @@ use crate::wave::{Job, Wave, WaveReport};
 use convergence_fit::ConvergenceFit;
 pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
-use tile::{Tile, clamp_slope};
+use tile::{FLATTEST, Tile, clamp_slope};
 
 /// Samples per pixel and replicate before adaptive sampling and noise estimates start. Estimates
 /// from fewer samples are unreliable and take as long as tracing. With 16, tiles without noise
@@ -319,7 +319,8 @@ impl Schedule {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };
         let noise = self.pooled(criterion, |_| true);
-        let factor = (noise / target).powf(1.0 / self.convergence.slope());
+        let factor =
+            (noise / target).powf(1.0 / self.convergence.fitted_slope().unwrap_or(FLATTEST));
         let half_way = (0.5 * f64::from(done) * (factor - 1.0).clamp(0.0, 2.0)) as u32;
         if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
     }
@@ -330,12 +331,6 @@ impl Schedule {
             .map(|(t, tile)| Job { tile, first: t.done, count: count(t) })
             .filter(|job| job.count > 0)
             .collect()
-    }
-
-    /// Returns the pooled slope of all glossy tiles, or of all other tiles; 0.5 if it cannot be
-    /// fitted.
-    fn pooled_slope(&self, glossy: bool) -> f64 {
-        self.fitted_slope(glossy).unwrap_or(0.5)
     }
 
     /// Returns the slope over the latest doubling of the samples of all glossy tiles, or of all
