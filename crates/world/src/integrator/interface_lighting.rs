@@ -20,7 +20,7 @@ use zerkalo_scene::material::{BsdfValue, InterfaceQuery};
 /// Hits of a packet on rough interfaces between transparent media.
 pub(crate) struct RoughInterface<'a, L: SimdFloat> {
     pub hit: &'a InterfaceHit<L>,
-    pub query: InterfaceQuery<L>,
+    pub query: &'a InterfaceQuery<L>,
     /// Lanes whose reflected light is found by both strategies.
     pub reflecting: L::Mask,
     /// Lanes whose transmitted light is found by both strategies.
@@ -39,10 +39,16 @@ struct Side<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> RoughInterface<'a, L> {
-    /// Selects the rough interfaces out of `hit`. Surfaces that coincide with another one, in the
+    /// Selects the rough interfaces out of `hit`, whose query is `query`. Surfaces that coincide with another one, in the
     /// lanes of `coincident`, are left out, because their transmitted rays start on the other
     /// surface.
-    pub fn new(vertex: &Vertex<'_, L>, hit: &'a InterfaceHit<L>, coincident: L::Mask) -> Self {
+    #[inline(always)]
+    pub fn new(
+        vertex: &Vertex<'_, L>,
+        hit: &'a InterfaceHit<L>,
+        query: &'a InterfaceQuery<L>,
+        coincident: L::Mask,
+    ) -> Self {
         let (world, interaction) = (vertex.world, vertex.interaction);
         let mut rough = L::mask(false);
         // If shadows are off, emitters also light points that cannot see them. Reflected rays do
@@ -56,7 +62,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         }
         let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
         let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
-        Self { hit, query: hit.query(vertex), reflecting, transmitting }
+        Self { hit, query, reflecting, transmitting }
     }
 
     /// Returns the value of the interfaces for light from `direction`, and the density with which
@@ -70,7 +76,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         let wanted = if behind { self.transmitting } else { self.reflecting };
         for (index, lanes) in interaction.bsdfs(wanted) {
             let bsdf = &world.bsdfs[index];
-            let eval = |direction| bsdf.eval_interface(&self.query, direction, L::mask(behind));
+            let eval = |direction| bsdf.eval_interface(self.query, direction, L::mask(behind));
             let mut lobe = eval(*direction);
             if world.smooth {
                 // Sampled rays on the wrong side of the geometric surface are mirrored to the right

@@ -159,7 +159,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             return branch.lanes.any();
         };
         let coincident_lanes = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
-        let rough = RoughInterface::new(&vertex, interface_hit, coincident_lanes);
+        let query = interface_hit.query(&vertex);
+        let rough = RoughInterface::new(&vertex, interface_hit, &query, coincident_lanes);
         if rough.reflecting.any() {
             vertex.interface_lighting(&rough, self.nested_dielectrics);
         }

@@ -124,6 +124,11 @@ impl<L: SimdFloat> Vertex<'_, L> {
             return (L::zero(), L::zero());
         }
         self.out.counts.glossy = true;
-        *numbers.get_or_insert_with(|| self.sampler.lobe_2d(self.bounce))
+        let shared = numbers.unwrap_or_else(
+            #[inline(always)]
+            || self.sampler.lobe_2d(self.bounce),
+        );
+        *numbers = Some(shared);
+        shared
     }
 }
