@@ -117,11 +117,7 @@ pub enum Command {
         file: PathBuf,
     },
     /// Report the capabilities of the terminal and of the connection, and how to improve them
-    Doctor {
-        /// Measure the rate of the connection as well, which takes a few seconds
-        #[arg(long)]
-        rate: bool,
-    },
+    Doctor,
 }
 
 /// Arguments of `zerkalo render`.

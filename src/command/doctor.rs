@@ -8,7 +8,7 @@ use std::env;
 use std::io::{self, IsTerminal};
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
-use zerkalo_terminal::flow::{DEFAULT_RATE, PacingMode};
+use zerkalo_terminal::flow::PacingMode;
 use zerkalo_terminal::image::Protocol;
 use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
 
@@ -17,7 +17,7 @@ const COLUMNS: usize = 80;
 /// Width of the names at the start of lines.
 const NAME: usize = 17;
 
-pub fn run(rate_requested: bool) -> Result<(), Failure> {
+pub fn run() -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let environment = Environment::of(variable);
     let obstacle = if environment.term == "dumb" {
@@ -29,13 +29,12 @@ pub fn run(rate_requested: bool) -> Result<(), Failure> {
     };
     let diagnosis = match obstacle {
         Some(reason) => Err(reason),
-        None => Ok(diagnose(environment.clone(), rate_requested)
+        None => Ok(diagnose(environment.clone())
             .map_err(|error| format!("the terminal cannot be used: {error}"))?),
     };
     let report = DoctorReport {
         environment,
         diagnosis,
-        rate_requested,
         locale: ["LC_ALL", "LC_CTYPE", "LANG"]
             .into_iter()
             .find_map(|name| variable(name).map(|value| (name, value))),
@@ -48,7 +47,6 @@ struct DoctorReport {
     environment: Environment,
     /// Reply of the terminal, or the reason why it was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
-    rate_requested: bool,
     /// Environment variable that sets the character encoding, and its value.
     locale: Option<(&'static str, String)>,
 }
@@ -60,14 +58,13 @@ impl DoctorReport {
         lines.push(row("terminal", &self.terminal()));
         lines.push(row("multiplexer", &self.multiplexer()));
         lines.push(row("colours", &self.colors()));
-        if let Ok(TerminalReport { terminal, mode, cells, rate }) = &self.diagnosis {
+        if let Ok(TerminalReport { terminal, mode, cells }) = &self.diagnosis {
             lines.push(row("background", &background(terminal)));
             lines.push(row("size", &size(*cells, terminal.cell_px)));
             lines.push(row("whole frames", whole_frames(terminal)));
             lines.push(row("still pictures", &stills(terminal)));
             lines.push(row("acknowledgement", acknowledgement(*mode)));
             lines.push(row("round trip", &round_trip(terminal)));
-            lines.push(row("rate", &self.rate(*mode, *rate)));
         }
         lines.push(row("connection", &self.connection()));
         lines.push(row("text", &self.text()));
@@ -154,18 +151,6 @@ impl DoctorReport {
                 let client = variable.split_whitespace().next().unwrap_or_default();
                 format!("SSH from {}", sanitized(client))
             }
-        }
-    }
-
-    fn rate(&self, mode: PacingMode, rate: Option<f64>) -> String {
-        let kilobytes = |rate: f64| format!("{:.0} KB/s", 1e-3 * rate);
-        match (rate, self.rate_requested) {
-            (Some(rate), _) => format!("{}, measured", kilobytes(rate)),
-            (None, true) => "cannot be measured: the terminal does not reply".to_string(),
-            (None, false) if mode == PacingMode::FixedRate => {
-                format!("{}, fixed; doctor --rate measures", kilobytes(DEFAULT_RATE))
-            }
-            (None, false) => "not measured; doctor --rate measures".to_string(),
         }
     }
 
@@ -281,12 +266,10 @@ mod tests {
             variable.map(|(_, value)| value.to_string())
         });
         let terminal = Capabilities::from_environment(environment.clone());
-        let diagnosis =
-            TerminalReport { terminal, mode: PacingMode::Unlimited, cells: [120, 36], rate: None };
+        let diagnosis = TerminalReport { terminal, mode: PacingMode::Unlimited, cells: [120, 36] };
         DoctorReport {
             environment,
             diagnosis: if queried { Ok(diagnosis) } else { Err("stdin or stdout is no terminal") },
-            rate_requested: false,
             locale: Some(("LANG", "en_US.UTF-8".into())),
         }
     }
@@ -309,7 +292,6 @@ mod tests {
     fn full_featured_local_terminal_gets_no_hints() {
         let mut report = report(&[("TERM", "xterm-kitty"), ("COLORTERM", "truecolor")], true);
         let diagnosis = diagnosis(&mut report);
-        diagnosis.rate = Some(2.5e6);
         let terminal = &mut diagnosis.terminal;
         terminal.version = Some("kitty(0.40.1)".into());
         terminal.kitty_graphics = true;
@@ -326,7 +308,6 @@ mod tests {
             "crisp, by kitty's protocol\n",
             "UTF-8: LANG=",
             "1.2 ms",
-            "2500 KB/s, measured",
         ];
         check(&report, &present, &["hints", "ssh -C", "unknown"]);
     }
@@ -346,7 +327,7 @@ mod tests {
         let present = [
             "SSH from 192.0.2.7",
             "tmux, which passes no queries through",
-            "30 KB/s, fixed",
+            "at a fixed rate",
             "ssh -C",
             "SendEnv COLORTERM",
             "AcceptEnv COLORTERM",

@@ -71,7 +71,7 @@ pub fn main() -> ExitCode {
         Some(Command::Check { scene }) => check::run(scene),
         Some(Command::Info(args)) => info::run(args),
         Some(Command::New { file }) => new::run(file),
-        Some(Command::Doctor { rate }) => doctor::run(*rate),
+        Some(Command::Doctor) => doctor::run(),
         None => edit::run(&cli.edit),
     };
     let (status, message) = match result {

@@ -1,5 +1,6 @@
-//! Layout of the screen in panels: a pure function that drawing and mouse handling share.
+//! Layout of the screen in panels, which drawing and mouse handling share.
 
+use crate::dashboard::Model;
 use ratatui::layout::{Margin, Rect};
 
 /// Panel that can have the focus.
@@ -11,18 +12,6 @@ pub enum Focus {
     Outline,
     /// List of the selection's properties.
     Inspector,
-}
-
-/// Input from which [`layout`] computes the areas of the panels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request {
-    pub screen: [u16; 2],
-    pub film: [u32; 2],
-    pub focus: Focus,
-    /// `true` if no panel except the picture's is visible.
-    pub fullscreen: bool,
-    /// `true` if the table of watched files takes the place of outline and inspector.
-    pub watching: bool,
 }
 
 /// Areas of the panels, borders included. The area of a side panel is `None` if it is hidden, for
@@ -57,52 +46,54 @@ const PLOT_ROWS: u16 = 8;
 /// focus.
 const SIDE_FROM: u16 = 72;
 
-/// Returns the layout of the screen; `None` if the terminal is smaller than [`SMALLEST`].
-pub fn layout(request: &Request) -> Option<Layout> {
-    let [width, height] = request.screen;
-    if width < SMALLEST[0] || height < SMALLEST[1] {
-        return None;
+impl Model {
+    /// Returns the layout of the screen; `None` if the terminal is smaller than [`SMALLEST`].
+    pub fn layout(&self) -> Option<Layout> {
+        let [width, height] = self.screen;
+        if width < SMALLEST[0] || height < SMALLEST[1] {
+            return None;
+        }
+        let status = Rect { x: 0, y: height - 2, width, height: 1 };
+        let hints = Rect { x: 0, y: height - 1, width, height: 1 };
+        let rows = height - 2;
+        let mut side = match (width, self.watch.is_some()) {
+            (0..100, false) => 28,
+            (0..100, true) => 34,
+            (100..160, false) => 38,
+            (100..160, true) => 46,
+            _ => 52,
+        };
+        if self.fullscreen || width < SIDE_FROM && self.focus == Focus::Picture {
+            side = 0;
+        }
+        let picture = Rect { x: 0, y: 0, width: width - side, height: rows };
+        let inside = if self.fullscreen { picture } else { picture.inner(BORDER) };
+        let (image, raster) = fitted(inside, self.scene().film.size);
+        let [outline, inspector, plot] = match side {
+            0 => [None; 3],
+            _ => self.side_panels(Rect { x: width - side, y: 0, width: side, height: rows }),
+        };
+        Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
     }
-    let status = Rect { x: 0, y: height - 2, width, height: 1 };
-    let hints = Rect { x: 0, y: height - 1, width, height: 1 };
-    let rows = height - 2;
-    let mut side = match (width, request.watching) {
-        (0..100, false) => 28,
-        (0..100, true) => 34,
-        (100..160, false) => 38,
-        (100..160, true) => 46,
-        _ => 52,
-    };
-    if request.fullscreen || width < SIDE_FROM && request.focus == Focus::Picture {
-        side = 0;
-    }
-    let picture = Rect { x: 0, y: 0, width: width - side, height: rows };
-    let inside = if request.fullscreen { picture } else { picture.inner(BORDER) };
-    let (image, raster) = fitted(inside, request.film);
-    let [outline, inspector, plot] = match side {
-        0 => [None; 3],
-        _ => side_panels(Rect { x: width - side, y: 0, width: side, height: rows }, request),
-    };
-    Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
-}
 
-/// Divides the side column into outline, inspector and plot, from top to bottom. In `zerkalo watch`
-/// the first is the table of watched files, and the second is `None`.
-fn side_panels(side: Rect, request: &Request) -> [Option<Rect>; 3] {
-    let rows = side.height;
-    let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
-    // The outline and the inspector share `left` rows. In less than 16 rows, there is room for one
-    // of them only.
-    let left = rows - plot;
-    let outline = match request.focus {
-        _ if request.watching => left,
-        Focus::Outline if rows < 16 => left,
-        _ if rows < 16 => 0,
-        Focus::Outline if rows < 40 => left * 3 / 5,
-        _ => left * 2 / 5,
-    };
-    let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
-    [part(0, outline), part(outline, left - outline), part(left, plot)]
+    /// Divides the side column into outline, inspector and plot, from top to bottom. In `zerkalo
+    /// watch` the first is the table of watched files, and the second is `None`.
+    fn side_panels(&self, side: Rect) -> [Option<Rect>; 3] {
+        let rows = side.height;
+        let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+        // The outline and the inspector share `left` rows. In less than 16 rows, there is room for
+        // one of them only.
+        let left = rows - plot;
+        let outline = match self.focus {
+            _ if self.watch.is_some() => left,
+            Focus::Outline if rows < 16 => left,
+            _ if rows < 16 => 0,
+            Focus::Outline if rows < 40 => left * 3 / 5,
+            _ => left * 2 / 5,
+        };
+        let part = |y, height| (height > 0).then_some(Rect { y: side.y + y, height, ..side });
+        [part(0, outline), part(outline, left - outline), part(left, plot)]
+    }
 }
 
 /// Returns the largest area with the film's aspect ratio in `inside`, centred there, and its number
@@ -143,11 +134,11 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+    use zerkalo_scene::{History, Scene};
 
     fn at(width: u16, height: u16, focus: Focus) -> Option<Layout> {
-        let film = [640, 480];
-        let screen = [width, height];
-        layout(&Request { screen, film, focus, fullscreen: false, watching: false })
+        Model { screen: [width, height], focus, ..Model::default() }.layout()
     }
 
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
@@ -192,17 +183,22 @@ mod tests {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
             for screen in [[80, 24], [120, 36], [200, 60], [40, 12]] {
                 for fullscreen in [false, true] {
-                    let focus = Focus::Picture;
-                    let request = Request { screen, film, focus, fullscreen, watching: false };
-                    let l = layout(&request).unwrap();
+                    let mut scene = Scene::default();
+                    scene.film.size = film;
+                    let history = History::new(Arc::new(scene));
+                    let l = Model { screen, fullscreen, history, ..Model::default() };
+                    let l = l.layout().unwrap();
                     let inside = if fullscreen { l.picture } else { l.picture.inner(BORDER) };
                     let [columns, halves] = l.raster;
                     let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
-                    assert!(columns == room[0] || halves == room[1], "{request:?} {l:?}");
+                    assert!(columns == room[0] || halves == room[1], "{film:?} {screen:?} {l:?}");
                     assert!(columns <= room[0] && halves <= room[1]);
                     let aspect = f64::from(film[0]) / f64::from(film[1]);
                     let off = (columns as f64 - halves as f64 * aspect).abs() / aspect.max(1.0);
-                    assert!(off <= 0.51 || columns == 1 || halves == 1, "{request:?} {l:?}");
+                    assert!(
+                        off <= 0.51 || columns == 1 || halves == 1,
+                        "{film:?} {screen:?} {l:?}"
+                    );
                     let image = l.image;
                     for row in image.y..image.y + image.height {
                         for column in image.x..image.x + image.width {

@@ -145,10 +145,6 @@ pub enum Effect {
     View(View),
     /// Discard all samples and restart rendering.
     Restart,
-    /// Render with this number of threads.
-    Threads(usize),
-    /// Give the render's threads low (`true`) or normal (`false`) priority.
-    LowPriority(bool),
     /// Return the current picture as [`Message::Pinned`].
     Pin,
     /// Write the scene to its file, or to `path`, which becomes the scene's file.

@@ -1,9 +1,7 @@
 //! Model: the complete state of the dashboard, from which the screen is drawn.
 
-use crate::dashboard::layout::{Request, layout};
 use crate::dashboard::{
-    Convergence, DisplayChannel, Editor, Focus, KeyContext, Layout, ListCursor, OrphanedEdits,
-    Overlay,
+    Convergence, DisplayChannel, Editor, Focus, KeyContext, ListCursor, OrphanedEdits, Overlay,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -169,10 +167,6 @@ pub struct Model {
     pub stop: Stop,
     /// `true` if the user has paused the render.
     pub paused: bool,
-    pub threads: usize,
-    /// Largest number of threads that the user can set.
-    pub max_threads: usize,
-    pub low_priority: bool,
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     pub link: Option<LinkStatus>,
     pub notice: Option<Notice>,
@@ -218,7 +212,6 @@ impl Model {
         name: &str,
         scene: Result<Arc<Scene>, SceneErrors>,
         stop: Stop,
-        threads: usize,
     ) -> Self {
         let (scene, broken) = match scene {
             Ok(scene) => (scene, None),
@@ -226,13 +219,10 @@ impl Model {
         };
         let name = path.as_deref().map_or(sanitized(name), short_name);
         let unreadable = broken.is_some();
-        let threads = threads.max(1);
         Self {
             file: File { path, name, saved: Arc::clone(&scene), broken, unreadable },
             history: History::new(scene),
             stop,
-            threads,
-            max_threads: threads,
             first_time: true,
             ..Self::default()
         }
@@ -248,17 +238,6 @@ impl Model {
 
     pub fn is_unsaved(&self) -> bool {
         !self.history.is_saved()
-    }
-
-    /// Returns the layout of the screen; `None` if the terminal is too small.
-    pub fn layout(&self) -> Option<Layout> {
-        layout(&Request {
-            screen: self.screen,
-            film: self.scene().film.size,
-            focus: self.focus,
-            fullscreen: self.fullscreen,
-            watching: self.watch.is_some(),
-        })
     }
 
     /// Returns the context that decides which commands the keys run.

@@ -54,7 +54,7 @@ pub fn states(keys: &[usize]) -> Vec<String> {
     let path = PathBuf::from("scene.toml");
     let mut document = Document::parse(SCENE.to_string(), "scene.toml").expect("a scene");
     let scene = Ok(Arc::new(document.scene().clone()));
-    let mut model = Model::new(Some(path.clone()), "", scene, Stop::default(), 1);
+    let mut model = Model::new(Some(path.clone()), "", scene, Stop::default());
     update(&mut model, Message::Resize([60, 18]), Duration::ZERO);
     let mut texts = vec![SCENE.to_string()];
     for (i, key) in keys.iter().enumerate() {

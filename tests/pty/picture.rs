@@ -2,7 +2,9 @@
 
 use super::*;
 use std::io::Cursor;
-use zerkalo::dashboard::layout::{Focus, Layout, Request, layout};
+use zerkalo::dashboard::layout::Layout;
+use zerkalo::dashboard::model::Model;
+use zerkalo_scene::{History, Scene};
 use zerkalo_terminal::cells::Oklab;
 
 const SIZE: [u16; 2] = [120, 36];
@@ -91,9 +93,10 @@ fn distance(screen: &vt100::Screen, layout: &Layout, picture: &Picture) -> Optio
 }
 
 fn room_layout() -> Layout {
-    let focus = Focus::Picture;
-    let request = Request { screen: SIZE, film: FILM, focus, fullscreen: false, watching: false };
-    layout(&request).unwrap()
+    let mut scene = Scene::default();
+    scene.film.size = FILM;
+    let history = History::new(Arc::new(scene));
+    Model { screen: SIZE, history, ..Model::default() }.layout().unwrap()
 }
 
 #[test]

@@ -330,9 +330,6 @@ fn picture_stories() -> Vec<Story> {
             // The noise target changes from 0.5 to the next finer one in the list.
             d.model.stop.noise_levels == Some(0.25) && d.model.overlay.is_none()
         }),
-        story("more threads", ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
-        story("fewer threads", ":", |_, d| d.asked(|e| *e == Effect::Threads(1))),
-        story("low or normal priority", ":", |_, d| d.asked(|e| *e == Effect::LowPriority(true))),
         story("next colour mode of the terminal", "#", |_, d| d.model.colors == Colors::Indexed),
         story("all keys", "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
         story(

@@ -5,7 +5,7 @@ use super::*;
 fn start(path: Option<&str>, text: &str) -> Model {
     let scene = Scene::parse(text, FILE).map(Arc::new);
     let path = path.map(PathBuf::from);
-    let mut model = Model::new(path, "mirror-room.toml", scene, Stop::default(), 1);
+    let mut model = Model::new(path, "mirror-room.toml", scene, Stop::default());
     update(&mut model, Message::Resize([80, 24]), Duration::ZERO);
     model
 }

@@ -77,8 +77,7 @@ impl Desk {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
         let stop = noise_stop(0.5);
-        let mut model = Model::new(Some(FILE.into()), FILE, Ok(scene), stop, 2);
-        model.max_threads = 4;
+        let model = Model::new(Some(FILE.into()), FILE, Ok(scene), stop);
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
         let (effects, fired) = (Vec::new(), HashSet::new());
         let begun_with = document.clone();

@@ -17,9 +17,6 @@ use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::Session;
 use zerkalo_scene::{Scene, SceneFile};
 
-/// Niceness of tracing threads with low priority: the largest value of Linux.
-const LOW_PRIORITY: i32 = 19;
-
 /// Action that the event loop must take after it has executed an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -49,7 +46,6 @@ struct Editing {
     files: Files,
     resized: Option<ResizedExport>,
     threads: usize,
-    niceness: i32,
     options: Options,
     settings: Settings,
 }
@@ -66,16 +62,14 @@ impl EffectRunner {
         settings: Settings,
         results: Sender<Message>,
     ) -> io::Result<Self> {
-        let unreadable_path = file.as_ref().err().cloned();
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
             file: Some(files.shared.clone()),
-            unreadable_path,
             sampler: options.sampling.kind,
             adaptive: settings.adaptive,
         };
-        let editing = Editing { files, resized: None, threads, niceness: 0, options, settings };
+        let editing = Editing { files, resized: None, threads, options, settings };
         Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
 
@@ -112,39 +106,31 @@ impl EffectRunner {
                 let viewport = image_viewer::viewport(frames, screen);
                 image_viewer::prepare(path, display, viewport, self.results.clone());
             }
-            Effect::Threads(threads) => self.edit(|editing, session| {
-                editing.threads = threads;
-                editing.set_threads(session);
-            }),
-            Effect::LowPriority(low) => self.edit(|editing, session| {
-                editing.niceness = if low { LOW_PRIORITY } else { 0 };
-                editing.set_threads(session);
-            }),
             Effect::Save { scene, path, overwrite } => {
-                self.edit(|editing, _| editing.files.save(scene, path, overwrite));
+                self.edit(|editing| editing.files.save(scene, path, overwrite));
             }
-            Effect::Load => self.edit(|editing, _| editing.files.give(Job::Load)),
-            Effect::Autosave(scene) => self.edit(|editing, _| editing.files.autosave(scene)),
+            Effect::Load => self.edit(|editing| editing.files.give(Job::Load)),
+            Effect::Autosave(scene) => self.edit(|editing| editing.files.autosave(scene)),
             Effect::Recover => {
-                self.edit(|editing, _| editing.files.give_autosave(AutosaveJob::Recover));
+                self.edit(|editing| editing.files.give_autosave(AutosaveJob::Recover));
             }
             Effect::Discard => {
-                self.edit(|editing, _| editing.files.give_autosave(AutosaveJob::Discard));
+                self.edit(|editing| editing.files.give_autosave(AutosaveJob::Discard));
             }
             Effect::ExportSized { scene, format, display, stop } => {
                 self.export_sized(scene, format, display, stop);
             }
             Effect::CancelExport => {
-                self.edit(|editing, _| editing.resized.iter().for_each(ResizedExport::cancel));
+                self.edit(|editing| editing.resized.iter().for_each(ResizedExport::cancel));
             }
         }
         Outcome::Done
     }
 
     /// Calls `act` unless this is `zerkalo watch`, which neither edits nor renders.
-    fn edit(&mut self, act: impl FnOnce(&mut Editing, &Session)) {
+    fn edit(&mut self, act: impl FnOnce(&mut Editing)) {
         if let Some(editing) = &mut self.editing {
-            act(editing, &self.session);
+            act(editing);
         }
     }
 
@@ -242,12 +228,5 @@ impl EffectRunner {
             ending.join_within(patience);
         }
         kept
-    }
-}
-
-impl Editing {
-    fn set_threads(&self, session: &Session) {
-        // If the threads cannot be started, the old ones continue, as the renderer's reports show.
-        let _ = session.set_threads(self.threads, self.niceness);
     }
 }

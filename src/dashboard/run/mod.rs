@@ -100,14 +100,13 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             None => effects.session.set_scene(Arc::clone(scene)),
         };
     }
-    let mut model = Model::new(path, &name, scene, settings.stop, threads);
-    model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);
+    let model = Model::new(path, &name, scene, settings.stop);
     run_on_terminal(effects, done, model, terminal, trace)
 }
 
 /// Shows `films`, which other processes write, as [`run`] shows a scene. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
-    let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
+    let model = Model::new(None, "", Ok(Arc::default()), Stop::default());
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;
     // The first frame shows the table of films.

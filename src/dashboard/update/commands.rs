@@ -269,9 +269,6 @@ pub static COMMANDS: &[Command] = &[
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
     command("rendering", "stop at …", &[(Anywhere, "T")], |c| c.ask_stop()),
     command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
-    command("rendering", "more threads", &[], |c| c.threads(1)),
-    command("rendering", "fewer threads", &[], |c| c.threads(-1)),
-    command("rendering", "low or normal priority", &[], |c| c.priority()),
     command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
 
     command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),

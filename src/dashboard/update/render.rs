@@ -34,21 +34,6 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(Overlay::NoiseTargets(ListCursor { index, scroll: 0 }));
     }
 
-    pub(super) fn threads(&mut self, more: isize) {
-        let threads = self.model.threads.saturating_add_signed(more);
-        self.model.threads = threads.clamp(1, self.model.max_threads);
-        self.emit(Effect::Threads(self.model.threads));
-        let max = self.model.max_threads;
-        self.say(format!("{} of {max} threads", self.model.threads));
-    }
-
-    pub(super) fn priority(&mut self) {
-        self.model.low_priority = !self.model.low_priority;
-        self.emit(Effect::LowPriority(self.model.low_priority));
-        let priority = if self.model.low_priority { "low" } else { "normal" };
-        self.say(format!("{priority} priority"));
-    }
-
     pub(super) fn export(&mut self, format: Format) {
         self.emit(Effect::Export(format));
         self.say(format!("writing {} …", format.extension()));

@@ -91,23 +91,22 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(6, vec![plain(rate(link.rate))]));
     }
     if !watching {
-        parts.extend(machine(model, report, theme));
+        parts.extend(machine(report, theme));
     }
     parts
 }
 
 /// Returns the precision and the threads of the render.
-fn machine(model: &Model, report: &Report, theme: &Theme) -> [Part; 2] {
+fn machine(report: &Report, theme: &Theme) -> [Part; 2] {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
     let threads = match report.threads {
         1 => "1 thread".to_string(),
         n => format!("{n} threads"),
     };
-    let priority = if model.low_priority { ", low priority" } else { "" };
     [
         Part { expendable: 7, text: vec![dim(precision)] },
-        Part { expendable: 5, text: vec![dim(&threads), dim(priority)] },
+        Part { expendable: 5, text: vec![dim(&threads)] },
     ]
 }
 

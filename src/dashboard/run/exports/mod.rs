@@ -32,8 +32,6 @@ pub struct Exporter {
     /// Scene file as last read or written; `None` for watched films, whose metadata name their
     /// scene file.
     pub file: Option<SharedFile>,
-    /// Path of a scene file that was unreadable at the start.
-    pub unreadable_path: Option<PathBuf>,
     /// Kind of random numbers, for the metadata.
     pub sampler: SamplerKind,
     /// `true` if sample allocation is adaptive, for the metadata.
@@ -43,7 +41,7 @@ pub struct Exporter {
 impl Exporter {
     /// Creates the writer of pictures of watched films.
     pub fn of_films() -> Self {
-        Self { file: None, unreadable_path: None, sampler: SamplerKind::Sobol, adaptive: true }
+        Self { file: None, sampler: SamplerKind::Sobol, adaptive: true }
     }
 
     /// Writes `picture` to a file with the next free name.
@@ -89,7 +87,7 @@ impl Exporter {
     fn stem(&self, source: &str) -> String {
         match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => stem(file.path(), file.document().name()),
-            None => stem(self.unreadable_path.as_deref(), source),
+            None => stem(None, source),
         }
     }
 

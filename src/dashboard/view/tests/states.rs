@@ -34,7 +34,7 @@ fn press(model: &mut Model, keys: &str) {
 pub fn tracing(screen: [u16; 2]) -> Model {
     let path = Some("scenes/mirror-room.toml".into());
     let stop = Stop { noise_levels: Some(0.5), ..Stop::default() };
-    let mut model = Model::new(path, "", Ok(Arc::new(mirror_room())), stop, 2);
+    let mut model = Model::new(path, "", Ok(Arc::new(mirror_room())), stop);
     model.screen = screen;
     model.first_time = false;
     for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
@@ -242,7 +242,6 @@ pub const STATES: &[Named] = &[
         m.history.record(Arc::new(edit.scene), "delete", false);
         m.display.exposure_ev = 0.75;
         m.display.tone = zerkalo_render::film::Tone::Neutral;
-        m.low_priority = true;
         let size = [1920, 1080];
         m.export = Some(RunningExport { size, progress: 0.43 });
     }),
