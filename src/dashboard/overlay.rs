@@ -1,4 +1,4 @@
-//! Overlays of the dashboard: help, lists, forms, prompts and questions. An overlay covers panels
+//! Overlays of the dashboard: lists, forms, prompts and questions. An overlay covers panels
 //! and receives the keys.
 
 use crate::dashboard::{Editor, FieldList, ListCursor, UpdateContext};
@@ -11,10 +11,6 @@ use zerkalo_terminal::image::ViewerImage;
 
 #[derive(Clone, Debug)]
 pub enum Overlay {
-    /// List of all keys.
-    Help {
-        scroll: usize,
-    },
     /// List of [`noise_targets`](crate::dashboard::noise_targets).
     NoiseTargets(ListCursor),
     Pick(Pick),
@@ -31,7 +27,7 @@ impl Overlay {
             Self::NoiseTargets(at) => Some((at, QUALITIES.len())),
             Self::Pick(pick) => Some((&mut pick.at, pick.found.len())),
             Self::Question(question) => Some((&mut question.at, question.answers.len())),
-            Self::Help { .. } | Self::Form(_) | Self::Prompt(_) | Self::ViewerImage(_) => None,
+            Self::Form(_) | Self::Prompt(_) | Self::ViewerImage(_) => None,
         }
     }
 }

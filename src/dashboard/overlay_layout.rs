@@ -39,7 +39,6 @@ impl Model {
                 frame: Rect { x: 0, y: 0, width, height },
                 ..OverlayLayout::default()
             },
-            Overlay::Help { .. } => whole(centred(84, height - 2)),
             Overlay::NoiseTargets(_) => {
                 let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
                 let frame = low(76, QUALITIES.len() as u16 + 2 + about);
@@ -48,8 +47,7 @@ impl Model {
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
             Overlay::Pick(pick) => {
-                let rows = (pick.entries.len() as u16).saturating_add(3).min(height.min(26) - 2);
-                let frame = centred(76, rows);
+                let frame = centred(84, (pick.entries.len() as u16).saturating_add(3));
                 let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
             }
@@ -106,11 +104,6 @@ impl Model {
         let problem = self.inspector.problem().is_some();
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
     }
-}
-
-/// Returns the layout of an overlay that consists of a list alone.
-fn whole(frame: Rect) -> OverlayLayout {
-    OverlayLayout { frame, list: frame.inner(BORDER), ..OverlayLayout::default() }
 }
 
 /// Splits the inside of a panel into an area for lines and one for help below. `problem` is `true`

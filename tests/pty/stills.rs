@@ -85,11 +85,11 @@ fn kitty_protocol_shows_the_exported_file() {
     terminal.wait_for_text("outline");
     let after = String::from_utf8_lossy(&terminal.bytes()).into_owned();
     assert_eq!(after.matches(REMOVAL).count(), 1);
-    // A later frame shows the help. When it is visible, the frame that removes the image has
+    // A later frame shows the list of keys. When it is visible, the frame that removes the image has
     // certainly been written.
     terminal.send("?");
     terminal.wait_for_text("orbit left");
-    terminal.send("?");
+    terminal.send("\x1b");
     terminal.wait_until_gone("orbit left");
     terminal.send("q");
     let (status, bytes) = terminal.end();

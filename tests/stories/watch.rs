@@ -2,7 +2,6 @@
 //! scene or start a render.
 
 use super::*;
-use zerkalo::dashboard::hints::{HelpLine, help};
 use zerkalo::dashboard::key_context::KeyContext;
 use zerkalo_render::session::{WatchReport, WatchedShards, WatchedState};
 
@@ -85,9 +84,11 @@ fn every_key_edits_and_renders_nothing() {
 }
 
 #[test]
-fn help_and_palette_have_the_keys_that_work() {
-    let lines = help(&watching(3).model);
-    let listed: Vec<_> = lines.iter().filter_map(HelpLine::entry).collect();
+fn palette_has_the_keys_that_work() {
+    let mut desk = watching(3);
+    desk.keys("?");
+    let Some(Overlay::Pick(pick)) = &desk.model.overlay else { panic!("no palette") };
+    let listed: Vec<_> = pick.entries.iter().map(|entry| (&*entry.keys, &*entry.name)).collect();
     for (keys, label) in &listed {
         let mut desk = watching(3);
         let first = keys.split([' ', ',']).next().unwrap();

@@ -1,5 +1,4 @@
-//! Command table, from which key dispatch, hint line, help, command palette and docs/keys.md are
-//! derived.
+//! Command table, from which key dispatch, hint line, command palette and docs/keys.md are derived.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
 use crate::dashboard::update::{BACK, DOWN, FORWARD, LEFT, RIGHT, UP};
@@ -18,8 +17,6 @@ pub enum HintLine {
     List,
     Form,
     Typing,
-    /// The help or the list of scene features is open.
-    Reading,
     Watching,
 }
 
@@ -37,9 +34,9 @@ pub struct Hint {
 /// Row of the command table.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Chapter of the help. The commands of a chapter follow each other in the table.
+    /// Chapter of docs/keys.md. The commands of a chapter follow each other in the table.
     pub chapter: &'static str,
-    /// Unique description for help, command palette and docs/keys.md.
+    /// Unique description for command palette and docs/keys.md.
     pub label: &'static str,
     /// Contexts with the names of the keys there, separated by spaces. A command without keys runs
     /// only from the command palette.
@@ -107,7 +104,7 @@ fn always(_: &Model) -> bool {
     true
 }
 
-/// All commands, in the order of the help.
+/// All commands, in the order of the command palette.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
     command("camera", "orbit left", &[(Picture, "Left")], |c| c.orbit(LEFT)).hints(&[hint(&[H::First, H::In(Picture)], 1, "arrows", "orbit")]),
@@ -201,7 +198,6 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
-        hint(&[H::Reading], 9, "Esc", "close"),
     ]),
     command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).while_typing().hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
@@ -215,7 +211,6 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::In(Outline)], 1, "Up Down", "select"),
         hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::List], 1, "Up Down", "choose"),
-        hint(&[H::Reading], 1, "Up Down", "scroll"),
         hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
     command("panels", "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
@@ -271,8 +266,11 @@ pub static COMMANDS: &[Command] = &[
     command("rendering", "noise targets and their times", &[(Anywhere, "N")], |c| c.open_noise_targets()),
     command("rendering", "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
 
-    command("help", "all keys", &[(Anywhere, "? F1")], |c| c.model.overlay = Some(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
-    command("help", "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.pick_command()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
+    command("help", "find an action or its keys", &[(Anywhere, "? F1 : Ctrl-p")], |c| c.pick_command()).available(always).hints(&[
+        hint(&[H::First], 11, ":", "all actions"),
+        hint(&[H::In(Picture)], 11, ":", "all"),
+        hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys"),
+    ]),
 ];
 
 impl Command {
@@ -292,8 +290,8 @@ impl Command {
         Self { over_image: true, ..self }
     }
 
-    /// Returns `true` if help and command palette list the command: if it can run in `zerkalo
-    /// watch`, or this is another dashboard.
+    /// Returns `true` if the command palette lists the command: if it can run in `zerkalo watch`, or
+    /// this is another dashboard.
     pub fn is_listed(&self, model: &Model) -> bool {
         model.watch.is_none() || (self.available)(model)
     }

@@ -98,7 +98,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Applies `c` to the open form, question or help. Returns `true` if an overlay is open: the
+    /// Applies `c` to the open form or question. Returns `true` if an overlay is open: the
     /// character then runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
@@ -109,7 +109,6 @@ impl UpdateContext<'_> {
                 }
             }
             Some(Overlay::Form(form)) if form.fields.editor.is_none() => self.open_field(Some(c)),
-            Some(Overlay::Help { .. }) if "?q ".contains(c) => self.model.overlay = None,
             Some(_) => {}
             None => return false,
         }

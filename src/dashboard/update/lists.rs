@@ -1,6 +1,5 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
-use crate::dashboard::hints::help;
 use crate::dashboard::panel_lines::{outline, outline_position};
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::{
@@ -13,22 +12,12 @@ use std::cmp::Reverse;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::QUALITIES;
 
-/// Returns `cursor` moved within a list of `len` entries.
-fn moved(cursor: usize, steps: isize, len: usize) -> usize {
-    cursor.saturating_add_signed(steps).min(len.saturating_sub(1))
-}
-
 impl UpdateContext<'_> {
-    /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines. Scrolls the
-    /// help, which has no cursor.
+    /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let list = self.model.overlay_layout().map(|layout| layout.list);
         let rows = list.map_or(1, |list| usize::from(list.height));
-        let help = help(self.model).len();
         match &mut self.model.overlay {
-            Some(Overlay::Help { scroll }) => {
-                *scroll = moved(*scroll, steps, help.saturating_sub(rows) + 1);
-            }
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
                     self.move_field_cursor(steps);
@@ -64,7 +53,8 @@ impl UpdateContext<'_> {
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
         let position = lines[..before].iter().filter_map(OutlineLine::entry).count();
         let entries: Vec<_> = lines.iter().filter_map(OutlineLine::entry).collect();
-        if let Some(entry) = entries.get(moved(position, steps, entries.len())) {
+        let position = position.saturating_add_signed(steps).min(entries.len().saturating_sub(1));
+        if let Some(entry) = entries.get(position) {
             self.select(entry.subject.clone());
         }
     }
@@ -72,7 +62,6 @@ impl UpdateContext<'_> {
     /// Confirms or opens the entry under the cursor.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
-            Some(Overlay::Help { .. }) => self.model.overlay = None,
             Some(Overlay::NoiseTargets(at)) => {
                 let noise_levels = Some(QUALITIES[at.index]);
                 self.model.overlay = None;
@@ -123,13 +112,21 @@ impl UpdateContext<'_> {
         let entries = entries.map(|command| PickEntry {
             name: command.label.to_string(),
             note: command.chapter.to_string(),
-            keys: command.all_keys(str::to_string),
+            keys: match self.model.watch {
+                Some(_) => command.watch_keys(str::to_string),
+                None => command.all_keys(str::to_string),
+            },
         });
-        self.open_pick("all actions".to_string(), entries.collect::<Vec<_>>(), 0, |c, label| {
-            if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
-                c.run(command);
-            }
-        });
+        self.open_pick(
+            "actions and keys".to_string(),
+            entries.collect::<Vec<_>>(),
+            0,
+            |c, label| {
+                if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
+                    c.run(command);
+                }
+            },
+        );
     }
 
     /// Opens a list with the cursor on the entry with index `index`. The name of the picked entry is

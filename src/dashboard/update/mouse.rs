@@ -196,9 +196,8 @@ impl UpdateContext<'_> {
     fn scrolled(&mut self, ticks: i32, mouse: Mouse) {
         let ticks = ticks.clamp(-100, 100);
         let lines = -(ticks * WHEEL_LINES) as isize;
-        if let Some(overlay) = &self.model.overlay {
-            let is_text = matches!(overlay, Overlay::Help { .. });
-            self.move_cursor(if is_text { lines } else { -ticks as isize });
+        if self.model.overlay.is_some() {
+            self.move_cursor(-ticks as isize);
             return;
         }
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {

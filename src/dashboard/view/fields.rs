@@ -121,7 +121,7 @@ fn expected(property: &Property) -> String {
 }
 
 /// Draws a heading with a line up to the last column but one.
-pub fn heading(mut to: Row, title: &str) {
+fn heading(mut to: Row, title: &str) {
     let theme = to.theme;
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
     let left = to.left().saturating_sub(1);

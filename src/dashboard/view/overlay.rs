@@ -1,10 +1,9 @@
 //! Drawing of overlays.
 
-use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::noise_targets::{ABOUT, LOOKS, cost};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut};
-use crate::dashboard::view::fields::{self, heading, typed};
+use crate::dashboard::view::fields::{self, typed};
 use crate::dashboard::view::painter::{ListRow, Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::{Model, Overlay, Pick, Prompt, Question};
@@ -17,7 +16,6 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
     let theme = painter.theme;
     let mut overlay = OverlayPainter { place: model.overlay_layout()?, theme, painter };
     match model.overlay.as_ref()? {
-        Overlay::Help { scroll } => overlay.help(model, *scroll),
         Overlay::NoiseTargets(at) => overlay.noise_targets(model, at.index),
         Overlay::Pick(pick) => return overlay.pick(pick),
         Overlay::Form(form) => {
@@ -63,24 +61,6 @@ impl OverlayPainter<'_, '_> {
         choice
     }
 
-    fn help(&mut self, model: &Model, scroll: usize) {
-        self.frame("keys");
-        let (lines, theme) = (help(model), self.theme);
-        for VisibleLine { row, index } in self.window(scroll, lines.len()) {
-            let mut to = self.row(row);
-            match &lines[index] {
-                HelpLine::Heading(title) => heading(to, title),
-                HelpLine::Entry((keys, label)) => {
-                    // A long list of keys must not shorten the label.
-                    let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
-                    to.put_right(" ", 0, theme.text());
-                    to.put_right(&cut(keys, room), 0, theme.accent());
-                    to.skip(3).put(label, theme.text());
-                }
-            }
-        }
-    }
-
     fn noise_targets(&mut self, model: &Model, cursor: usize) {
         self.frame("noise targets in 8-bit levels");
         let good = self.theme.good();
@@ -110,7 +90,9 @@ impl OverlayPainter<'_, '_> {
         for VisibleLine { row, index } in self.window(pick.at.scroll, pick.found.len()) {
             let entry = &pick.entries[pick.found[index]];
             let ListRow { mut to, name, note, key } = self.choice(row, index == pick.at.index);
-            to.put_right(" ", 0, key).put_right(&entry.keys, columns(&entry.name) + 2, key);
+            // A long list of keys must not shorten the name.
+            let room = to.left().saturating_sub(columns(&entry.name) + 3);
+            to.put_right(" ", 0, key).put_right(&cut(&entry.keys, room), 0, key);
             to.put_wide(&entry.name, names, name).skip(2);
             // A description may be truncated, a chapter beside long keys not.
             if entry.keys.is_empty() || columns(&entry.note) < to.left() {

@@ -317,14 +317,14 @@ pub const STATES: &[Named] = &[
     }),
     ("watching-help", |m| {
         watching(m, &watched_plan());
-        m.overlay = Some(Overlay::Help { scroll: 0 });
+        press(m, "?");
     }),
     ("watching-refusal", |m| {
         watching(m, &watched_plan());
         press(m, "x");
     }),
-    ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
-    ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
+    ("help", |m| press(m, "?")),
+    ("help-scrolled", |m| press(m, "? PageDown PageDown")),
     ("noise-targets", |m| {
         m.overlay = Some(Overlay::NoiseTargets(ListCursor { index: 3, scroll: 0 }));
     }),
