@@ -42,6 +42,8 @@ pub struct File {
     pub saved: Arc<Scene>,
     /// Errors in the current contents of the file.
     pub broken: Option<SceneErrors>,
+    /// Path of the last save that was refused because a file exists there.
+    pub occupied: Option<PathBuf>,
     /// `true` if the file has been unreadable since the start. There is no scene then, and the
     /// dashboard shows only the errors in `broken`.
     pub unreadable: bool,
@@ -220,7 +222,14 @@ impl Model {
         let name = path.as_deref().map_or(sanitized(name), short_name);
         let unreadable = broken.is_some();
         Self {
-            file: File { path, name, saved: Arc::clone(&scene), broken, unreadable },
+            file: File {
+                path,
+                name,
+                saved: Arc::clone(&scene),
+                broken,
+                occupied: None,
+                unreadable,
+            },
             history: History::new(scene),
             stop,
             first_time: true,

@@ -104,22 +104,9 @@ pub struct Prompt {
 #[derive(Clone, Debug)]
 pub struct Question {
     pub text: String,
-    /// Letter, text and effect of each answer.
-    pub answers: Vec<(char, &'static str, Answer)>,
+    pub(super) answers: Vec<Answer>,
     pub at: ListCursor,
 }
 
-/// Effect of an answer.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
-    Nothing,
-    SaveAndQuit,
-    Quit,
-    /// Read the scene file again; unsaved edits are lost.
-    Load,
-    /// Save over the file at this path; `None` for the scene file.
-    Overwrite(Option<PathBuf>),
-    SaveAs,
-    Recover,
-    Discard,
-}
+/// Letter, text and effect of an answer.
+pub(super) type Answer = (char, &'static str, fn(&mut UpdateContext<'_>));

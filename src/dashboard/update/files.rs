@@ -8,11 +8,12 @@ use zerkalo_scene::edit::{Target, outline};
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{SaveError, Scene, SceneErrors};
 
-const KEEP_FILE: (char, &str, Answer) = ('k', "keep the file on disk", Answer::Nothing);
-const KEEP_EDITS: (char, &str, Answer) = ('k', "keep my edits", Answer::Nothing);
-const OVERWRITE: (char, &str, Answer) = ('o', "overwrite it", Answer::Overwrite(None));
-const STAY: (char, &str, Answer) = ('c', "stay", Answer::Nothing);
-const SAVE_AS: (char, &str, Answer) = ('s', "save under another name", Answer::SaveAs);
+const KEEP_FILE: Answer = ('k', "keep the file on disk", |c| c.decline());
+const KEEP_EDITS: Answer = ('k', "keep my edits", |c| c.decline());
+const OVERWRITE: Answer = ('o', "overwrite it", |c| c.write(None, true));
+const STAY: Answer = ('c', "stay", |c| c.decline());
+const SAVE_AS: Answer = ('s', "save under another name", |c| c.ask_path());
+const LOAD: Answer = ('r', "read the file and lose my edits", |c| c.emit(Effect::Load));
 
 impl UpdateContext<'_> {
     pub(super) fn undo(&mut self) {
@@ -75,13 +76,16 @@ impl UpdateContext<'_> {
             Err(SaveError::Untitled) => self.ask_path(),
             Err(error @ SaveError::Changed(_)) => {
                 let text = capital(&error.to_string());
-                let reload = ('r', "reload it and lose my edits", Answer::Load);
-                self.ask(text, &[KEEP_FILE, OVERWRITE, SAVE_AS, reload]);
+                self.ask(text, &[KEEP_FILE, OVERWRITE, SAVE_AS, LOAD]);
             }
             Err(SaveError::Exists(path)) => {
                 let text = format!("{} exists.", sanitized(&path.display().to_string()));
-                let overwrite = ('o', "overwrite it", Answer::Overwrite(Some(path)));
-                self.ask(text, &[('s', "another name", Answer::SaveAs), overwrite]);
+                self.model.file.occupied = Some(path);
+                let overwrite: Answer = ('o', "overwrite it", |c| {
+                    let path = c.model.file.occupied.take();
+                    c.write(path, true);
+                });
+                self.ask(text, &[SAVE_AS, overwrite]);
             }
             Err(error @ SaveError::Failed { .. }) => {
                 self.model.quit_when_saved = false;
@@ -93,28 +97,33 @@ impl UpdateContext<'_> {
     pub(super) fn reload(&mut self) {
         if self.model.file.path.is_none() {
             self.say("This scene has no file to read yet");
-        } else if self.model.is_unsaved() {
-            let text = format!("Reading {} again loses the unsaved edits.", self.model.file.name);
-            self.ask(text, &[KEEP_EDITS, ('r', "read the file", Answer::Load)]);
+        } else {
+            self.load(format!("Reading {} again loses the unsaved edits.", self.model.file.name));
+        }
+    }
+
+    pub(super) fn changed_on_disk(&mut self) {
+        let name = &self.model.file.name;
+        if self.model.is_busy() {
+            let text = format!("{name} has changed on disk · Ctrl-o reads it");
+            self.notify(Tone::Plain, text, None);
+        } else {
+            self.load(format!("{name} has changed on disk, and here are unsaved edits."));
+        }
+    }
+
+    /// Reads the scene file. If there are unsaved edits, asks `question` first.
+    fn load(&mut self, question: String) {
+        if self.model.is_unsaved() {
+            self.ask(question, &[KEEP_EDITS, LOAD]);
         } else {
             self.emit(Effect::Load);
         }
     }
 
-    pub(super) fn changed_on_disk(&mut self) {
-        if self.model.is_busy() {
-            let text = format!("{} has changed on disk · Ctrl-o reads it", self.model.file.name);
-            self.notify(Tone::Plain, text, None);
-        } else if self.model.is_unsaved() {
-            let text = format!(
-                "{} has changed on disk, and here are unsaved edits.",
-                self.model.file.name
-            );
-            let reload = ('r', "read the file and lose my edits", Answer::Load);
-            self.ask(text, &[KEEP_EDITS, reload]);
-        } else {
-            self.emit(Effect::Load);
-        }
+    /// Answers a question by changing nothing.
+    pub(super) fn decline(&mut self) {
+        self.model.quit_when_saved = false;
     }
 
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
@@ -149,11 +158,15 @@ impl UpdateContext<'_> {
     pub(super) fn quit(&mut self) {
         if self.model.is_unsaved() && !self.model.file.unreadable {
             let text = format!("{} has unsaved edits.", self.model.file.name);
-            let discard = ('d', "discard them and quit", Answer::Quit);
-            self.ask(text, &[('s', "save and quit", Answer::SaveAndQuit), discard, STAY]);
+            let save: Answer = ('s', "save and quit", |c| {
+                c.model.quit_when_saved = true;
+                c.save();
+            });
+            let discard: Answer = ('d', "discard them and quit", |c| c.emit(Effect::Quit));
+            self.ask(text, &[save, discard, STAY]);
         } else if self.model.export.is_some() {
             let text = "A picture is still being rendered.".to_string();
-            self.ask(text, &[STAY, ('q', "quit without it", Answer::Quit)]);
+            self.ask(text, &[STAY, ('q', "quit without it", |c| c.emit(Effect::Quit))]);
         } else {
             self.emit(Effect::Quit);
         }

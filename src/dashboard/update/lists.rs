@@ -3,7 +3,7 @@
 use crate::dashboard::panel_lines::{outline, outline_position};
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::{
-    Answer, Editor, Effect, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
+    Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
 };
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -163,8 +163,7 @@ impl UpdateContext<'_> {
         pick.at = ListCursor::default();
     }
 
-    /// Opens a question. `answers` holds the letter, text and effect of each answer.
-    pub(super) fn ask(&mut self, text: String, answers: &[(char, &'static str, Answer)]) {
+    pub(super) fn ask(&mut self, text: String, answers: &[Answer]) {
         let question = Question { text, answers: answers.to_vec(), at: ListCursor::default() };
         self.model.overlay = Some(Overlay::Question(question));
     }
@@ -172,20 +171,8 @@ impl UpdateContext<'_> {
     /// Closes the open question and carries out the answer with index `at`.
     pub(super) fn answer(&mut self, at: usize) {
         let Some(Overlay::Question(question)) = &self.model.overlay else { return };
-        let Some((_, _, answer)) = question.answers.get(at).cloned() else { return };
+        let Some((_, _, act)) = question.answers.get(at).copied() else { return };
         self.model.overlay = None;
-        match answer {
-            Answer::Nothing => self.model.quit_when_saved = false,
-            Answer::SaveAndQuit => {
-                self.model.quit_when_saved = true;
-                self.save();
-            }
-            Answer::Quit => self.emit(Effect::Quit),
-            Answer::Load => self.emit(Effect::Load),
-            Answer::Overwrite(path) => self.write(path, true),
-            Answer::SaveAs => self.ask_path(),
-            Answer::Recover => self.recover(),
-            Answer::Discard => self.discard_orphaned_edits(),
-        }
+        act(self);
     }
 }

@@ -11,10 +11,10 @@ use zerkalo_scene::edit::Target;
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Number of lines that a list scrolls per tick of the wheel.
-pub(super) const WHEEL_LINES: i32 = 3;
+const WHEEL_LINES: i32 = 3;
 
 /// Returns `true` if the mouse is in `area`; `None` is the area of a hidden panel.
-pub(super) fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
+fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
 
@@ -27,9 +27,6 @@ impl UpdateContext<'_> {
     pub(super) fn mouse(&mut self, mouse: Mouse) {
         self.follow = true;
         self.model.first_time = false;
-        if self.model.watch.is_some() && self.model.overlay.is_none() {
-            return self.mouse_on_watch(mouse);
-        }
         match mouse.kind {
             MouseKind::Press(button) => self.press(button, mouse),
             MouseKind::Drag(_) => self.dragged(mouse),
@@ -59,7 +56,9 @@ impl UpdateContext<'_> {
                 self.end_gesture();
             }
             let Mouse { column, row, modified, .. } = mouse;
-            let (last, in_picture) = ([column, row], is_in(mouse, layout.image));
+            // Watched films have no camera to orbit and no objects to select.
+            let is_inert = self.model.watch.is_some() && self.model.mode != Mode::Probe;
+            let (last, in_picture) = ([column, row], is_in(mouse, layout.image) && !is_inert);
             self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
@@ -67,6 +66,8 @@ impl UpdateContext<'_> {
             let focused = self.model.focus == Focus::Inspector;
             self.set_focus(Focus::Inspector);
             self.press_in_fields(rows, focused, mouse);
+        } else if is_in(mouse, layout.outline) && self.model.watch.is_some() {
+            self.press_in_watch_table(mouse);
         } else if let Some(rows) = self.model.outline_rows()
             && is_in(mouse, layout.outline)
         {
@@ -152,7 +153,7 @@ impl UpdateContext<'_> {
             if !self.moves_or_rotates() {
                 self.end_gesture();
             }
-        } else if self.model.overlay.is_none() {
+        } else if self.model.overlay.is_none() && drag.in_picture {
             self.click(drag, mouse);
         }
     }
@@ -187,7 +188,7 @@ impl UpdateContext<'_> {
         self.model.layout()?.film_pixel(self.scene().film.size, mouse.column, mouse.row)
     }
 
-    pub(super) fn probe_at(&mut self, mouse: Mouse) {
+    fn probe_at(&mut self, mouse: Mouse) {
         if let Some(pixel) = self.pixel_at(mouse) {
             self.set_probe(Some(pixel));
         }
@@ -212,8 +213,11 @@ impl UpdateContext<'_> {
             }
             scroll
         } else if is_in(mouse, layout.outline) {
+            if self.model.watch.is_some() {
+                return self.move_watch_cursor(lines);
+            }
             &mut self.model.outline_scroll
-        } else if is_in(mouse, layout.picture) {
+        } else if is_in(mouse, layout.picture) && self.model.watch.is_none() {
             return self.dolly(f64::from(ticks));
         } else {
             return;

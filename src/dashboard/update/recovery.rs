@@ -2,7 +2,7 @@
 
 use crate::dashboard::model::Tone;
 use crate::dashboard::text::age;
-use crate::dashboard::{Answer, Effect, OrphanedEdits, UpdateContext};
+use crate::dashboard::{Effect, OrphanedEdits, UpdateContext};
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
@@ -36,9 +36,9 @@ impl UpdateContext<'_> {
         self.ask(
             text,
             &[
-                ('r', "recover them: undo returns to the file", Answer::Recover),
-                ('f', "view the file, decide later", Answer::Nothing),
-                ('d', "discard them", Answer::Discard),
+                ('r', "recover them: undo returns to the file", |c| c.recover()),
+                ('f', "view the file, decide later", |c| c.decline()),
+                ('d', "discard them", |c| c.discard_orphaned_edits()),
             ],
         );
     }

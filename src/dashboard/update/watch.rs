@@ -1,14 +1,14 @@
-//! Table of watched film files: reports, cursor and mouse.
+//! Table of watched film files: reports and cursor.
 
-use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
-use crate::dashboard::{Focus, ListCursor, Mode, UpdateContext, WatchTable, short_name};
+use crate::dashboard::update::mouse::line_at;
+use crate::dashboard::{Focus, ListCursor, UpdateContext, WatchTable, short_name};
 use std::path::Path;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{WatchReport, WatchedShards};
 use zerkalo_scene::Scene;
 use zerkalo_scene::value::sanitized;
-use zerkalo_terminal::event::{Mouse, MouseKind};
+use zerkalo_terminal::event::Mouse;
 
 impl UpdateContext<'_> {
     /// Stores a report. The cursor follows its entry to the entry's new row, except from the first
@@ -49,27 +49,14 @@ impl UpdateContext<'_> {
         table.at.walk(steps, table.report.shards.len(), rows);
     }
 
-    /// Handles mouse events while no overlay is open.
-    pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
-        let Some(layout) = self.model.layout() else { return };
-        let in_table = is_in(mouse, layout.outline);
-        match mouse.kind {
-            MouseKind::Press(_) if in_table => {
-                self.model.focus = Focus::Outline;
-                if let Some((rows, _)) = self.model.watch_rows()
-                    && let Some(table) = &self.model.watch
-                    && let Some(line) = line_at(rows, table.at.scroll, mouse)
-                {
-                    self.move_watch_cursor(line as isize - table.at.index as isize);
-                }
-            }
-            MouseKind::Scroll(ticks) if in_table => {
-                self.move_watch_cursor(-(ticks.clamp(-100, 100) * WHEEL_LINES) as isize);
-            }
-            MouseKind::Press(_) | MouseKind::Drag(_) if self.model.mode == Mode::Probe => {
-                self.probe_at(mouse);
-            }
-            _ => {}
+    /// Moves the cursor of the table to the clicked row.
+    pub(super) fn press_in_watch_table(&mut self, mouse: Mouse) {
+        self.model.focus = Focus::Outline;
+        if let Some((rows, _)) = self.model.watch_rows()
+            && let Some(table) = &self.model.watch
+            && let Some(line) = line_at(rows, table.at.scroll, mouse)
+        {
+            self.move_watch_cursor(line as isize - table.at.index as isize);
         }
     }
 }

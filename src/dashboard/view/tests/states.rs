@@ -6,8 +6,8 @@ use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
 use crate::dashboard::update::update;
 use crate::dashboard::{
-    Answer, CompareView, DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode,
-    Model, OrphanedEdits, Overlay, PanelLine, Prompt, Question,
+    CompareView, DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode, Model,
+    OrphanedEdits, Overlay, PanelLine, Prompt,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -346,13 +346,10 @@ pub const STATES: &[Named] = &[
         prompt(m, ["stop at", help, "noise low"], Some(problem));
     }),
     ("quit", |m| {
-        let text = "There are edits that are not saved.".to_string();
-        let answers = vec![
-            ('s', "save and quit", Answer::SaveAndQuit),
-            ('d', "discard them and quit", Answer::Quit),
-            ('c', "cancel", Answer::Nothing),
-        ];
-        m.overlay = Some(Overlay::Question(Question { text, answers, at: ListCursor::default() }));
+        let mut scene = mirror_room();
+        scene.trace.max_depth = 3;
+        m.history.record(Arc::new(scene), "depth", false);
+        press(m, "q");
     }),
     ("orphaned-edits", |m| {
         let age = Duration::from_secs(720);
