@@ -110,10 +110,9 @@ impl FramePipeline {
     }
 
     fn give_up(&mut self) {
-        if let Some(upload) = self.upload.take() {
-            let (removal, destroys) = upload.removal();
-            self.removal.extend(removal);
-            if destroys {
+        if let Some(upload) = self.upload.take().filter(ImageUpload::has_begun) {
+            self.removal.extend(upload.removal());
+            if upload.image.transfer.is_sixel {
                 self.diff = FrameDiff::default();
             }
         }

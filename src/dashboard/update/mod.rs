@@ -16,7 +16,6 @@ mod objects;
 mod prompt;
 mod recovery;
 mod render;
-mod undo_coalescing;
 mod watch;
 
 use crate::dashboard::model::{Notice, Tone};
@@ -26,7 +25,6 @@ use files::capital;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
-use undo_coalescing::Coalesce;
 use zerkalo_render::session::{State, View};
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Edit, EditError, Target};
@@ -51,6 +49,33 @@ pub(super) struct UpdateContext<'a> {
     follow: bool,
     /// Character of the key that ran the current command.
     typed: Option<char>,
+}
+
+/// Longest time between edits that form one undo step, longer than the delay after which a held key
+/// repeats.
+const REPEAT_WINDOW: Duration = Duration::from_millis(700);
+
+/// Undo coalescing: rule that decides if an edit with the same label joins the previous undo step.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Coalesce {
+    /// The edit is an undo step of its own.
+    Single,
+    /// The edit joins the previous step if it comes soon enough.
+    Repeat,
+    /// The edits of a gesture (a drag or mode) are one undo step.
+    Gesture,
+}
+
+impl Coalesce {
+    /// Returns `true` if the edit joins. `age` is the time since the previous edit; `None` unless
+    /// its rule was [`Self::Repeat`].
+    fn joins(self, age: Option<Duration>) -> bool {
+        match self {
+            Self::Single => false,
+            Self::Repeat => age.is_some_and(|age| age <= REPEAT_WINDOW),
+            Self::Gesture => true,
+        }
+    }
 }
 
 /// Unit vector (right, up, forward).

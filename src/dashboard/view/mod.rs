@@ -19,7 +19,6 @@ mod theme;
 mod watch;
 
 use crate::dashboard::layout::SMALLEST;
-use crate::dashboard::text;
 use crate::dashboard::{Focus, Layout, Model, Overlay};
 use painter::Painter;
 use picture::PictureView;
@@ -121,11 +120,6 @@ fn too_small([width, height]: [u16; 2], painter: &mut Painter) {
         "zerkalo needs at least {columns} columns and {rows} rows; this terminal has {width} and \
          {height}."
     );
-    let lines = text::wrapped(&message, width.max(1));
     let area = Rect { x: 0, y: 0, width, height };
-    let top = height.saturating_sub(lines.len() as u16) / 2;
-    for (row, line) in (top..).zip(&lines) {
-        let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;
-        painter.row(area, row).skip(indent).put(line, Style::new());
-    }
+    painter.paragraphs(area, &[(message, Style::new())]);
 }

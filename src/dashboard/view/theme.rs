@@ -98,14 +98,9 @@ impl Theme {
     }
 
     /// Returns the style of a colour sample; `None` if the terminal cannot show it.
-    pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
-        match self.colors {
-            Colors::True => Some(Style::new().fg(Color::Rgb(r, g, b))),
-            Colors::Indexed => {
-                let index = nearest_xterm([r, g, b]);
-                Some(Style::new().fg(Color::Indexed(index)))
-            }
-            Colors::Sixteen | Colors::Mono => None,
-        }
+    pub fn swatch(&self, rgb: [u8; 3]) -> Option<Style> {
+        let shows = matches!(self.colors, Colors::True | Colors::Indexed);
+        let color = shows.then(|| self.color((rgb, nearest_xterm(rgb), Color::Reset)))?;
+        color.map(|color| Style::new().fg(color))
     }
 }

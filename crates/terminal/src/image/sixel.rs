@@ -19,7 +19,7 @@ pub fn transfer(
     cell_height: usize,
     colors: u16,
 ) -> Result<Transfer, String> {
-    let mut transfer = Transfer { divisible: true, destroys: true, ..Transfer::default() };
+    let mut transfer = Transfer { is_sixel: true, ..Transfer::default() };
     let rows = place.height.div_ceil(MAX_STRIPS).max(1);
     let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
     let width = image.width;

@@ -10,12 +10,11 @@ pub struct Transfer {
     /// Offsets between escape sequences, ascending, at which other output may be sent. The last is
     /// the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if sequences may be divided at any byte and ended early by ST (string terminator).
-    pub divisible: bool,
+    /// `true` for sixel: sequences may be divided at any byte and ended early by ST (string
+    /// terminator), and the image overwrites its cells, which must be drawn again after its removal.
+    pub is_sixel: bool,
     /// Bytes that remove the image, even if only a part of it was sent.
     pub remove: Vec<u8>,
-    /// `true` if the image overwrites its cells, which must be drawn again after its removal.
-    pub destroys: bool,
 }
 
 impl Transfer {
@@ -26,12 +25,12 @@ impl Transfer {
     /// If not even one sequence fits, a divisible one is cut, and an indivisible one is returned
     /// whole.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
-        let room = room.max(usize::from(self.divisible));
+        let room = room.max(usize::from(self.is_sixel));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
         let fitting = later_stops.partition_point(|stop| *stop <= sent.saturating_add(room));
         match (fitting, later_stops.first()) {
             (_, None) => (sent..sent, false),
-            (0, Some(stop)) if !self.divisible => (sent..*stop, false),
+            (0, Some(stop)) if !self.is_sixel => (sent..*stop, false),
             (0, Some(_)) => (sent..sent + room, true),
             (fitting, _) => (sent..later_stops[fitting - 1], false),
         }
@@ -53,7 +52,7 @@ mod tests {
     #[test]
     fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {
-            let mut transfer = Transfer { divisible, ..Transfer::default() };
+            let mut transfer = Transfer { is_sixel: divisible, ..Transfer::default() };
             for length in [1, 7, 30, 2, 2, 100, 1] {
                 transfer.add(&vec![length as u8; length]);
             }

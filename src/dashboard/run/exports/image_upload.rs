@@ -56,21 +56,16 @@ impl ImageUpload {
         (self.sent, self.open) = (range.end, open);
     }
 
-    /// Returns the escape sequence that removes the sent part, and `true` if the cells under it
-    /// must be drawn again.
-    pub fn removal(&self) -> (Vec<u8>, bool) {
-        let transfer = &self.image.transfer;
-        if !self.has_begun() {
-            return (Vec::new(), false);
-        }
+    /// Returns the escape sequence that removes the sent part.
+    pub fn removal(&self) -> Vec<u8> {
         let end = if self.open { END } else { b"" };
-        ([end, &transfer.remove].concat(), transfer.destroys)
+        [end, &self.image.transfer.remove].concat()
     }
 
     /// Returns an escape sequence that removes the image at any progress of its upload, and clears
     /// the screen if the image has overwritten cells.
     pub fn any_removal(&self) -> Vec<u8> {
-        let clear: &[u8] = if self.image.transfer.destroys { b"\x1b[2J" } else { b"" };
+        let clear: &[u8] = if self.image.transfer.is_sixel { b"\x1b[2J" } else { b"" };
         [END, &self.image.transfer.remove, clear].concat()
     }
 }

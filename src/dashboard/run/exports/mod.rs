@@ -3,7 +3,6 @@
 pub mod image_upload;
 pub mod image_viewer;
 pub mod paths;
-mod shrink;
 
 use crate::dashboard::run::files::SharedFile;
 use crate::dashboard::run::worker::Worker;
