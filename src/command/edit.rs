@@ -76,13 +76,9 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
         match exported {
-            Ok(exported) => lines.push(summary(exported)),
-            Err(reason) => warn(reason),
-        }
-    }
-    for written in &ended.checkpoints {
-        match written {
-            Ok(path) => lines.push(format!("{}  checkpoint", path.display())),
+            Ok(Exported { path, description, .. }) => {
+                lines.push(format!("{}  {description}", path.display()));
+            }
             Err(reason) => warn(reason),
         }
     }
@@ -160,18 +156,6 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     }
 }
 
-/// Formats an exported picture, such as `mirror-room-1.png 640x480 212 spp noise 0.50 8-bit
-/// levels`.
-fn summary(exported: &Exported) -> String {
-    let [width, height] = exported.size;
-    let noise = match exported.noise_levels {
-        Some(levels) => format!("{levels:.2} 8-bit levels"),
-        None => "unknown".to_string(),
-    };
-    let path = exported.path.display();
-    format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,17 +176,11 @@ mod tests {
     fn ended(signalled: Option<u8>) -> Ended {
         let exported = Exported {
             path: PathBuf::from("room.png"),
-            size: [60, 40],
-            spp: 4.0,
-            noise_levels: None,
-            scp: String::new(),
+            description: "60x40  4 spp  noise unknown".to_string(),
+            advice: String::new(),
+            size: Some([60, 40]),
         };
-        Ended {
-            signalled,
-            exported: vec![Ok(exported)],
-            kept: Ok(None),
-            checkpoints: vec![Ok(PathBuf::from("room.film"))],
-        }
+        Ended { signalled, exported: vec![Ok(exported)], kept: Ok(None) }
     }
 
     /// Checks that the program returns the exit status of a signal even if writing to standard
@@ -218,7 +196,7 @@ mod tests {
         assert_eq!(status(None, &mut Gone), 1, "a result that is not shown is a failure");
         let mut text = Vec::new();
         assert_eq!(status(None, &mut text), 0);
-        let expected = "room.png  60x40  4 spp  noise unknown\nroom.film  checkpoint\n";
+        let expected = "room.png  60x40  4 spp  noise unknown\n";
         assert_eq!(String::from_utf8(text).unwrap(), expected);
     }
 }

@@ -36,10 +36,8 @@ pub enum Message {
     OrphanedEdits(OrphanedEdits),
     /// Warning that is shown until the next key.
     Warning(String),
-    /// Exported image, or the reason of the failure.
+    /// Written image or checkpoint, or the reason of the failure.
     Exported(Result<Exported, String>),
-    /// Result of [`Effect::Checkpoint`].
-    CheckpointWritten(Result<PathBuf, String>),
     /// Progress of [`Effect::ExportSized`], 0..=1.
     ExportProgress(f64),
     /// Result of [`Effect::ViewImage`] for the file at this path.
@@ -62,18 +60,16 @@ pub struct OrphanedEdits {
     pub changed: bool,
 }
 
-/// Exported image file.
+/// Exported file: an image or a checkpoint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
     pub path: PathBuf,
-    /// Width and height in pixels.
-    pub size: [usize; 2],
-    /// Mean number of samples per pixel.
-    pub spp: f64,
-    /// Estimated RMSE of the displayed image.
-    pub noise_levels: Option<f64>,
-    /// Argument of scp that copies the image file, such as `user@host:path`.
-    pub scp: String,
+    /// Description, such as `640x480  212 spp  noise 0.50 levels`.
+    pub description: String,
+    /// Advice on the next step, such as the command that copies an image from another machine.
+    pub advice: String,
+    /// Width and height in pixels; `None` for a checkpoint.
+    pub size: Option<[usize; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

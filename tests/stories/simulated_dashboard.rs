@@ -151,12 +151,16 @@ impl Desk {
             }
             Effect::Export(format) => Message::Exported(Ok(Exported {
                 path: format!("room-1.{}", format.extension()).into(),
-                size: [64, 48],
-                spp: 16.0,
-                noise_levels: Some(2.5),
-                scp: "me@here:room-1.png".into(),
+                description: "64x48  16 spp  noise 2.50 levels".into(),
+                advice: "scp me@here:room-1.png .".into(),
+                size: Some([64, 48]),
             })),
-            Effect::Checkpoint(_) => Message::CheckpointWritten(Ok("room-1.zk".into())),
+            Effect::Checkpoint(_) => Message::Exported(Ok(Exported {
+                path: "room-1.zk".into(),
+                description: "checkpoint".into(),
+                advice: "`zerkalo room-1.zk` continues it".into(),
+                size: None,
+            })),
             Effect::Pin => {
                 let header = Header {
                     width: 64,

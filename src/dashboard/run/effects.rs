@@ -188,7 +188,7 @@ impl EffectRunner {
         self.session.checkpoint(self.exporter.provenance(scene), move |checkpoint| {
             let _running = running;
             let written = exporter.write_checkpoint(checkpoint);
-            let _ = results.send(Message::CheckpointWritten(written));
+            let _ = results.send(Message::Exported(written));
         });
     }
 

@@ -70,13 +70,11 @@ pub struct Ended {
     pub exported: Vec<Result<Exported, String>>,
     /// Path of the recovery file with unsaved edits, or the reason why unsaved edits are lost.
     pub kept: Result<Option<PathBuf>, String>,
-    /// Checkpoints that ended after the screen was restored.
-    pub checkpoints: Vec<Result<PathBuf, String>>,
 }
 
 impl Ended {
     fn new(signalled: Option<u8>, kept: Result<Option<PathBuf>, String>) -> Self {
-        Self { signalled, exported: Vec::new(), kept, checkpoints: Vec::new() }
+        Self { signalled, exported: Vec::new(), kept }
     }
 }
 
@@ -188,8 +186,6 @@ fn end(
     for message in dashboard.done.try_iter() {
         if let Message::Exported(result) = message {
             ended.exported.push(result);
-        } else if let Message::CheckpointWritten(result) = message {
-            ended.checkpoints.push(result);
         }
     }
     if let Some(path) = trace {

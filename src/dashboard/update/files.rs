@@ -174,31 +174,19 @@ impl UpdateContext<'_> {
 
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
-            Ok(Exported { path, size: [width, height], spp, noise_levels, scp }) => {
-                // An image of its size ends the export in the background.
-                self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
-                let noise = noise_levels.map_or(String::new(), |n| format!("  noise {n:.2}"));
-                let text = format!(
-                    "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",
-                    path.display()
-                );
-                self.model.last_export = Some(path);
+            Ok(Exported { path, description, advice, size }) => {
+                let text = format!("{}  {description}  ·  {advice}", path.display());
+                if let Some(size) = size {
+                    // An image of its size ends the export in the background.
+                    self.model.export.take_if(|e| e.size.map(|n| n as usize) == size);
+                    self.model.last_export = Some(path);
+                }
                 self.notify(Tone::Good, text, None);
             }
             Err(reason) => {
                 self.model.export = None;
                 self.notify(Tone::Bad, capital(&reason), None);
             }
-        }
-    }
-
-    pub(super) fn checkpoint_written(&mut self, result: Result<PathBuf, String>) {
-        match result {
-            Ok(path) => {
-                let path = path.display();
-                self.notify(Tone::Good, format!("{path}  ·  `zerkalo {path}` continues it"), None);
-            }
-            Err(reason) => self.notify(Tone::Bad, capital(&reason), None),
         }
     }
 

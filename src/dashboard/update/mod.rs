@@ -119,7 +119,6 @@ impl UpdateContext<'_> {
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
             Message::Exported(result) => self.exported(result),
-            Message::CheckpointWritten(result) => self.checkpoint_written(result),
             Message::ExportProgress(progress) => {
                 if let Some(export) = &mut self.model.export {
                     export.progress = progress;

@@ -10,7 +10,7 @@ use crate::dashboard::{Exported, Format, Message};
 use crossbeam_channel::{Sender, bounded};
 use paths::{numbered, scp};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -52,12 +52,14 @@ impl Exporter {
         };
         let stem = self.stem(header.source().unwrap_or_default());
         let path = numbered(&stem, format.extension(), write)?;
+        let size @ [width, height] = [picture.film.width(), picture.film.height()];
+        let (spp, noise) = (picture.report.spp.mean, picture.report.noise);
+        let noise = noise.map_or("unknown".to_string(), |n| format!("{:.2} levels", n.rmse_levels));
         Ok(Exported {
-            scp: scp(&path),
+            description: format!("{width}x{height}  {spp:.0} spp  noise {noise}"),
+            advice: format!("o shows it, y copies the path  ·  scp {} .", scp(&path)),
             path,
-            size: [picture.film.width(), picture.film.height()],
-            spp: picture.report.spp.mean,
-            noise_levels: picture.report.noise.map(|noise| noise.rmse_levels),
+            size: Some(size),
         })
     }
 
@@ -76,9 +78,12 @@ impl Exporter {
     pub fn write_checkpoint(
         &self,
         checkpoint: Option<EncodedCheckpoint>,
-    ) -> Result<PathBuf, String> {
+    ) -> Result<Exported, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
-        numbered(&self.stem(""), "zk", |path| checkpoint.write(path, Existing::Refuse))
+        let write = |path: &Path| checkpoint.write(path, Existing::Refuse);
+        let path = numbered(&self.stem(""), "zk", write)?;
+        let advice = format!("`zerkalo {}` continues it", path.display());
+        Ok(Exported { path, description: "checkpoint".to_string(), advice, size: None })
     }
 
     /// Returns the beginning of file names. `source` is the name of a scene file that this process
