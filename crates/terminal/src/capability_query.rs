@@ -83,21 +83,33 @@ pub fn query_capabilities(
         capabilities.learn(reply);
         matches!(reply, Reply::Attributes(_))
     })?;
-    if let (Some(_), Some(multiplexer)) =
-        (&capabilities.environment.ssh, capabilities.environment.multiplexer)
-    {
-        let sent_at = Instant::now();
-        tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
-        listen(input, sent_at + PATIENCE, is_ending, |at, reply| {
-            capabilities.learn(reply);
-            let is_reply = matches!(reply, Reply::Cursor { .. });
-            if is_reply {
-                capabilities.passthrough = Some(at.saturating_duration_since(sent_at));
-            }
-            is_reply
-        })?;
+    if capabilities.environment.ssh.is_some() {
+        query_passthrough(tty, input, &mut capabilities, is_ending)?;
     }
     Ok(capabilities)
+}
+
+/// Measures the round trip to the terminal outside a multiplexer, if there is one, by a request of
+/// the cursor position.
+///
+/// # Errors Fails if the terminal is closed.
+pub fn query_passthrough(
+    tty: &Tty,
+    input: &mut InputReader,
+    capabilities: &mut Capabilities,
+    is_ending: &dyn Fn() -> bool,
+) -> io::Result<()> {
+    let Some(multiplexer) = capabilities.environment.multiplexer else { return Ok(()) };
+    let sent_at = Instant::now();
+    tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
+    listen(input, sent_at + PATIENCE, is_ending, |at, reply| {
+        capabilities.learn(reply);
+        let is_reply = matches!(reply, Reply::Cursor { .. });
+        if is_reply {
+            capabilities.passthrough = Some(at.saturating_duration_since(sent_at));
+        }
+        is_reply
+    })
 }
 
 /// Passes replies to `take` until it returns `true`, `deadline` has come, or `is_ending` returns

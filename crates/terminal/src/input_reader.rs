@@ -52,8 +52,14 @@ impl InputReader {
             let patience = self.decoder.patience();
             let gives_up = patience.is_some_and(|p| time_left.is_none_or(|left| p <= left));
             let wait = if gives_up { patience } else { time_left };
-            let Some(ready) = self.is_ready(wait)? else { continue };
-            let events = if ready {
+            let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
+            let is_ready = match poll(&mut [PollFd::new(&self.stdin, PollFlags::IN)], wait.as_ref())
+            {
+                Ok(ready) => ready > 0,
+                Err(rustix::io::Errno::INTR) => continue,
+                Err(error) => return Err(error.into()),
+            };
+            let events = if is_ready {
                 let read = match rustix::io::read(&self.stdin, &mut *self.buffer) {
                     Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                     Ok(read) => read,
@@ -70,18 +76,6 @@ impl InputReader {
                 let at = Instant::now();
                 return Ok(events.into_iter().map(|event| TimedEvent { at, event }).collect());
             }
-        }
-    }
-
-    /// Waits at most `wait` for input. Returns `Some(true)` if it has arrived, `Some(false)` if the
-    /// time is over, and `None` after a signal.
-    fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
-        let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
-        let mut stdin = [PollFd::new(&self.stdin, PollFlags::IN)];
-        match poll(&mut stdin, wait.as_ref()) {
-            Ok(ready) => Ok(Some(ready > 0)),
-            Err(rustix::io::Errno::INTR) => Ok(None),
-            Err(error) => Err(error.into()),
         }
     }
 }

@@ -73,9 +73,9 @@ impl Dashboard {
             let timer = wait.into_iter().chain(wants_snapshot).min().map_or(never(), after);
             select! {
                 recv(input) -> event => match event {
-                    Ok(Ok(event)) => self.enqueue(event, &mut waiting),
+                    Ok(event) => self.enqueue(event, &mut waiting),
                     // The terminal is gone.
-                    Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
+                    Err(_) => return Ok(Some(HUNG_UP)),
                 },
                 recv(wakeup) -> notified => match notified {
                     Ok(()) => self.take_snapshot(),
@@ -85,10 +85,12 @@ impl Dashboard {
                 recv(done) -> message => if let Ok(message) = message {
                     self.dispatch(message);
                 },
-                recv(written) -> frame => if let Ok(result) = frame {
-                    self.frames.record_written();
-                    let Ok(at) = result else { return Ok(Some(HUNG_UP)) };
-                    self.latency.written(at);
+                recv(written) -> at => match at {
+                    Ok(at) => {
+                        self.frames.record_written();
+                        self.latency.written(at);
+                    }
+                    Err(_) => return Ok(Some(HUNG_UP)),
                 },
                 recv(signals) -> event => {
                     if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
@@ -98,7 +100,7 @@ impl Dashboard {
                 recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(Ok(event)) = input.try_recv() {
+            while let Ok(event) = input.try_recv() {
                 self.enqueue(event, &mut waiting);
             }
             if let Some(status) = self.handle(&mut waiting) {
@@ -148,7 +150,7 @@ impl Dashboard {
     pub fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
-            let Ok(Ok(event)) = self.terminal_io.input.recv_timeout(left) else { break };
+            let Ok(event) = self.terminal_io.input.recv_timeout(left) else { break };
             self.enqueue(event, &mut Vec::new());
             if !self.frames.flow.is_waiting() {
                 break;

@@ -16,22 +16,14 @@ pub struct Input {
     pub message: Message,
 }
 
-/// Starts a thread that sends terminal events to the returned receiver, until a read fails; then
-/// the error.
-pub fn read(mut reader: InputReader) -> io::Result<Receiver<io::Result<TimedEvent>>> {
+/// Starts a thread that sends terminal events to the returned receiver, which is disconnected as
+/// soon as a read fails.
+pub fn read(mut reader: InputReader) -> io::Result<Receiver<TimedEvent>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
-        loop {
-            match reader.wait(None) {
-                Ok(events) => {
-                    if events.into_iter().any(|event| sender.send(Ok(event)).is_err()) {
-                        break;
-                    }
-                }
-                Err(error) => {
-                    let _ = sender.send(Err(error));
-                    break;
-                }
+        while let Ok(events) = reader.wait(None) {
+            if events.into_iter().any(|event| sender.send(event).is_err()) {
+                break;
             }
         }
     })?;

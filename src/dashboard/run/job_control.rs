@@ -30,7 +30,7 @@ const STOPS_WITHIN: Duration = Duration::from_millis(500);
 #[derive(Clone)]
 pub(super) struct TerminalIo {
     pub tty: Arc<Tty>,
-    pub input: Receiver<io::Result<TimedEvent>>,
+    pub input: Receiver<TimedEvent>,
     pub signals: Receiver<SignalEvent>,
     /// Notification that the terminal has been restored for good, for example after a panic.
     pub left: Receiver<()>,

@@ -9,8 +9,9 @@ use zerkalo_terminal::Tty;
 
 pub struct Writer {
     pub frames: Sender<Vec<u8>>,
-    /// Time at which each frame was completely written, or the error.
-    pub written: Receiver<io::Result<Instant>>,
+    /// Time at which each frame was completely written. The receiver is disconnected as soon as a
+    /// write fails.
+    pub written: Receiver<Instant>,
 }
 
 pub fn start(tty: Arc<Tty>) -> io::Result<Writer> {
@@ -18,8 +19,7 @@ pub fn start(tty: Arc<Tty>) -> io::Result<Writer> {
     let (results, written) = bounded(1);
     thread::Builder::new().name("writer".into()).spawn(move || {
         for frame in inbox {
-            let result = tty.write(&frame).map(|()| Instant::now());
-            if results.send(result).is_err() {
+            if tty.write(&frame).is_err() || results.send(Instant::now()).is_err() {
                 break;
             }
         }

@@ -1,7 +1,7 @@
 //! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
 //! the estimated time at which it is reached.
 
-use crate::dashboard::text::{columns, number};
+use crate::dashboard::text::{self, columns};
 use crate::dashboard::view::false_color::positive_range;
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::{BORDER, Layout, Model};
@@ -10,6 +10,7 @@ use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
+use zerkalo_scene::value::{number, round_significant};
 
 /// Logarithmic axis from `low` to `high`, both greater than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,14 +43,10 @@ impl Axis {
     }
 }
 
-/// Formats the value of a tick, such as `0.5` or `20`.
+/// Formats the value of a tick, such as `0.5` or `20`, without the error of a product with a
+/// negative power of ten.
 fn label(value: f64) -> String {
-    if (1e-3..1e6).contains(&value) {
-        // Rounding removes the error of a product with a negative power of ten.
-        format!("{}", (value * 1e6).round() / 1e6)
-    } else {
-        format!("{value:.0e}")
-    }
+    number(round_significant(value, 3))
 }
 
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
@@ -65,7 +62,11 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         return;
     };
     let mut title = painter.edge(area, 0);
-    title.skip(14).put_right(&format!(" {} levels ", number(last.noise_levels)), 0, theme.text());
+    title.skip(14).put_right(
+        &format!(" {} levels ", text::number(last.noise_levels)),
+        0,
+        theme.text(),
+    );
     let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
     // The expected time is the mean of its bounds.
