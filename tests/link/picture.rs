@@ -5,7 +5,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use zerkalo_render::schedule::Schedule;
-use zerkalo_terminal::cells::{Colors, Oklab, PictureCells, Raster};
+use zerkalo_terminal::cells::{Colors, Oklab, Raster, picture_cells};
 use zerkalo_terminal::diff::TargetFrame;
 
 pub const SCREEN: [u16; 2] = [160, 45];
@@ -66,9 +66,9 @@ impl Work {
         let [width, height] = [PICTURE.width, 2 * PICTURE.height].map(usize::from);
         let raster = Raster::from_fn(width, height, |i| to_8(radiance[i]));
         self.cells.reset();
-        let picture = PictureCells::new(&raster, Colors::True, self.done);
-        for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {
-            self.cells[at].set_char(cell.glyph).set_style(Style::new().fg(cell.fg).bg(cell.bg));
+        let picture = picture_cells(&raster, Colors::True, self.done);
+        for (cell, at) in picture.content.into_iter().zip(PICTURE.positions()) {
+            self.cells[at] = cell;
         }
         let text = format!(" {} samples per pixel, wave {}", self.samples, self.version);
         self.cells.set_string(0, PICTURE.height, text, Style::new());

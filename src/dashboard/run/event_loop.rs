@@ -171,8 +171,9 @@ impl Dashboard {
                 Outcome::Rendering(generation) => {
                     // A change of lights alone needs none: the snapshot has one picture per light
                     // group.
-                    let mix = |s: &Box<Snapshot>| s.mix_for(self.model.scene());
-                    if !is_edit || self.model.snapshot.as_ref().and_then(mix).is_none() {
+                    let snapshot = self.model.snapshot.as_deref();
+                    let mix = snapshot.and_then(|s| s.mix_for(self.model.scene()));
+                    if !is_edit || mix.is_none() {
                         awaited = Some(generation);
                     }
                 }

@@ -3,14 +3,15 @@
 use crate::dashboard::view::painter::Painter;
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::{Model, ViewedImage, short_name};
+use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
-use zerkalo_terminal::cells::PictureCells;
+use zerkalo_terminal::cells::picture_cells;
 use zerkalo_terminal::image::{Protocol, ViewerImage};
 
 /// Draws the viewed image in half blocks and returns these cells. The uploaded image later replaces
 /// them. Returns `None` if the image is still being read, or placeholder characters show it.
-pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<PictureCells> {
+pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<Buffer> {
     let theme = painter.theme;
     let [width, height] = model.screen;
     let last = Rect { x: 0, y: height.saturating_sub(1), width, height: 1 };
@@ -35,7 +36,7 @@ pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Optio
         }
         return None;
     }
-    let cells = PictureCells::new(&image.raster, model.colors, true);
+    let cells = picture_cells(&image.raster, model.colors, true);
     paint(&cells, place, painter.buffer);
     Some(cells)
 }

@@ -6,7 +6,7 @@ use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
-use zerkalo_terminal::cells::{PictureCells, Raster};
+use zerkalo_terminal::cells::{Raster, picture_cells};
 
 const BAR: usize = 12;
 
@@ -58,7 +58,7 @@ impl Legend {
             line.put(" ", Style::new()).put(&self.unit, theme.dim());
         }
         line.put(" ", Style::new());
-        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, line.buffer);
+        paint(&picture_cells(&self.bar, theme.colors, false), bar, line.buffer);
     }
 }
 

@@ -27,14 +27,14 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use ratatui::style::Style;
 use theme::Theme;
-use zerkalo_terminal::cells::{Colors, PictureCells};
+use zerkalo_terminal::cells::{Colors, picture_cells};
 
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
     /// Inputs of `picture`.
     made_for: Option<Version>,
-    picture: PictureCells,
+    picture: Buffer,
     /// Rectangle in which the picture was last drawn.
     pub place: Rect,
     /// Row-major mask of the cells of `place`: `true` if nothing covers the cell.
@@ -46,12 +46,12 @@ type Version = (u64, [usize; 2], Colors);
 
 impl View {
     /// Returns the cells of the picture for the area in `layout`.
-    pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
+    pub fn picture(&mut self, model: &Model, layout: &Layout) -> &Buffer {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
             let settled = picture::is_settled(model);
             let raster = self.imager.raster(model, layout.raster);
-            self.picture = PictureCells::new(&raster, model.colors, settled);
+            self.picture = picture_cells(&raster, model.colors, settled);
             self.made_for = Some(version);
         }
         &self.picture

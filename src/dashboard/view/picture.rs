@@ -5,11 +5,10 @@ use crate::dashboard::view::legend::Legend;
 use crate::dashboard::{CompareView, DisplayChannel, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
 use std::sync::Arc;
 use zerkalo_render::film::{Display, LinearImage, TILE};
 use zerkalo_render::session::{Snapshot, State};
-use zerkalo_terminal::cells::{PictureCells, Raster};
+use zerkalo_terminal::cells::Raster;
 use zerkalo_world::FirstHit;
 
 /// Converter of the model to rasters, images of half cells.
@@ -196,28 +195,22 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
 }
 
 /// Draws `cells` into `area` from its upper left corner.
-pub fn paint(cells: &PictureCells, area: Rect, buffer: &mut Buffer) {
+pub fn paint(cells: &Buffer, area: Rect, buffer: &mut Buffer) {
     for at in area.intersection(buffer.area).positions() {
-        if let Some(cell) = cells.cell(at.x - area.x, at.y - area.y) {
-            buffer[at].set_char(cell.glyph).set_style(Style::new().fg(cell.fg).bg(cell.bg));
+        if let Some(cell) = cells.cell((at.x - area.x, at.y - area.y)) {
+            buffer[at] = cell.clone();
         }
     }
 }
 
 /// Returns the rectangle into which [`paint`] drew `cells`, and a row-major mask that is `true`
 /// where nothing was drawn over them.
-pub fn visible_mask(cells: &PictureCells, area: Rect, buffer: &Buffer) -> (Rect, Vec<bool>) {
+pub fn visible_mask(cells: &Buffer, area: Rect, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Rect { x, y, width, height } = area;
-    let (width, height) = (width.min(cells.columns), height.min(cells.rows));
+    let (width, height) = (width.min(cells.area.width), height.min(cells.area.height));
     let place = Rect { x, y, width, height }.intersection(buffer.area);
-    let visible_mask = place.positions().map(|at| {
-        let (Some(cell), now) = (cells.cell(at.x - x, at.y - y), &buffer[at]) else {
-            return false;
-        };
-        let same_glyph = now.symbol().chars().eq([cell.glyph]);
-        same_glyph && [now.fg, now.bg] == [cell.fg, cell.bg] && now.modifier.is_empty()
-    });
-    (place, visible_mask.collect())
+    let mask = place.positions().map(|at| buffer[at] == cells[(at.x - x, at.y - y)]);
+    (place, mask.collect())
 }
 
 #[cfg(test)]

@@ -11,6 +11,8 @@ pub use mosaic::blocks;
 pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
 use palette_quantisation::xterm_rgb;
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::Rect;
 use ratatui::style::Color;
 
 /// Set of colours that a terminal shows.
@@ -116,54 +118,46 @@ const PLAIN_FG: [u8; 3] = [229; 3];
 /// Assumed default background of a terminal, 8-bit sRGB.
 const PLAIN_BG: [u8; 3] = [0; 3];
 
-/// Image converted to terminal cells.
-#[derive(Clone, Debug, PartialEq, Eq, Default)]
-pub struct PictureCells {
-    pub columns: u16,
-    pub rows: u16,
-    /// Cells, row by row.
-    pub cells: Vec<PictureCell>,
+impl From<&Cell> for PictureCell {
+    fn from(cell: &Cell) -> Self {
+        let glyph = cell.symbol().chars().next().unwrap_or(' ');
+        Self { glyph, fg: cell.fg, bg: cell.bg }
+    }
 }
 
-impl PictureCells {
-    /// Converts `raster` for a terminal with `colors`. In 256 colours only a settled picture is
-    /// dithered, because a changing one would flicker.
-    ///
-    /// The last row of cells is half empty if the raster has an odd number of rows.
-    pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
-        let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
-        let rgb = |pixel: usize| raster.pixels[pixel];
-        let color = |pixel: usize| match &dithered {
-            Some(indices) => Color::Indexed(indices[pixel]),
-            None if colors == Colors::True => Color::from(rgb(pixel)),
-            None => Color::Indexed(nearest_xterm(rgb(pixel))),
-        };
-        let cell = |index: usize| {
-            let upper = index / raster.width * 2 * raster.width + index % raster.width;
-            let lower = Some(upper + raster.width).filter(|pixel| *pixel < raster.pixels.len());
-            match (colors, lower) {
-                (Colors::True | Colors::Indexed, _) => two_halves(color(upper), lower.map(color)),
-                (Colors::Sixteen, Some(lower)) => glyph_shading::pair(rgb(upper), rgb(lower)),
-                (Colors::Sixteen, None) => {
-                    two_halves(Color::Indexed(glyph_shading::nearest(rgb(upper))), None)
-                }
-                (Colors::Mono, Some(lower)) => glyph_shading::pair_mono(rgb(upper), rgb(lower)),
-                (Colors::Mono, None) if Oklab::of(rgb(upper)).l < 0.5 => PictureCell::default(),
-                (Colors::Mono, None) => two_halves(Color::Reset, None),
+/// Converts `raster` to cells of a terminal with `colors`. In 256 colours only a settled picture is
+/// dithered, because a changing one would flicker.
+///
+/// The last row of cells is half empty if the raster has an odd number of rows.
+pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {
+    let dithered = (settled && colors == Colors::Indexed).then(|| dither::dithered(raster));
+    let rgb = |pixel: usize| raster.pixels[pixel];
+    let color = |pixel: usize| match &dithered {
+        Some(indices) => Color::Indexed(indices[pixel]),
+        None if colors == Colors::True => Color::from(rgb(pixel)),
+        None => Color::Indexed(nearest_xterm(rgb(pixel))),
+    };
+    let cell = |index: usize| {
+        let upper = index / raster.width * 2 * raster.width + index % raster.width;
+        let lower = Some(upper + raster.width).filter(|pixel| *pixel < raster.pixels.len());
+        match (colors, lower) {
+            (Colors::True | Colors::Indexed, _) => two_halves(color(upper), lower.map(color)),
+            (Colors::Sixteen, Some(lower)) => glyph_shading::pair(rgb(upper), rgb(lower)),
+            (Colors::Sixteen, None) => {
+                two_halves(Color::Indexed(glyph_shading::nearest(rgb(upper))), None)
             }
-        };
-        let rows = raster.height.div_ceil(2);
-        let cells = (0..raster.width * rows).map(cell).collect();
-        Self { columns: raster.width as u16, rows: rows as u16, cells }
+            (Colors::Mono, Some(lower)) => glyph_shading::pair_mono(rgb(upper), rgb(lower)),
+            (Colors::Mono, None) if Oklab::of(rgb(upper)).l < 0.5 => PictureCell::default(),
+            (Colors::Mono, None) => two_halves(Color::Reset, None),
+        }
+    };
+    let mut buffer =
+        Buffer::empty(Rect::new(0, 0, raster.width as u16, raster.height.div_ceil(2) as u16));
+    for (index, out) in buffer.content.iter_mut().enumerate() {
+        let PictureCell { glyph, fg, bg } = cell(index);
+        out.set_char(glyph).set_fg(fg).set_bg(bg);
     }
-
-    /// Returns the cell at `column` and `row`; `None` outside the image.
-    pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
-        let inside = column < self.columns && row < self.rows;
-        inside.then(|| {
-            &self.cells[usize::from(row) * usize::from(self.columns) + usize::from(column)]
-        })
-    }
+    buffer
 }
 
 /// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.

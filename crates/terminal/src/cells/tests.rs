@@ -11,27 +11,29 @@ fn checker(width: usize, height: usize) -> Raster {
 
 #[test]
 fn cell_shows_two_pixels() {
-    let cells = PictureCells::new(&checker(3, 4), Colors::True, false);
-    assert_eq!((cells.columns, cells.rows, cells.cells.len()), (3, 2, 6));
+    let cells = picture_cells(&checker(3, 4), Colors::True, false);
+    assert_eq!((cells.area, cells.content.len()), (Rect::new(0, 0, 3, 2), 6));
     let [red, sky] = [Color::from(RED), Color::from(SKY)];
-    assert_eq!(cells.cell(0, 0), Some(&PictureCell { glyph: '▀', fg: red, bg: sky }));
-    assert_eq!(cells.cell(1, 0), Some(&PictureCell { glyph: '▀', fg: sky, bg: red }));
-    assert_eq!([cells.cell(3, 0), cells.cell(0, 2)], [None, None]);
+    let [first, second] = [0, 1].map(|index| PictureCell::from(&cells.content[index]));
+    assert_eq!(first, PictureCell { glyph: '▀', fg: red, bg: sky });
+    assert_eq!(second, PictureCell { glyph: '▀', fg: sky, bg: red });
 }
 
 #[test]
 fn equal_halves_are_a_space() {
-    let cells = PictureCells::new(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
-    assert_eq!(cells.cells, [PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::from(SKY) }]);
+    let cells = picture_cells(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
+    let expected = PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::from(SKY) };
+    assert_eq!(PictureCell::from(&cells.content[0]), expected);
 }
 
 #[test]
 fn odd_last_row_leaves_lower_half_plain() {
     for colors in Colors::ALL {
         for settled in [false, true] {
-            let cells = PictureCells::new(&checker(2, 3), colors, settled);
-            assert_eq!((cells.columns, cells.rows, cells.cells.len()), (2, 2, 4));
-            for cell in &cells.cells[2..] {
+            let cells = picture_cells(&checker(2, 3), colors, settled);
+            assert_eq!(cells.area, Rect::new(0, 0, 2, 2));
+            for cell in &cells.content[2..] {
+                let cell = PictureCell::from(cell);
                 assert_eq!(cell.bg, Color::Reset, "{colors:?}");
                 assert!(cell.glyph == '▀' || cell.glyph == ' ', "{colors:?}");
             }
@@ -43,25 +45,25 @@ fn odd_last_row_leaves_lower_half_plain() {
 fn any_size_is_converted() {
     for (width, height) in [(0, 0), (0, 3), (3, 0), (1, 1)] {
         for colors in Colors::ALL {
-            let cells = PictureCells::new(&Raster::from_fn(width, height, |_| SKY), colors, true);
-            assert_eq!(cells.cells.len(), width * height.div_ceil(2));
+            let cells = picture_cells(&Raster::from_fn(width, height, |_| SKY), colors, true);
+            assert_eq!(cells.content.len(), width * height.div_ceil(2));
         }
     }
 }
 
 /// Returns the mean OKLab distance between the pixels of an image with gradients and the terminal
-/// cells that show it. `settled` is passed to [`PictureCells::new`].
+/// cells that show it. `settled` is passed to [`picture_cells`].
 fn mean_error(colors: Colors, settled: bool) -> f32 {
     let (width, height) = (64, 64);
     let raster = Raster::from_fn(width, height, |i| {
         let (x, y) = (i % width * 4, i / width * 4);
         [x as u8, y as u8, (255 - (x + y) / 2) as u8]
     });
-    let cells = PictureCells::new(&raster, colors, settled);
+    let cells = picture_cells(&raster, colors, settled);
     let mut sum = 0.0;
     for (i, rgb) in raster.pixels.iter().enumerate() {
-        let cell = cells.cell((i % width) as u16, (i / width / 2) as u16).unwrap();
-        sum += cell.halves()[i / width % 2].distance(Oklab::of(*rgb));
+        let cell = &cells[((i % width) as u16, (i / width / 2) as u16)];
+        sum += PictureCell::from(cell).halves()[i / width % 2].distance(Oklab::of(*rgb));
     }
     sum / raster.pixels.len() as f32
 }
@@ -94,7 +96,7 @@ fn picture_conversion_time() {
                     [noise + (i % width) as u8, noise + (i / width) as u8, 100 + noise]
                 });
                 let start = std::time::Instant::now();
-                std::hint::black_box(PictureCells::new(&raster, colors, settled));
+                std::hint::black_box(picture_cells(&raster, colors, settled));
                 best = best.min(start.elapsed().as_secs_f64());
             }
             println!("{colors:?} settled {settled}: {:.2} ms", 1e3 * best);

@@ -64,7 +64,7 @@ impl PerceptualDiff {
                 cell_colors.target = None;
                 continue;
             }
-            let picture = picture_cell(cell);
+            let picture = PictureCell::from(cell);
             if cell_colors.target != Some(picture) {
                 cell_colors.target = Some(picture);
                 cell_colors.look = picture.halves();
@@ -92,7 +92,7 @@ impl PerceptualDiff {
     /// Records that the terminal shows `cell`, which equals the target if `exact` is `true`.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
-        let shown = picture_cell(cell).halves();
+        let shown = PictureCell::from(cell).halves();
         cell_colors.shown = Some(shown);
         (cell_colors.counts, cell_colors.visible) = (!exact, !exact);
         cell_colors.error =
@@ -154,9 +154,4 @@ impl PerceptualDiff {
 /// Returns the larger of the distances between upper and between lower halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
-}
-
-fn picture_cell(cell: &Cell) -> PictureCell {
-    let glyph = cell.symbol().chars().next().unwrap_or(' ');
-    PictureCell { glyph, fg: cell.fg, bg: cell.bg }
 }
