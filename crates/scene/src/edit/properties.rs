@@ -82,11 +82,8 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         | Target::IntegratorSettings => None,
     };
     let given = given_key(part, subject);
-    let light = match subject {
-        Target::Light(i) => scene.lights.get(*i),
-        _ => None,
-    };
-    let hidden_key = |name: &str| light.is_some_and(|light| !light.has_key(name));
+    let hidden_key =
+        |name: &str| matches!(subject, Target::Light(i) if !scene.lights[*i].has_key(name));
     for field in fields(subject) {
         if hidden_key(field.name) {
             continue;

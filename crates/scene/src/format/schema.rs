@@ -25,47 +25,41 @@ pub const FIELDS: &[Field] = &[
         IntegratorSettings::FIELDS,
         "Integrator: kinds of rays, depth, acceleration structure.",
     ),
-    Field::optional(
+    optional(
         "camera",
         ValueType::Table(camera::FIELDS),
-        "",
         "at [0.0, 1.0, 5.0], directed at the origin",
         "Camera that the picture is taken from.",
     ),
-    Field::optional(
+    optional(
         "cameras",
         ValueType::Named(camera::FIELDS),
-        "",
         "there are none",
         "Stored cameras by name. The picture is taken from `[camera]`.",
     ),
     table("background", Background::FIELDS, "Radiance of rays that hit no surface."),
     table("ambient", Ambient::FIELDS, "Ambient light: uniform, without shadows."),
-    Field::optional(
-        "light",
-        ValueType::Tables(|| light::FIELDS),
-        "",
-        "there are none",
-        "The lights.",
-    ),
-    Field::optional(
+    optional("light", ValueType::Tables(|| light::FIELDS), "there are none", "The lights."),
+    optional(
         "materials",
         ValueType::Named(material::FIELDS),
-        "",
         "there are none",
         "Materials by name, for the key `material` of objects.",
     ),
-    Field::optional(
-        "object",
-        ValueType::Tables(|| Object::FIELDS),
-        "",
-        "there are none",
-        "The objects.",
-    ),
+    optional("object", ValueType::Tables(|| Object::FIELDS), "there are none", "The objects."),
 ];
 
 const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) -> Field {
-    Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
+    optional(name, ValueType::Table(fields), "its keys have their defaults", doc)
+}
+
+const fn optional(
+    name: &'static str,
+    takes: ValueType,
+    absent: &'static str,
+    doc: &'static str,
+) -> Field {
+    Field::required(name, takes, "", doc).or(absent)
 }
 
 /// Reads `root`, the parsed `part` of the file, into `node`, which has default values and the type
@@ -226,16 +220,24 @@ impl SchemaReader<'_> {
     /// Adds an error if the table of a light, whose byte range is `span`, has no kind or several.
     fn kind_of_light(&mut self, table: &DeTable, span: ops::Range<usize>) {
         let is_known = |key: &str| light::FIELDS.iter().any(|field| field.name == key);
-        let is_kind = |key: &str| light::KIND_KEYS.contains(&key);
-        let mut given: Vec<_> = table.keys().filter(|key| is_kind(key.get_ref())).collect();
+        let mut given: Vec<_> =
+            table.keys().filter(|key| light::KIND_KEYS.contains(&key.get_ref().as_ref())).collect();
         sort_by_number(&mut given, |key| key.span().start as i64);
-        let names: Vec<&str> = given.iter().map(|key| key.get_ref().as_ref()).collect();
-        let may_be_mistyped = given.is_empty() && !table.keys().all(|key| is_known(key.get_ref()));
-        if let Err((found, expected)) = light::check_kinds(&names)
-            && !may_be_mistyped
-        {
-            let span = given.get(1).map_or(span, |second| second.span());
-            self.add(span, found, format!("Expected {expected}."));
+        match given.as_slice() {
+            [first, second, ..] => {
+                let found = format!("both {} and {} are given", first.get_ref(), second.get_ref());
+                let help = "Expected exactly one kind; a second light needs its own [[light]].";
+                self.add(second.span(), found, help.to_string());
+            }
+            [] if table.keys().all(|key| is_known(key.get_ref())) => {
+                let kinds = light::KIND_KEYS.join(", ");
+                let help = format!(
+                    "Expected one of {kinds}, such as point = {{ position = [2.0, 4.0, 3.0] }}."
+                );
+                self.add(span, "the light has no kind".to_string(), help);
+            }
+            // Without a kind, an unknown key may be a mistyped one, which has an error already.
+            [_] | [] => {}
         }
     }
 

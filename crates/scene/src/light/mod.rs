@@ -28,7 +28,7 @@ pub use environment::{Environment, EnvironmentLight};
 pub use form::{EmissiveSurface, LightForm};
 pub use point::Point;
 pub use rectangle::RectangleLight;
-pub use registry::{Handles, KIND_KEYS, LightDesc, LightKind, Placement, check_kinds};
+pub use registry::{Handles, KIND_KEYS, LightDesc, LightKind, Placement};
 pub use sample::LightSample;
 pub use sphere::SphereLight;
 pub use spot::{Spot, SpotCone, spot_factor};
@@ -120,6 +120,7 @@ impl Light {
     pub fn has_key(&self, name: &str) -> bool {
         match name {
             "unit" => self.surface().is_some(),
+            "falloff" => self.apex().is_some(),
             "visible" => self.has_radiance(),
             _ => true,
         }
@@ -133,14 +134,10 @@ impl Light {
     }
 
     pub fn environment_mut(&mut self) -> Option<&mut Environment> {
-        match &mut self.kind {
-            LightKind::Environment(environment) => Some(environment),
-            LightKind::Point(_)
-            | LightKind::Directional(_)
-            | LightKind::Spot(_)
-            | LightKind::Sphere(_)
-            | LightKind::Rectangle(_)
-            | LightKind::Disk(_) => None,
+        if let LightKind::Environment(environment) = &mut self.kind {
+            Some(environment)
+        } else {
+            None
         }
     }
 

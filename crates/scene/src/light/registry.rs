@@ -139,26 +139,6 @@ impl FieldValue for LightKind {
     }
 }
 
-/// Checks that `given`, the keys of kinds in the table of a light, is exactly one key.
-///
-/// # Errors
-/// Returns a phrase that states the error, and one that states what is expected.
-pub fn check_kinds(given: &[&str]) -> Result<(), (String, String)> {
-    match given {
-        [_] => Ok(()),
-        [] => {
-            let (last, others) = KIND_KEYS.split_last().unwrap_or((&"", &[]));
-            let example = "point = { position = [2.0, 4.0, 3.0] }";
-            let expected = format!("one of {} and {last}, such as {example}", others.join(", "));
-            Err(("the light has no kind".to_string(), expected))
-        }
-        [first, second, ..] => Err((
-            format!("both {first} and {second} are given"),
-            "exactly one kind; a second light needs its own [[light]]".to_string(),
-        )),
-    }
-}
-
 /// Returns `center`, rounded to multiples of a power of ten that is at most 1e-4 x `radius`, and
 /// `radius`, rounded to two significant digits.
 pub(super) fn rounded_ball(placement: &Placement) -> ([f64; 3], f64) {

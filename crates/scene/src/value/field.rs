@@ -85,17 +85,6 @@ impl Field {
         Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
-    /// Creates a key without a default. `instead` describes the result of omitting it.
-    pub const fn optional(
-        name: &'static str,
-        takes: ValueType,
-        unit: &'static str,
-        instead: &'static str,
-        doc: &'static str,
-    ) -> Self {
-        Self { name, takes, unit, preset: DefaultValue::Without(instead), doc }
-    }
-
     /// Returns the key with the default `value`, given as TOML text.
     pub const fn with_default(self, value: &'static str) -> Self {
         Self { preset: DefaultValue::Is(value), ..self }
