@@ -143,13 +143,13 @@ fn unreadable_scene_files_are_reported() {
     let scene = |text: &str| Scene::parse(text, "s.toml");
     let many: String = (0..50).map(|i| format!("key{i} = 0\n")).collect();
     let many = scene(&many).unwrap_err();
-    assert_eq!(many.messages().len(), 50);
+    assert_eq!(many.messages.len(), 50);
     assert!(many.to_string().ends_with("… and 30 more."), "{many}");
     // A byte order mark and Windows line ends are valid and do not count as columns.
     let marked = "\u{feff}[[object]]\r\nshape.sphere = { center = [0, 0, 0], radius = 1 }\r\n";
     assert!(scene(marked).is_ok());
     let error = scene(&marked.replace("[[object]]", "wrong = 1")).unwrap_err();
-    assert_eq!(error.messages()[0].line_column, Some((1, 1)));
+    assert_eq!(error.messages[0].line_column, Some((1, 1)));
     // Without a material, a camera and a light, the defaults apply.
     let bare = scene(marked).unwrap();
     assert_eq!(bare.objects[0].material, "");

@@ -201,7 +201,7 @@ pub fn short_name(path: &Path) -> String {
 
 /// Returns the first of `errors` as one line.
 pub(super) fn first_line(errors: &SceneErrors) -> String {
-    let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
+    let first = errors.messages.first().map(ToString::to_string).unwrap_or_default();
     first.lines().map(str::trim).collect::<Vec<_>>().join(" ")
 }
 

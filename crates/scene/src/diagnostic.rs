@@ -48,9 +48,10 @@ pub(crate) const MAX_REPORTED: usize = 100;
 /// Errors of one scene file: at least one, sorted by location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
-    messages: Vec<Diagnostic>,
+    /// First diagnostics, at most 100, sorted by location.
+    pub messages: Vec<Diagnostic>,
     /// Number of errors of the scene file that are not in `messages`.
-    more: usize,
+    pub more: usize,
 }
 
 /// Collector of the first [`MAX_REPORTED`] diagnostics of a file; further ones are only counted.
@@ -135,16 +136,6 @@ impl SceneErrors {
         let (file, help) = (file.to_string(), help.to_string());
         let message = Diagnostic { file, line_column, found, help, ..Diagnostic::default() };
         Self { messages: vec![message], more: 0 }
-    }
-
-    /// Returns the first diagnostics, at most 100, sorted by location.
-    pub fn messages(&self) -> &[Diagnostic] {
-        &self.messages
-    }
-
-    /// Returns the number of errors of the scene file beyond those of [`SceneErrors::messages`].
-    pub fn more(&self) -> usize {
-        self.more
     }
 }
 

@@ -67,7 +67,7 @@ fn broken_file_is_reported_once_and_document_stays() {
     let (path, mut file) = opened(directory.path());
     fs::write(&path, MIRROR_ROOM.replace("radius = 0.5", "radius = -0.5")).unwrap();
     let errors = file.reload().unwrap_err();
-    assert_eq!(errors.messages()[0].subject, "object \"ball\"");
+    assert_eq!(errors.messages[0].subject, "object \"ball\"");
     assert_eq!(file.document().text(), MIRROR_ROOM);
     assert_eq!(file.on_disk(), DiskState::Unchanged);
     fs::write(&path, MIRROR_ROOM).unwrap();

@@ -10,7 +10,7 @@ use crate::*;
 fn keys_of<T: TomlText>() -> Vec<String> {
     let error = match T::from_text("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
-        Err(errors) => errors.messages()[0].help.clone(),
+        Err(errors) => errors.messages[0].help.clone(),
     };
     let list = error.strip_prefix("Known: ").unwrap_or_else(|| panic!("{error}"));
     let (list, _) = list.split_once('.').unwrap_or_else(|| panic!("{error}"));
@@ -147,7 +147,7 @@ fn every_documented_choice_is_read() {
                     assert!(T::from_text(&line).is_ok(), "{line}");
                 }
                 let line = format!("{needed}{} = \"no such word\"", field.name);
-                let error = T::from_text(&line).err().map(|e| e.messages()[0].help.clone());
+                let error = T::from_text(&line).err().map(|e| e.messages[0].help.clone());
                 let error = error.unwrap_or_else(|| panic!("{line} was read"));
                 let documented =
                     choices.iter().filter(|c| error.contains(&format!("\"{}\"", c.name)));

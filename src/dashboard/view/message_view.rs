@@ -21,12 +21,12 @@ pub fn broken(model: &Model, layout: &Layout, painter: &mut Painter) {
     let Some(errors) = &model.file.broken else { return };
     let bold = theme.bad().add_modifier(Modifier::BOLD);
     let mut texts = vec![(format!("{} cannot be read", model.file.name), bold)];
-    for message in errors.messages() {
+    for message in &errors.messages {
         texts.push((String::new(), theme.text()));
         texts.extend(formatted(message, &theme));
     }
-    if errors.more() > 0 {
-        texts.push((format!("… and {} more.", errors.more()), theme.text()));
+    if errors.more > 0 {
+        texts.push((format!("… and {} more.", errors.more), theme.text()));
     }
     let help = "Fix the file: it is reloaded as soon as it is written.";
     texts.extend(["", help].map(|text| (text.to_string(), theme.text())));
@@ -63,7 +63,7 @@ pub fn failure(model: &Model, layout: &Layout, painter: &mut Painter) {
         let texts = [(title, theme.bad()), (sanitized(why), theme.text())];
         painter.paragraphs(text_area(layout), &texts);
     }
-    if let Some(first) = model.file.broken.as_ref().and_then(|b| b.messages().first())
+    if let Some(first) = model.file.broken.as_ref().and_then(|b| b.messages.first())
         && !model.fullscreen
     {
         let area = layout.picture;

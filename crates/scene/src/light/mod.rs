@@ -204,7 +204,7 @@ mod tests {
     fn light_has_exactly_one_kind() {
         let read = |keys: &str| match Scene::parse(&format!("[[light]]\n{keys}"), "a.toml") {
             Ok(mut scene) => Ok(scene.lights.remove(0)),
-            Err(errors) => Err(errors.messages()[0].found.clone()),
+            Err(errors) => Err(errors.messages[0].found.clone()),
         };
         assert_eq!(read("point.position = [0, 0, 0]"), Ok(point()));
         assert_eq!(read("intensity = 2.0"), Err("the light has no kind".to_string()));

@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
-use crate::value::{Description, ValidationError, description};
+use crate::value::description;
 use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
@@ -24,10 +24,6 @@ impl ShapeDesc for Cube {
     fn form(&self) -> Form {
         let e = self.edge;
         prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&[("edge", self.edge)], &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::prismoid;
-use crate::value::{Description, ValidationError, description};
+use crate::value::description;
 use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
@@ -24,10 +24,6 @@ impl ShapeDesc for Cuboid {
         let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;
         let base = [(0.0, 0.0), (x, 0.0), (x, -z), (0.0, -z)].map(DVec2::from);
         prismoid(corner, &base, y, 1.0, 0.0)
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
-use crate::value::{Description, ValidationError, description};
+use crate::value::description;
 use glam::{DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, ParallelogramForm};
 
@@ -26,10 +26,6 @@ impl ShapeDesc for HorizontalRectangle {
             u: DVec3::new(0.0, 0.0, z),
             v: DVec3::new(x, 0.0, 0.0),
         })
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
     /// Creates the rectangle that is the upper side of a box; see [`ShapeDesc::fitted_to`].

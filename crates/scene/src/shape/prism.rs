@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
-use crate::value::{Description, ValidationError, description};
+use crate::value::description;
 use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
@@ -29,12 +29,6 @@ impl ShapeDesc for Prism {
         let s = self.side;
         let base = [(0.0, 0.0), (s, 0.0), (s / 2.0, -s * 0.75f64.sqrt())].map(DVec2::from);
         prismoid(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.validator()
-            .ratio(&[("side", self.side), ("height", self.height)], &self.corner)
-            .errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -3,7 +3,7 @@
 use crate::shape::ShapeDesc;
 use crate::shape::cube::square;
 use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
-use crate::value::{Description, ValidationError, description};
+use crate::value::description;
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
@@ -34,12 +34,6 @@ impl ShapeDesc for Pyramid {
         let top_over_base = (self.apex_height - height) / self.apex_height;
         let corner = DVec3::from_array(self.corner);
         prismoid(corner, &square(self.side), height, top_over_base, self.rotation)
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        let sizes =
-            [("side", self.side), ("apex_height", self.apex_height), ("height", self.height)];
-        self.validator().ratio(&sizes, &self.corner).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

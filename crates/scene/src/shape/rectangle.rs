@@ -48,7 +48,7 @@ impl ShapeDesc for Rectangle {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        let checks = self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center);
+        let checks = self.validator().lengths(self);
         let parallel = checks.is_clean() && self.frame().is_none();
         checks
             .and(parallel.then(|| {

@@ -21,7 +21,7 @@ pub trait ShapeDesc: Description {
 
     /// Returns the validation errors of the description.
     fn faults(&self) -> Vec<ValidationError> {
-        self.validator().errors()
+        self.validator().lengths(self).errors()
     }
 
     /// Creates an upright instance that roughly fills a box. `base` is the centre of its lower

@@ -1,7 +1,7 @@
 //! Sphere: the points at distance `radius` from `center`.
 
 use crate::shape::ShapeDesc;
-use crate::value::{Description, ValidationError, description, round_nice};
+use crate::value::{description, round_nice};
 use glam::DVec3;
 use zerkalo_kernel::primitive::{Form, SphereForm};
 
@@ -20,10 +20,6 @@ impl ShapeDesc for Sphere {
 
     fn form(&self) -> Form {
         Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
-    }
-
-    fn faults(&self) -> Vec<ValidationError> {
-        self.validator().ratio(&[("radius", self.radius)], &self.center).errors()
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

@@ -36,10 +36,7 @@ impl ShapeDesc for Torus {
             let found = format!("tube ({}) is larger than ring ({})", self.tube, self.ring);
             ValidationError::new("tube", found, "a tube at most as large as ring")
         });
-        self.validator()
-            .and(spindle)
-            .ratio(&[("ring", self.ring), ("tube", self.tube)], &self.center)
-            .errors()
+        self.validator().and(spindle).lengths(self).errors()
     }
 
     /// Creates a flat torus whose tube is at most a third of its ring.

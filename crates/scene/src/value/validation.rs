@@ -1,6 +1,6 @@
 //! Validation errors of a table in a scene file, without their position in the file.
 
-use crate::value::{Field, FieldValue, ValueType, number};
+use crate::value::{Field, FieldValue, KeyNode, KeyValue, NumberRange, ValueType, number};
 
 /// Validation error of a table, without file, line and object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +63,25 @@ impl Validator {
     fn find(&self, name: &str) -> &'static Field {
         let field = self.fields.iter().find(|field| field.name == name);
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
+    }
+
+    /// Checks by [`Validator::ratio`] the values of `table` whose ranges are those of sizes and of
+    /// coordinates.
+    pub fn lengths(self, table: &dyn KeyNode) -> Self {
+        let (mut sizes, mut coordinates) = (Vec::new(), Vec::new());
+        for field in self.fields {
+            let value = table.child(field.name).and_then(KeyNode::value);
+            let (ValueType::Number(range) | ValueType::Numbers(_, range)) = field.takes else {
+                continue;
+            };
+            let Some(KeyValue::Numbers(numbers)) = value else { continue };
+            if range == NumberRange::SIZE {
+                sizes.extend(numbers.into_iter().map(|size| (field.name, size)));
+            } else if range == NumberRange::COORDINATE {
+                coordinates.extend(numbers);
+            }
+        }
+        self.ratio(&sizes, &coordinates)
     }
 
     /// Checks that no size or coordinate is more than 1e12 times as large as the smallest size.

@@ -33,6 +33,8 @@ pub struct Builder<'a> {
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
+    /// Index of the colour of each triangle; 0 for those before the first call of
+    /// [`Builder::color`].
     color_of: Vec<u16>,
     color: u16,
     notes: Vec<String>,
@@ -152,11 +154,7 @@ impl<'a> Builder<'a> {
         }
         self.check_limits(0, 1)?;
         self.triangles.push(corners);
-        if self.colors.len() > 1 {
-            // The triangles before the first call of [`Builder::color`] have colour index 0.
-            self.color_of.resize(self.triangles.len() - 1, 0);
-            self.color_of.push(self.color);
-        }
+        self.color_of.push(self.color);
         Ok(())
     }
 
@@ -204,12 +202,7 @@ impl<'a> Builder<'a> {
         let normals = self.unit_normals(&positions);
         let uvs = self.checked_uvs(positions.len())?;
         self.triangles.shrink_to_fit();
-        let color_of = if self.colors.len() > 1 {
-            self.color_of.resize(self.triangles.len(), 0);
-            self.color_of
-        } else {
-            Vec::new()
-        };
+        let color_of = if self.colors.len() > 1 { self.color_of } else { Vec::new() };
         Ok(TriangleMesh {
             positions,
             center,
@@ -259,15 +252,9 @@ impl<'a> Builder<'a> {
             let p = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
             (p[1] - p[0]).cross(p[2] - p[0]) != DVec3::ZERO
         };
-        if self.color_of.is_empty() {
-            self.triangles.retain(has_area);
-        } else {
-            let keep: Vec<bool> = self.triangles.iter().map(has_area).collect();
-            let mut kept = keep.iter();
-            self.triangles.retain(|_| *kept.next().unwrap_or(&true));
-            let mut kept = keep.iter();
-            self.color_of.retain(|_| *kept.next().unwrap_or(&true));
-        }
+        let mut kept = self.triangles.iter().map(has_area);
+        self.color_of.retain(|_| kept.next().unwrap_or(true));
+        self.triangles.retain(has_area);
         let dropped = before - self.triangles.len();
         if self.triangles.is_empty() {
             let found = format!("none of the {before} triangles has an area");
