@@ -58,7 +58,7 @@ fn d5_rectangle_light() {
         &[
             ("a visible window", &|s| s.lights[1].visible = true),
             ("an invisible ceiling lamp", &|s| lamp(s).visible = false),
-            ("the wrong side", &|s| lamp(s).direction_mut().unwrap()[1] = 1.0),
+            ("the wrong side", &|s| lamp(s).kind.handles().direction.unwrap()[1] = 1.0),
             ("sides exchanged", &|s| rectangle(s).size.reverse()),
             ("power for radiance", &|s| lamp(s).unit = LightUnit::Power),
             ("a diffuse floor", &|s| material(s, "floor").reflection = 0.0),
@@ -85,7 +85,7 @@ fn d8_disk_light() {
         "disk-light.toml",
         &[
             ("half the size", &|s| *radius(s) *= 0.5),
-            ("facing the wall", &|s| *lamp(s).direction_mut().unwrap() = [0.0, 0.0, -1.0]),
+            ("facing the wall", &|s| *lamp(s).kind.handles().direction.unwrap() = [0.0, 0.0, -1.0]),
             ("radiance for power", &|s| lamp(s).unit = LightUnit::Radiance),
             ("another place", &|s| lamp(s).position_mut().unwrap()[1] += 0.2),
         ],

@@ -34,7 +34,7 @@ impl Chart {
             ReflectionLobe::Mirror => unreachable!(),
             ReflectionLobe::Cone { .. } => framed(chart.mirror()),
             ReflectionLobe::Square { .. } => chart.square_frame(),
-            ReflectionLobe::MicrofacetDistribution(_) => framed(n),
+            ReflectionLobe::Microfacet(_) => framed(n),
         };
         chart
     }
@@ -84,7 +84,7 @@ impl Chart {
     /// Returns `true` if the transmitted ray of a sample exists: the microfacet does not reflect
     /// totally, and the ray is behind the surface.
     fn exists(&self, crossing: &Crossing) -> bool {
-        if !matches!(self.spread, ReflectionLobe::MicrofacetDistribution(_)) {
+        if !matches!(self.spread, ReflectionLobe::Microfacet(_)) {
             // The density of the lobes `cone` and `square` includes rays in front of the surface.
             return true;
         }
@@ -112,7 +112,7 @@ impl Chart {
                 let z = dot(d, m);
                 [dot(d, t) / (z * side) + 0.5, dot(d, b) / (z * side) + 0.5]
             }
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 let h = self.half(d);
                 let [t, b, _] = self.frame;
                 let z = dot(h, self.n);
@@ -143,7 +143,7 @@ impl Chart {
                 let d = unit(combine(&[(1.0, m), ((p - 0.5) * side, t), ((q - 0.5) * side, b)]));
                 (d, side * side * dot(d, m).powi(3))
             }
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 let [t, b, _] = self.frame;
                 let r = facets.alpha * ((1.0 / (1.0 - p)).powi(2) - 1.0).sqrt();
                 let h = unit(combine(&[(1.0, self.n), (r * cos, t), (r * sin, b)]));

@@ -94,7 +94,7 @@ fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
         ReflectionLobe::Mirror => unreachable!(),
         // The test of weight x density below shows that this lobe and the highlight have the same
         // f.
-        ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
+        ReflectionLobe::Microfacet(_) => highlight_f(material, v, l),
         _ => {
             let query = query::<f64>((combine(&[(-1.0, v)]), n), false);
             finish.reflection.unwrap() * finish.pdf(&query, Vec3::of(l)) / dot(n, l)

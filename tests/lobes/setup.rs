@@ -66,7 +66,7 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
 /// Returns `true` if the lobe is a microfacet distribution. Only these have masking.
 pub fn has_facets(lobe: Lobe) -> bool {
     let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
-    matches!(finish.lobe, ReflectionLobe::MicrofacetDistribution(_))
+    matches!(finish.lobe, ReflectionLobe::Microfacet(_))
 }
 
 pub fn every_lobe() -> Vec<(Lobe, Masking)> {

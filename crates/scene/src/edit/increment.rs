@@ -175,30 +175,26 @@ impl StepRule {
     fn of(field: &Field, scene: &Scene) -> Option<Self> {
         Some(match field.takes {
             ValueType::Number(range) | ValueType::Numbers(_, range) => {
-                if field.unit == "degrees" {
-                    Self::Degrees { range }
-                } else if range == NumberRange::SIZE || field.name == "scale" {
-                    // A size, or the scale of a texture.
-                    Self::Rungs { floor: 0.0, range }
-                } else if range == NumberRange::COORDINATE {
-                    Self::Units { unit: step_length(scene), range }
-                } else if field.name == "height" {
+                let rungs = |floor| Self::Rungs { floor, range };
+                let units = |unit| Self::Units { unit, range };
+                match (field.name, field.unit) {
+                    (_, "degrees") => Self::Degrees { range },
+                    // Repetitions of a texture.
+                    ("scale", _) => rungs(0.0),
+                    _ if range == NumberRange::SIZE => rungs(0.0),
+                    _ if range == NumberRange::COORDINATE => units(step_length(scene)),
                     // Useful bumps are at most a hundredth of the size of the surface high.
-                    Self::Units { unit: 0.005, range }
-                } else if matches!(field.name, "roughness" | "alpha") {
+                    ("height", _) => units(0.005),
                     // The blur of 0.001 is the smallest that is visible at the far end of a room.
-                    Self::Rungs { floor: 0.001, range }
-                } else if field.name == "offset"
-                    || [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range)
-                {
-                    Self::Units { unit: 0.05, range }
-                } else if field.unit == "scene units" {
-                    Self::Rungs { floor: step_length(scene) / 10.0, range }
-                } else if range == NumberRange::LIGHT {
-                    Self::Rungs { floor: 0.01, range }
-                } else {
+                    ("roughness" | "alpha", _) => rungs(0.001),
+                    ("offset", _) => units(0.05),
+                    _ if [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range) => {
+                        units(0.05)
+                    }
+                    (_, "scene units") => rungs(step_length(scene) / 10.0),
+                    _ if range == NumberRange::LIGHT => rungs(0.01),
                     // Phong exponent, or another number without a unit.
-                    Self::Rungs { floor: 1.0, range }
+                    _ => rungs(1.0),
                 }
             }
             ValueType::Direction => Self::Direction,

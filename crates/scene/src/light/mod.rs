@@ -156,10 +156,6 @@ impl Light {
         self.kind.clone().handles().direction.copied()
     }
 
-    pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
-        self.kind.handles().direction
-    }
-
     pub fn faults(&self) -> Vec<ValidationError> {
         let unused_key = if self.falloff == Falloff::InverseSquare && self.apex().is_none() {
             Some(ValidationError::new(

@@ -28,7 +28,7 @@ pub enum SpecularModel<S> {
         sharp: bool,
     },
     /// Microfacet model: k_s D G F / (4 N.L N.V).
-    MicrofacetDistribution {
+    Microfacet {
         /// Specular coefficient k_s.
         strength: S,
         /// Distribution that gives D and G.
@@ -53,7 +53,7 @@ pub enum ReflectionLobe<S> {
         side: S,
     },
     /// Reflection and refraction at visible microfacets.
-    MicrofacetDistribution(MicrofacetDistribution<S>),
+    Microfacet(MicrofacetDistribution<S>),
 }
 
 /// Transmission of light through a surface.
@@ -118,7 +118,7 @@ impl<S: Float> Bsdf<S> {
                 exponent: S::from_f64(material.exponent),
                 sharp: material.exponent > SHARP_EXPONENT,
             },
-            Highlight::CookTorrance => SpecularModel::MicrofacetDistribution { strength, facets },
+            Highlight::CookTorrance => SpecularModel::Microfacet { strength, facets },
         };
         let r = material.roughness;
         let lobe = match material.lobe {
@@ -133,7 +133,7 @@ impl<S: Float> Bsdf<S> {
             Lobe::Beckmann | Lobe::Ggx if material.microfacet_alpha() < SMOOTH_ALPHA => {
                 ReflectionLobe::Mirror
             }
-            Lobe::Beckmann | Lobe::Ggx => ReflectionLobe::MicrofacetDistribution(facets),
+            Lobe::Beckmann | Lobe::Ggx => ReflectionLobe::Microfacet(facets),
         };
         let (k_r, k_t) = (material.reflection, material.transmission);
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
@@ -241,7 +241,7 @@ pub(super) fn spread<L: SimdFloat>(
     let local = match lobe {
         ReflectionLobe::Cone { one_minus_cos } => warp::cone(u, v, L::splat(*one_minus_cos)),
         ReflectionLobe::Square { side } => warp::square(u, v, L::splat(*side)),
-        ReflectionLobe::Mirror | ReflectionLobe::MicrofacetDistribution(_) => return axis,
+        ReflectionLobe::Mirror | ReflectionLobe::Microfacet(_) => return axis,
     };
     Frame::around(axis.renormalize()).to_world(local)
 }
@@ -293,7 +293,7 @@ impl<S: Float> Bsdf<S> {
                 };
                 Vec3::gray(L::splat(*strength) * power * L::from_f64(FRAC_1_PI))
             }
-            SpecularModel::MicrofacetDistribution { strength, facets } => {
+            SpecularModel::Microfacet { strength, facets } => {
                 let (nl, nv) = (n.dot(light), n.dot(view));
                 // The half vector is not normalised: its squared length is twice its dot product
                 // with `view` or with `light`.
@@ -326,7 +326,7 @@ impl<S: Float> Bsdf<S> {
             ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => {
                 spread(&self.lobe, mirror, uv)
             }
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 return self.sample_microfacet(facets, query, uv);
             }
         };
@@ -380,7 +380,7 @@ impl<S: Float> Bsdf<S> {
             ReflectionLobe::Mirror
             | ReflectionLobe::Cone { .. }
             | ReflectionLobe::Square { .. }
-            | ReflectionLobe::MicrofacetDistribution(_) => density,
+            | ReflectionLobe::Microfacet(_) => density,
         }
     }
 
@@ -401,7 +401,7 @@ impl<S: Float> Bsdf<S> {
                 let local = Frame::around(mirror.renormalize()).to_local(direction);
                 warp::square_pdf(local, L::splat(*side))
             }
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 let h = direction - incident;
                 let (nh, tan2) = along_tan2(h, n);
                 let nv = -incident.dot(n);
@@ -431,7 +431,7 @@ impl<S: Float> Bsdf<S> {
         let value = match &self.lobe {
             ReflectionLobe::Mirror => L::zero(),
             ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => k * density,
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 let nv = -incident.dot(n);
                 let (nh, tan2) = along_tan2(h, n);
                 let (visible, total) =

@@ -79,9 +79,7 @@ impl<S: Float> Bsdf<S> {
         uv: (L, L),
     ) -> InterfaceSample<L> {
         match &self.lobe {
-            ReflectionLobe::MicrofacetDistribution(facets) => {
-                self.sample_facet_interface(facets, query, uv)
-            }
+            ReflectionLobe::Microfacet(facets) => self.sample_facet_interface(facets, query, uv),
             ReflectionLobe::Mirror
             | ReflectionLobe::Cone { .. }
             | ReflectionLobe::Square { .. } => self.sample_spread_interface(query, uv),
@@ -179,7 +177,7 @@ impl<S: Float> Bsdf<S> {
                 let local = Frame::around(axis()).to_local(direction);
                 warp::square_pdf(local, L::splat(*side))
             }
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 facet(facets, query, direction, L::mask(true)).density
             }
         };
@@ -199,7 +197,7 @@ impl<S: Float> Bsdf<S> {
         behind: L::Mask,
     ) -> BsdfValue<L> {
         match &self.lobe {
-            ReflectionLobe::MicrofacetDistribution(facets) => {
+            ReflectionLobe::Microfacet(facets) => {
                 self.eval_facet_interface(facets, query, direction, behind)
             }
             ReflectionLobe::Mirror

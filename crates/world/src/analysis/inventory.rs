@@ -81,7 +81,7 @@ fn material_features<L: SimdFloat>(
     let any_facets = |test: fn(&FacetNormals) -> bool| {
         let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
         bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
-            ReflectionLobe::MicrofacetDistribution(facets) => test(&facets.normals),
+            ReflectionLobe::Microfacet(facets) => test(&facets.normals),
             ReflectionLobe::Mirror
             | ReflectionLobe::Cone { .. }
             | ReflectionLobe::Square { .. } => false,
@@ -90,10 +90,7 @@ fn material_features<L: SimdFloat>(
     let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
     present([
         (any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong"),
-        (
-            any_specular(|s| matches!(s, SpecularModel::MicrofacetDistribution { .. })),
-            "Cook-Torrance",
-        ),
+        (any_specular(|s| matches!(s, SpecularModel::Microfacet { .. })), "Cook-Torrance"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),

@@ -196,9 +196,9 @@ impl<'a> Part<'a> {
             return Ok(());
         };
         let vertices = positions.count();
-        let positions = self.floats::<3>(positions)?;
+        let positions = self.triples(positions)?;
         let normals = self.primitive.get(&Semantic::Normals);
-        let normals = normals.map(|a| self.floats::<3>(a)).transpose()?;
+        let normals = normals.map(|a| self.triples(a)).transpose()?;
         let uvs = self.primitive.get(&Semantic::TexCoords(0));
         let mut uvs = uvs.map(|a| self.pairs(a)).transpose()?;
         self.add_color(builder)?;
@@ -257,14 +257,12 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Returns the elements of `accessor`, a glTF list of single-precision vectors with `N` (2 or
-    /// 3) components.
-    fn floats<const N: usize>(
+    /// Returns the elements of `accessor`, a glTF list of single-precision vectors.
+    fn triples(
         &self,
         accessor: Accessor<'a>,
-    ) -> Result<impl Iterator<Item = [f32; N]>, AssetError> {
-        let shape = if N == 3 { Dimensions::Vec3 } else { Dimensions::Vec2 };
-        let slice = self.slice(&accessor, shape, DataType::F32)?;
+    ) -> Result<impl Iterator<Item = [f32; 3]>, AssetError> {
+        let slice = self.slice(&accessor, Dimensions::Vec3, DataType::F32)?;
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
