@@ -1,7 +1,7 @@
 //! Objects of a scene: a shape with a transform and a material.
 
 use crate::shape::{Shape, TransformOp, compose, ill_conditioned};
-use crate::value::{Description, ValidationError, description};
+use crate::value::{KeyNode, ValidationError, description};
 use glam::DAffine3;
 use zerkalo_kernel::primitive::Form;
 

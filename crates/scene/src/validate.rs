@@ -5,7 +5,7 @@ use crate::diagnostic::MAX_REPORTED;
 use crate::format::suggest::did_you_mean;
 use crate::light::Light;
 use crate::material::Mapping;
-use crate::value::{Description, ValidationError, truncated};
+use crate::value::{KeyNode, ValidationError, truncated};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;

@@ -9,7 +9,7 @@ mod perspective;
 pub use lens::{Aperture, Focus};
 pub use perspective::{PerspectiveCamera, ThinLens};
 
-use crate::value::{Description, Field, ValidationError, description, one_of, unit};
+use crate::value::{Description, Field, KeyNode, ValidationError, description, one_of, unit};
 use glam::DVec3;
 
 description! {

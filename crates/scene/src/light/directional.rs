@@ -5,7 +5,7 @@
 //! radiance. The radiance is chosen so that this irradiance does not depend on a.
 
 use crate::light::{Handles, LightDesc, LightForm, Placement};
-use crate::value::{Description, ValidationError, description, number, unit};
+use crate::value::{KeyNode, ValidationError, description, number, unit};
 use glam::DVec3;
 
 /// Smallest angular diameter of a sun \[degrees\]. Rounding of directions to single precision then

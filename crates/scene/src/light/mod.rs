@@ -33,7 +33,7 @@ pub use sample::LightSample;
 pub use sphere::SphereLight;
 pub use spot::{Spot, SpotCone, spot_factor};
 
-use crate::value::{Color, Description, Field, ValidationError, choices, description};
+use crate::value::{Color, Description, Field, KeyNode, ValidationError, choices, description};
 use glam::DVec3;
 
 description! {

@@ -1,7 +1,7 @@
 //! Spot light: its description, and the cone that limits its light.
 
 use crate::light::{Handles, LightDesc, LightForm, Placement};
-use crate::value::{Description, ValidationError, description, unit};
+use crate::value::{KeyNode, ValidationError, description, unit};
 use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 

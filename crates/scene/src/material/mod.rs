@@ -25,7 +25,7 @@ pub use texture::{
 };
 pub use texture_eval::{BumpMap, CompiledTexture};
 
-use crate::value::{Color, Description, Field, ValidationError, choices, description};
+use crate::value::{Color, Description, Field, KeyNode, ValidationError, choices, description};
 
 description! {
     /// A surface's material. Every key may be left out.

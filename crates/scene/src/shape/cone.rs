@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::axial::{axis_faults, by_axis, frustum_between};
-use crate::value::{Description, ValidationError, description};
+use crate::value::{KeyNode, ValidationError, description};
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
@@ -15,13 +15,11 @@ description! {
         apex: [f64; 3], in COORDINATE "scene units";
         /// Radius of the base.
         radius: f64, in SIZE "scene units";
+        example "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
     }
 }
 
 impl ShapeDesc for Cone {
-    const EXAMPLE: &str =
-        "shape.cone = { base = [0.0, 0.0, 0.0], apex = [0.0, 1.0, 0.0], radius = 0.5 }";
-
     fn form(&self) -> Form {
         frustum_between(self.base, self.apex, self.radius, 0.0)
     }

@@ -4,7 +4,7 @@
 use crate::shape::transform::{TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
 use crate::value::{
-    Description, Field, FieldValue, ValidationError, Validator, ValueType, description,
+    Description, Field, FieldValue, KeyNode, ValidationError, Validator, ValueType, description,
 };
 use glam::DVec3;
 use zerkalo_kernel::primitive::{CsgSolid, CsgTree, Form};
@@ -39,12 +39,11 @@ macro_rules! compounds {
             pub struct $kind {
                 /// Two parts or more, each written like an object: `shape`, `material`, `transform`.
                 of: Vec<CsgOperand>;
+                example $example;
             }
         }
 
         impl ShapeDesc for $kind {
-            const EXAMPLE: &str = $example;
-
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }

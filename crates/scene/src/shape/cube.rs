@@ -15,12 +15,11 @@ description! {
         edge: f64, in SIZE "scene units";
         /// Rotation about the vertical through the centre, counter-clockwise seen from above.
         rotation: f64 = 0.0, in FINITE "degrees";
+        example "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
     }
 }
 
 impl ShapeDesc for Cube {
-    const EXAMPLE: &str = "shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0, rotation = 30.0 }";
-
     fn form(&self) -> Form {
         let e = self.edge;
         prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)

@@ -13,12 +13,11 @@ description! {
         center: [f64; 3], in COORDINATE "scene units";
         /// Lengths of the box along x, y and z.
         size: [f64; 3], in SIZE "scene units";
+        example "shape.box = { center = [0.0, 0.5, 0.0], size = [2.0, 1.0, 0.5] }";
     }
 }
 
 impl ShapeDesc for Cuboid {
-    const EXAMPLE: &str = "shape.box = { center = [0.0, 0.5, 0.0], size = [2.0, 1.0, 0.5] }";
-
     fn form(&self) -> Form {
         let [x, y, z] = self.size;
         let corner = DVec3::from_array(self.center) + DVec3::new(-x, -y, z) / 2.0;

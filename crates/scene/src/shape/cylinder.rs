@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::axial::{axis_faults, by_axis, frustum_between};
-use crate::value::{Description, ValidationError, description};
+use crate::value::{KeyNode, ValidationError, description};
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
@@ -15,13 +15,11 @@ description! {
         top: [f64; 3], in COORDINATE "scene units";
         /// Radius of the cylinder.
         radius: f64, in SIZE "scene units";
+        example "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
     }
 }
 
 impl ShapeDesc for Cylinder {
-    const EXAMPLE: &str =
-        "shape.cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], radius = 0.4 }";
-
     fn form(&self) -> Form {
         frustum_between(self.base, self.top, self.radius, self.radius)
     }

@@ -13,12 +13,11 @@ description! {
         center: [f64; 3], in COORDINATE "scene units";
         /// Lengths of the rectangle along x and z.
         size: [f64; 2], in SIZE "scene units";
+        example "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
     }
 }
 
 impl ShapeDesc for HorizontalRectangle {
-    const EXAMPLE: &str = "shape.platform = { center = [0.0, 0.0, 0.0], size = [8.0, 8.0] }";
-
     fn form(&self) -> Form {
         let [x, z] = self.size;
         Form::Parallelogram(ParallelogramForm {

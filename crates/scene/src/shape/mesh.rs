@@ -17,6 +17,7 @@ description! {
         /// Normals used for shading: curved triangles or flat ones.
         normals: Normals = "smooth";
         loads content: Loaded<Mesh>;
+        example "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
     }
 }
 
@@ -85,9 +86,6 @@ impl MeshDesc {
 }
 
 impl ShapeDesc for MeshDesc {
-    const EXAMPLE: &str =
-        "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
-
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
         Form::Mesh(MeshForm {

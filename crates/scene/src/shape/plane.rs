@@ -13,12 +13,11 @@ description! {
         point: [f64; 3], in COORDINATE "scene units";
         /// Direction in which the front faces.
         normal: [f64; 3], as Direction;
+        example "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
     }
 }
 
 impl ShapeDesc for Plane {
-    const EXAMPLE: &str = "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
-
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane(PlaneForm { normal, offset: normal.dot(DVec3::from_array(self.point)) })

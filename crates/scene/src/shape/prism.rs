@@ -19,12 +19,11 @@ description! {
         /// Rotation about the vertical through the base's centroid, counter-clockwise seen from
         /// above.
         rotation: f64 = 0.0, in FINITE "degrees";
+        example "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
     }
 }
 
 impl ShapeDesc for Prism {
-    const EXAMPLE: &str = "shape.prism = { corner = [-0.5, 0.0, 0.3], side = 1.0, height = 1.2 }";
-
     fn form(&self) -> Form {
         let s = self.side;
         let base = [(0.0, 0.0), (s, 0.0), (s / 2.0, -s * 0.75f64.sqrt())].map(DVec2::from);

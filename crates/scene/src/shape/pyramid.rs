@@ -22,13 +22,12 @@ description! {
         /// Rotation about the vertical through the base's centre, counter-clockwise seen from
         /// above.
         rotation: f64 = 0.0, in FINITE "degrees";
+        example "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, apex_height = 1.5, \
+            height = 0.8 }";
     }
 }
 
 impl ShapeDesc for Pyramid {
-    const EXAMPLE: &str = "shape.pyramid = { corner = [-0.5, 0.0, 0.5], side = 1.0, apex_height = 1.5, \
-        height = 0.8 }";
-
     fn form(&self) -> Form {
         let height = self.height.min(self.apex_height);
         let top_over_base = (self.apex_height - height) / self.apex_height;

@@ -1,7 +1,7 @@
 //! Rectangle in any orientation, such as a flat mirror.
 
 use crate::shape::ShapeDesc;
-use crate::value::{Description, ValidationError, description, rotated_y, unit};
+use crate::value::{KeyNode, ValidationError, description, rotated_y, unit};
 use glam::{DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, ParallelogramForm};
 
@@ -16,6 +16,8 @@ description! {
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`; not parallel to it.
         up: [f64; 3] = [0.0, 1.0, 0.0], as Direction;
+        example "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
+            normal = [0.0, 0.0, 1.0] }";
     }
 }
 
@@ -34,9 +36,6 @@ impl Rectangle {
 }
 
 impl ShapeDesc for Rectangle {
-    const EXAMPLE: &str = "shape.rectangle = { center = [0.0, 1.5, -2.0], size = [4.0, 3.0], \
-        normal = [0.0, 0.0, 1.0] }";
-
     fn form(&self) -> Form {
         let [right, up, _] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
         let (u, v) = (right * self.size[0], up * self.size[1]);

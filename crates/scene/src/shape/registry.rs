@@ -6,16 +6,14 @@ use crate::shape::{
 };
 use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
 use crate::value::{
-    Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
+    Description, Field, FieldValue, KeyNode, ValidationError, ValueType, one_of, rounded_to,
 };
 use glam::{DMat3, DVec3};
+use std::ops::{Deref, DerefMut};
 use zerkalo_kernel::primitive::Form;
 
 /// Description of one kind of shape, with the keys that users write in scene files.
-pub trait ShapeDesc: Description {
-    /// Example of an `[[object]]` in TOML, for the manual and for tests.
-    const EXAMPLE: &str;
-
+pub trait ShapeDesc: KeyNode {
     /// Converts the valid description to its canonical form.
     fn form(&self) -> Form;
 
@@ -26,7 +24,9 @@ pub trait ShapeDesc: Description {
 
     /// Creates an upright instance that roughly fills a box. `base` is the centre of its lower
     /// side.
-    fn fitted_to(base: DVec3, size: DVec3) -> Self;
+    fn fitted_to(base: DVec3, size: DVec3) -> Self
+    where
+        Self: Sized;
 
     /// Returns the points that move the shape if a vector is added to all of them; empty if only a
     /// transform can.
@@ -100,56 +100,6 @@ macro_rules! kinds {
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
 
         impl Shape {
-            /// Converts the valid shape to its canonical form, without the object's transform.
-            pub fn form(&self) -> Form {
-                match self {
-                    $(Self::$kind(kind) => kind.form(),)+
-                }
-            }
-
-            /// Returns the validation errors; each key begins with the kind.
-            pub fn faults(&self) -> Vec<ValidationError> {
-                let faults = match self {
-                    $(Self::$kind(kind) => kind.faults(),)+
-                };
-                faults.into_iter().map(|f| f.prefixed(self.key())).collect()
-            }
-
-            /// Returns the axes of the shape's texture space, as the columns of a rotation matrix.
-            pub(super) fn texture_axes(&self) -> DMat3 {
-                match self {
-                    $(Self::$kind(kind) => kind.texture_axes(),)+
-                }
-            }
-
-            /// Returns [`ShapeDesc::rotation`].
-            pub fn rotation(&self) -> f64 {
-                match self {
-                    $(Self::$kind(kind) => kind.rotation(),)+
-                }
-            }
-
-            /// Returns [`ShapeDesc::upright`].
-            pub fn upright(&self) -> Option<TransformOp> {
-                match self {
-                    $(Self::$kind(kind) => kind.upright(),)+
-                }
-            }
-
-            /// Returns the parts of a compound; `None` for any other kind.
-            pub(super) fn parts(&self) -> Option<&[CsgOperand]> {
-                match self {
-                    $(Self::$kind(kind) => kind.parts(),)+
-                }
-            }
-
-            /// Returns the parts of a compound; empty for any other kind.
-            pub(super) fn parts_mut(&mut self) -> &mut [CsgOperand] {
-                match self {
-                    $(Self::$kind(kind) => kind.parts_mut(),)+
-                }
-            }
-
             /// Creates a shape by [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
@@ -157,18 +107,22 @@ macro_rules! kinds {
                     _ => None,
                 }
             }
+        }
 
-            /// Returns [`ShapeDesc::anchor_points_mut`].
-            pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+        impl Deref for Shape {
+            type Target = dyn ShapeDesc;
+
+            fn deref(&self) -> &Self::Target {
                 match self {
-                    $(Self::$kind(kind) => kind.anchor_points_mut(),)+
+                    $(Self::$kind(kind) => kind,)+
                 }
             }
+        }
 
-            /// Rotates the shape by [`ShapeDesc::rotate_y`].
-            pub fn rotate_y(&mut self, degrees: f64) -> bool {
+        impl DerefMut for Shape {
+            fn deref_mut(&mut self) -> &mut Self::Target {
                 match self {
-                    $(Self::$kind(kind) => kind.rotate_y(degrees),)+
+                    $(Self::$kind(kind) => kind,)+
                 }
             }
         }
@@ -204,6 +158,11 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
+    /// Returns the validation errors; each key begins with the kind.
+    pub fn faults(&self) -> Vec<ValidationError> {
+        (**self).faults().into_iter().map(|fault| fault.prefixed(self.key())).collect()
+    }
+
     /// Returns the first anchor point, or the origin.
     pub fn position(&self) -> DVec3 {
         self.clone()

@@ -12,12 +12,11 @@ description! {
         center: [f64; 3], in COORDINATE "scene units";
         /// Radius of the sphere.
         radius: f64, in SIZE "scene units";
+        example "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
     }
 }
 
 impl ShapeDesc for Sphere {
-    const EXAMPLE: &str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
-
     fn form(&self) -> Form {
         Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
     }

@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::axial::{axis_faults, by_axis, frustum_between};
-use crate::value::{Description, NumberRange, ValidationError, description};
+use crate::value::{KeyNode, NumberRange, ValidationError, description};
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
@@ -17,13 +17,12 @@ description! {
         base_radius: f64, in closed(0.0, NumberRange::SIZE.high) "scene units";
         /// Radius of the end at `top`; 0 makes an apex.
         top_radius: f64, in closed(0.0, NumberRange::SIZE.high) "scene units";
+        example "shape.tapered_cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], \
+            base_radius = 0.5, top_radius = 0.3 }";
     }
 }
 
 impl ShapeDesc for TaperedCylinder {
-    const EXAMPLE: &str = "shape.tapered_cylinder = { base = [0.0, 0.0, 0.0], top = [0.0, 1.0, 0.0], \
-        base_radius = 0.5, top_radius = 0.3 }";
-
     fn form(&self) -> Form {
         frustum_between(self.base, self.top, self.base_radius, self.top_radius)
     }

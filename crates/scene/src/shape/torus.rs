@@ -2,7 +2,7 @@
 
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::around_axis;
-use crate::value::{Description, ValidationError, description, rotated_y, round_nice, unit};
+use crate::value::{KeyNode, ValidationError, description, rotated_y, round_nice, unit};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo_kernel::primitive::{Form, TorusForm};
 
@@ -17,13 +17,12 @@ description! {
         ring: f64, in SIZE "scene units";
         /// Radius of the tube, at most `ring`.
         tube: f64, in SIZE "scene units";
+        example "shape.torus = { center = [0.0, 0.25, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, \
+            tube = 0.25 }";
     }
 }
 
 impl ShapeDesc for Torus {
-    const EXAMPLE: &str = "shape.torus = { center = [0.0, 0.25, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, \
-        tube = 0.25 }";
-
     fn form(&self) -> Form {
         let scene_from_torus =
             DAffine3::from_mat3_translation(self.texture_axes(), self.center.into());

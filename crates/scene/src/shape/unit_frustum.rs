@@ -13,12 +13,11 @@ description! {
     pub struct UnitFrustum {
         /// Radius at z = 1: 0 makes a cone, 1 a cylinder, more than 1 widens.
         s: f64, in closed(0.0, 1e6);
+        example "shape.unit_frustum = { s = 0.5 }";
     }
 }
 
 impl ShapeDesc for UnitFrustum {
-    const EXAMPLE: &str = "shape.unit_frustum = { s = 0.5 }";
-
     fn form(&self) -> Form {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }

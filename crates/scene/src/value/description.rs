@@ -1,9 +1,7 @@
 //! Macros that declare the tables of scene files: [`description!`] a struct for a table of keys,
 //! [`choices!`] an enum for a key that accepts a set of words.
 
-use crate::value::{
-    Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, Validator, ValueType,
-};
+use crate::value::{Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, ValueType};
 
 /// Table of a scene file: the keys that it has and the checks of their values. Its `Default` has the
 /// declared defaults; required keys are 0, empty, or of the first kind.
@@ -12,9 +10,8 @@ pub trait Description: KeyNode + Default {
     const DOC: &'static str;
     /// Keys of this kind of table, in the order of their declaration.
     const FIELDS: &'static [Field];
-
-    /// Returns a validator that has checked each value against the range of its key.
-    fn validator(&self) -> Validator;
+    /// Example in TOML, for the manual and for tests; may be empty.
+    const EXAMPLE: &'static str;
 }
 
 /// Rust type to which the values of keys in scene files are converted.
@@ -218,6 +215,8 @@ pub(crate) use choices;
 ///         flatten placement: Placement, after 3;
 ///         // A private field for the content of the key `file`.
 ///         loads content: Loaded<Image>;
+///         // An example in TOML.
+///         example "example = { center = [0.0, 1.0, 0.0] }";
 ///     }
 /// }
 /// ```
@@ -237,6 +236,7 @@ macro_rules! description {
             )+
             $(flatten $flat:ident: $flat_type:ty, after $position:literal;)?
             $(loads $hidden:ident: $hidden_type:ty;)?
+            $(example $example:literal;)?
         }
     ) => {
         $(#[doc = $doc])+
@@ -272,6 +272,7 @@ macro_rules! description {
 
         impl $crate::value::Description for $name {
             const DOC: &'static str = $crate::value::doc_text(concat!($($doc),+));
+            const EXAMPLE: &'static str = concat!("" $(, $example)?);
             const FIELDS: &'static [$crate::value::Field] = {
                 const OWN: &[$crate::value::Field] = &[$(
                     $crate::value::Field::required(
@@ -288,16 +289,16 @@ macro_rules! description {
                 )+];
                 $crate::value::description!(@fields OWN $(, <$flat_type>::FIELDS, $position)?)
             };
+        }
 
+        impl $crate::value::KeyNode for $name {
             fn validator(&self) -> $crate::value::Validator {
-                $crate::value::Validator::new(Self::FIELDS)
+                $crate::value::Validator::new(<Self as $crate::value::Description>::FIELDS)
                     $(.field(stringify!($key), &self.$key))+
                     $(.flattened(&self.$flat))?
                     $(.and(self.$hidden.fault()))?
             }
-        }
 
-        impl $crate::value::KeyNode for $name {
             $crate::value::children! { $(stringify!($key) => $key),+ $(; $flat: $flat_type)? }
         }
     };

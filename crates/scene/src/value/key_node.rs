@@ -1,5 +1,6 @@
 //! Access to the values of a description by key path, such as `shape.sphere.radius`.
 
+use crate::value::Validator;
 use std::collections::BTreeMap;
 
 /// Value of a key as edits read and write it.
@@ -71,6 +72,11 @@ pub trait KeyNode {
     /// entry of a list, or a table with this name.
     fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
         self.child_mut(key)
+    }
+
+    /// Returns a validator that has checked each value of a table against the range of its key.
+    fn validator(&self) -> Validator {
+        Validator::new(&[])
     }
 
     /// Returns the names of named tables.

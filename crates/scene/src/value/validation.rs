@@ -67,7 +67,7 @@ impl Validator {
 
     /// Checks by [`Validator::ratio`] the values of `table` whose ranges are those of sizes and of
     /// coordinates.
-    pub fn lengths(self, table: &dyn KeyNode) -> Self {
+    pub fn lengths(self, table: &(impl KeyNode + ?Sized)) -> Self {
         let (mut sizes, mut coordinates) = (Vec::new(), Vec::new());
         for field in self.fields {
             let value = table.child(field.name).and_then(KeyNode::value);
