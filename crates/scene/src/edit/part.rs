@@ -1,23 +1,16 @@
 //! Access to the values of edit targets by key path.
 
-use crate::camera;
 use crate::edit::{EditError, Target};
 use crate::light;
-use crate::material;
-use crate::value::{Description, Field, KeyNode, ValueType};
-use crate::{Ambient, Background, FilmSettings, IntegratorSettings, Object, Scene};
+use crate::value::{Field, KeyNode, ValueType};
+use crate::{FIELDS, Scene};
 
 /// Returns the keys that scene files permit for `subject`, with their types and defaults.
 pub(super) fn fields(subject: &Target) -> &'static [Field] {
-    match subject {
-        Target::Camera | Target::View(_) => camera::FIELDS,
-        Target::Ambient => Ambient::FIELDS,
-        Target::Background => Background::FIELDS,
-        Target::Light(_) => light::FIELDS,
-        Target::Object(_) => Object::FIELDS,
-        Target::Material(_) => material::FIELDS,
-        Target::Film => FilmSettings::FIELDS,
-        Target::IntegratorSettings => IntegratorSettings::FIELDS,
+    match FIELDS.iter().find(|field| field.name == subject.path()[0]).map(|field| field.takes) {
+        Some(ValueType::Table(fields) | ValueType::Named(fields)) => fields,
+        Some(ValueType::Tables(fields)) => fields(),
+        _ => &[],
     }
 }
 

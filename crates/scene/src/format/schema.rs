@@ -125,6 +125,14 @@ impl SchemaReader<'_> {
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
+    /// Returns ` in ` with [`Self::inner`], unless it is empty.
+    fn place(&self) -> String {
+        match self.inner() {
+            inner if inner.is_empty() => inner,
+            inner => format!(" in {}", truncated(&inner)),
+        }
+    }
+
     /// Adds an error about `value`, which has the wrong type.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         if self.errors.skips(self.part.in_file(span.start)) {
@@ -148,11 +156,7 @@ impl SchemaReader<'_> {
         }
         let known = || fields.iter().map(|f| f.name);
         let help = format!("Known: {}.{}", names(fields), did_you_mean(key.get_ref(), known()));
-        let place = match self.inner() {
-            inner if inner.is_empty() => String::new(),
-            inner => format!(" in {}", truncated(&inner)),
-        };
-        let found = format!("unknown key \"{}\"{place}", truncated(key.get_ref()));
+        let found = format!("unknown key \"{}\"{}", truncated(key.get_ref()), self.place());
         self.add(key.span(), found, help);
         nearest(key.get_ref(), known())
     }
@@ -173,15 +177,9 @@ impl SchemaReader<'_> {
         }
         for field in fields.iter().filter(|f| f.preset == DefaultValue::Required) {
             if !table.contains_key(field.name) && !intended.contains(&field.name) {
-                let place = match self.inner() {
-                    inner if inner.is_empty() => String::new(),
-                    inner => format!(" in {inner}"),
-                };
-                self.add(
-                    span.clone(),
-                    format!("key \"{}\" is missing{place}", field.name),
-                    format!("Expected {} = {}.", field.name, field.takes),
-                );
+                let found = format!("key \"{}\" is missing{}", field.name, self.place());
+                let help = format!("Expected {} = {}.", field.name, field.takes);
+                self.add(span.clone(), found, help);
             }
         }
     }
@@ -323,39 +321,34 @@ impl SchemaReader<'_> {
     }
 }
 
-/// Describes a TOML value in words: `the string "abc"`, `the number -2`, `a list of 2`.
+/// Describes a TOML value in words: `the string "abc"`, `the number -2`, `[1, 2]`.
 fn describe(value: &DeValue) -> String {
     match value {
-        DeValue::String(text) => format!("the string \"{}\"", truncated(text)),
+        DeValue::String(_) => format!("the string {}", literal(value)),
         DeValue::Integer(digits) => match integer(digits) {
             Some(number) => format!("the number {number}"),
-            None => format!("a whole number too large for 64 bits, {}", truncated(digits.as_str())),
+            None => format!("a whole number too large for 64 bits, {}", literal(value)),
         },
-        DeValue::Float(digits) => format!("the number {}", truncated(digits.as_str())),
-        DeValue::Boolean(yes) => format!("{yes}"),
-        DeValue::Datetime(_) => "a date or time".to_string(),
-        DeValue::Array(list) => describe_list(list),
-        DeValue::Table(_) => "a table".to_string(),
+        DeValue::Float(_) => format!("the number {}", literal(value)),
+        DeValue::Array(list) if list.is_empty() => "an empty list".to_string(),
+        DeValue::Array(list) => {
+            let items: Vec<_> = list.iter().take(4).map(|item| literal(item.get_ref())).collect();
+            let ellipsis = if list.len() > items.len() { ", …" } else { "" };
+            format!("[{}{ellipsis}]", items.join(", "))
+        }
+        DeValue::Boolean(_) | DeValue::Datetime(_) | DeValue::Table(_) => literal(value),
     }
 }
 
-fn describe_list(list: &[Spanned<DeValue>]) -> String {
-    if list.is_empty() {
-        return "an empty list".to_string();
+/// Returns a TOML value as it is written; lists, tables and dates in words.
+fn literal(value: &DeValue) -> String {
+    match value {
+        DeValue::String(text) => format!("\"{}\"", truncated(text)),
+        DeValue::Integer(digits) => truncated(digits.as_str()),
+        DeValue::Float(digits) => truncated(digits.as_str()),
+        DeValue::Boolean(yes) => yes.to_string(),
+        DeValue::Datetime(_) => "a date or time".to_string(),
+        DeValue::Array(_) => "a list".to_string(),
+        DeValue::Table(_) => "a table".to_string(),
     }
-    let items: Vec<_> = list
-        .iter()
-        .take(4)
-        .map(|entry| match entry.get_ref() {
-            DeValue::String(text) => format!("\"{}\"", truncated(text)),
-            DeValue::Integer(digits) => truncated(digits.as_str()),
-            DeValue::Float(digits) => truncated(digits.as_str()),
-            DeValue::Boolean(yes) => yes.to_string(),
-            DeValue::Datetime(_) => "a date".to_string(),
-            DeValue::Array(_) => "a list".to_string(),
-            DeValue::Table(_) => "a table".to_string(),
-        })
-        .collect();
-    let ellipsis = if list.len() > items.len() { ", …" } else { "" };
-    format!("[{}{ellipsis}]", items.join(", "))
 }
