@@ -7,7 +7,7 @@
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{round_fine, round_significant, rounded_to, unit};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Steepest view up or down, in degrees from the plane perpendicular to `up`.
 const MAX_PITCH: f64 = 89.9;
@@ -94,9 +94,7 @@ impl Camera {
         }
         let forward = self.frame()[2];
         let up = unit(self.up).unwrap_or(DVec3::Y);
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        // Rodrigues' rotation about the view direction.
-        let rolled = up * cos + forward.cross(up) * sin + forward * (forward.dot(up) * (1.0 - cos));
+        let rolled = DMat3::from_axis_angle(forward, degrees.to_radians()) * up;
         let up = rolled.map(|x| rounded_to(x, -6)).to_array();
         self.valid_or_self(Self { up, ..self.clone() })
     }

@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
 use crate::edit::bounds::{BoundingSphere, scene_bounds};
+use crate::edit::convert::irradiance_at;
 use crate::edit::placement::place_for;
 use crate::edit::properties::{Word, words};
 use crate::edit::unique_name::{free_light, free_material, free_object};
@@ -16,6 +17,7 @@ use crate::value::{
 };
 use crate::{Object, Scale, Scene, TransformOp};
 use glam::DVec3;
+use std::f64::consts::PI;
 use zerkalo_kernel::primitive::{Form, ParallelogramForm};
 
 /// Returns the name and a description of each kind of object that can be added.
@@ -172,26 +174,17 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     light.name = free_light(scene, name);
     // If a light is on already, the new light adds to it, and therefore gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
-    if let Some(surface) = light.surface() {
-        // The intensity makes the light as bright at the centre of the scene as a light without
-        // falloff.
-        let squared = (from * (1.5 * radius)).length_squared();
-        let seen = std::f64::consts::PI * surface.radius().powi(2);
-        let factor = std::f64::consts::PI * squared / seen;
-        light.intensity = round_significant(light.intensity * factor, 2);
-    }
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
-    let mut note = None;
     if physical && !scene.lights.is_empty() && light.apex().is_some() {
-        // All other lights have the inverse square falloff: the new one gets it, too. Its intensity
-        // is scaled so that the brightness at the centre of the scene stays that of a light without
-        // falloff.
-        let squared = (from * (1.5 * radius)).length_squared();
+        // All other lights have the inverse square falloff: the new one gets it, too.
         light.falloff = Falloff::InverseSquare;
-        light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);
-        let text = number(light.intensity);
-        note = Some(format!("It falls off with the square of the distance; intensity {text}."));
     }
+    light.intensity *= PI / irradiance_at(&light, center);
+    light.intensity = round_significant(light.intensity, 2);
+    let note = (light.falloff == Falloff::InverseSquare).then(|| {
+        let text = number(light.intensity);
+        format!("It falls off with the square of the distance; intensity {text}.")
+    });
     let mut next = scene.clone();
     let label = format!("add {}", light.name);
     next.lights.push(light);

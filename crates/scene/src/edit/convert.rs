@@ -150,7 +150,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
 /// that faces the light. A spot light is taken to be aimed at the point, an environment to be
 /// white. A light with a size counts as a light of the same area that is far away. The irradiance
 /// is at most that of a hemisphere of the light's radiance.
-fn irradiance_at(light: &Light, point: DVec3) -> f64 {
+pub(super) fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     let Some(position) = light.position() else { return PI };
     let squared = (DVec3::from_array(position) - point).length_squared();
     match light.surface() {
@@ -177,13 +177,9 @@ pub(super) fn switch_falloff(
     let mut edit = replace(scene, &subject, "falloff", falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
-    if let Some(position) = light.position().filter(|_| light.falloff != old.falloff) {
+    if light.falloff != old.falloff {
         let center = DVec3::from_array(scene_bounds(scene).center);
-        let squared = (DVec3::from_array(position) - center).length_squared();
-        // The irradiance at the distance d is I / d^2 with the inverse square, pi I without
-        // falloff.
-        let factor = std::f64::consts::PI * squared;
-        let factor = if light.falloff == Falloff::None { factor.recip() } else { factor };
+        let factor = irradiance_at(old, center) / irradiance_at(light, center);
         edit.note = Some(refit(light, factor));
     }
     Ok(edit)

@@ -2,6 +2,7 @@
 
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
+use crate::shape::wrapped_angle;
 use crate::value::{floor_log10, rotated_y, rounded_to, sin_cos_degrees};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
@@ -71,8 +72,7 @@ fn rotate_by_steps(object: &mut Object, degrees: f64) {
         DVec3::new(middle.x * cos + middle.z * sin, middle.y, middle.z * cos - middle.x * sin)
     };
     let position = after(angle) + DVec3::from_array(shift);
-    let wrapped = rounded_to((angle + degrees).rem_euclid(360.0), -6);
-    let angle = if wrapped > 180.0 { rounded_to(wrapped - 360.0, -6) } else { wrapped };
+    let angle = wrapped_angle(angle, degrees);
     let shift = position - after(angle);
     let digits = floor_log10(scale.max(middle.x.hypot(middle.z))) - 6;
     let shift = shift.map(|x| rounded_to(x, digits)).to_array();

@@ -35,6 +35,7 @@ pub use plane::Plane;
 pub use prism::Prism;
 pub use pyramid::Pyramid;
 pub use rectangle::Rectangle;
+pub(crate) use registry::wrapped_angle;
 pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;

@@ -12,7 +12,7 @@ macro_rules! by_corner_and_rotation {
         }
 
         fn rotate_y(&mut self, degrees: f64) -> bool {
-            self.rotation = $crate::shape::registry::wrapped_angle(self.rotation, degrees);
+            self.rotation = $crate::shape::wrapped_angle(self.rotation, degrees);
             true
         }
 

@@ -68,7 +68,7 @@ pub trait ShapeDesc: KeyNode {
 }
 
 /// Returns `rotation + degrees`, above -180 and at most 180, rounded to a millionth.
-pub(super) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
+pub(crate) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
