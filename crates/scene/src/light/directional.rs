@@ -13,7 +13,7 @@ use glam::DVec3;
 const MIN_ANGLE: f64 = 0.01;
 
 description! {
-    /// Light from infinitely far away.
+    /// Light from infinitely far away, such as the sun.
     pub struct Directional: Copy {
         /// Direction in which the light travels.
         direction: [f64; 3], as Direction;
@@ -57,7 +57,7 @@ impl LightDesc for Directional {
         Handles { direction: Some(&mut self.direction), ..Handles::default() }
     }
 
-    fn placed(placement: &Placement) -> Self {
-        Self::along(placement.direction)
+    fn place(&mut self, placement: &Placement) {
+        self.direction = placement.direction;
     }
 }

@@ -33,8 +33,8 @@ impl LightDesc for DiskLight {
         }
     }
 
-    fn placed(placement: &Placement) -> Self {
-        let (center, radius) = registry::rounded_ball(placement);
-        Self { center, radius, normal: placement.direction }
+    fn place(&mut self, placement: &Placement) {
+        (self.center, self.radius) = registry::rounded_ball(placement);
+        self.normal = placement.direction;
     }
 }

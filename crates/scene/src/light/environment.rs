@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::{Handles, LightDesc, LightForm, LightSample, Placement};
+use crate::light::{Handles, LightDesc, LightForm, LightSample};
 use crate::value::{Color, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use zerkalo_kernel::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 const GRADIENT_ROWS: u32 = 512;
 
 description! {
-    /// Light from all directions, infinitely far away: an image around the scene, or a gradient.
+    /// Light from all directions, such as the sky.
     pub struct Environment {
         /// Name of an equirectangular image (Radiance HDR, OpenEXR, PNG, JPEG), relative to the
         /// folder of the scene file. The middle of the image is towards -z. An empty name selects
@@ -71,10 +71,6 @@ impl LightDesc for Environment {
 
     fn handles(&mut self) -> Handles<'_> {
         Handles::default()
-    }
-
-    fn placed(_: &Placement) -> Self {
-        Self::default()
     }
 }
 

@@ -5,7 +5,7 @@ use crate::value::description;
 use glam::DVec3;
 
 description! {
-    /// Light from one point.
+    /// Light from one point, such as a lamp.
     pub struct Point: Copy {
         /// Position of the light.
         position: [f64; 3], in COORDINATE "scene units";
@@ -21,7 +21,7 @@ impl LightDesc for Point {
         Handles { position: Some(&mut self.position), ..Handles::default() }
     }
 
-    fn placed(placement: &Placement) -> Self {
-        Self { position: placement.position }
+    fn place(&mut self, placement: &Placement) {
+        self.position = placement.position;
     }
 }

@@ -5,7 +5,7 @@ use crate::value::{description, unit};
 use glam::DVec3;
 
 description! {
-    /// Light from one side of a rectangle.
+    /// Light from one side of a rectangle, such as a window.
     pub struct RectangleLight: Copy {
         /// Centre of the rectangle.
         center: [f64; 3], in COORDINATE "scene units";
@@ -45,8 +45,9 @@ impl LightDesc for RectangleLight {
         }
     }
 
-    fn placed(placement: &Placement) -> Self {
+    fn place(&mut self, placement: &Placement) {
         let (center, radius) = registry::rounded_ball(placement);
-        Self { center, size: [2.0 * radius; 2], normal: placement.direction, up: [0.0, 1.0, 0.0] }
+        (self.center, self.size) = (center, [2.0 * radius; 2]);
+        self.normal = placement.direction;
     }
 }

@@ -3,14 +3,11 @@
 use crate::light::{
     Directional, DiskLight, Environment, LightForm, Point, RectangleLight, SphereLight, Spot,
 };
-use crate::value::{
-    Description, Field, FieldValue, ValidationError, ValueType, doc_text, one_of, round_nice,
-    round_significant,
-};
+use crate::value::{KeyNode, ValidationError, kinds, round_nice, round_significant};
 use glam::DVec3;
 
 /// Description of one kind of light, with the keys that users write in scene files.
-pub trait LightDesc: Description {
+pub trait LightDesc: KeyNode {
     /// Converts the description, which must be valid, to its canonical form.
     fn form(&self) -> LightForm<'_>;
 
@@ -22,8 +19,8 @@ pub trait LightDesc: Description {
     /// Returns the values that edits of position and direction change.
     fn handles(&mut self) -> Handles<'_>;
 
-    /// Creates a light with those values of `placement` for which the kind has keys.
-    fn placed(placement: &Placement) -> Self;
+    /// Sets those values of `placement` for which the kind has keys, and a usual size.
+    fn place(&mut self, _: &Placement) {}
 }
 
 /// Values of a light that determine its position and direction.
@@ -47,95 +44,28 @@ pub struct Placement {
     pub radius: f64,
 }
 
-macro_rules! kinds {
-    ($($(#[doc = $doc:literal])+ $key:literal => $variant:ident($kind:ident),)+) => {
-        #[derive(Clone, Debug, PartialEq)]
-        pub enum LightKind {
-            $($(#[doc = $doc])+ $variant($kind),)+
-        }
-
-        one_of! {
-            LightKind { $($key => $variant),+ }
-        }
-
-        $(
-            impl From<$kind> for LightKind {
-                fn from(kind: $kind) -> Self {
-                    Self::$variant(kind)
-                }
-            }
-        )+
-
-        pub const KIND_KEYS: &[&str] = &[$($key),+];
-
-        impl LightKind {
-            /// Every kind of light, with its key, its fields and its help text. A light has exactly
-            /// one of these keys.
-            pub const FIELDS: &[Field] = &[$(
-                Field::required(
-                    $key,
-                    ValueType::Table($kind::FIELDS),
-                    "",
-                    doc_text(concat!($($doc),+)),
-                )
-                .or("another kind is needed"),
-            )+];
-
-            /// Creates a light of the kind `key`, see [`LightDesc::placed`]. Returns `None` if there
-            /// is no such kind.
-            pub fn placed(key: &str, placement: &Placement) -> Option<Self> {
-                match key {
-                    $($key => Some(Self::$variant($kind::placed(placement))),)+
-                    _ => None,
-                }
-            }
-
-            pub fn form(&self) -> LightForm<'_> {
-                match self {
-                    $(Self::$variant(kind) => kind.form(),)+
-                }
-            }
-
-            /// Returns the validation errors; each key begins with the kind.
-            fn faults(&self) -> Vec<ValidationError> {
-                let faults = match self {
-                    $(Self::$variant(kind) => kind.faults(),)+
-                };
-                faults.into_iter().map(|fault| fault.prefixed(self.key())).collect()
-            }
-
-            /// Returns the values that edits of position and direction change.
-            pub fn handles(&mut self) -> Handles<'_> {
-                match self {
-                    $(Self::$variant(kind) => kind.handles(),)+
-                }
-            }
-        }
-    };
-}
-
 kinds! {
-    /// Light from one point, such as a lamp.
-    "point" => Point(Point),
-    /// Light from infinitely far away, such as the sun.
-    "directional" => Directional(Directional),
-    /// Light from one point into a cone, such as a spotlight.
-    "spot" => Spot(Spot),
-    /// Light from a sphere, such as a bulb: soft shadows.
-    "sphere" => Sphere(SphereLight),
-    /// Light from one side of a rectangle, such as a window.
-    "rectangle" => Rectangle(RectangleLight),
-    /// Light from one side of a disk.
-    "disk" => Disk(DiskLight),
-    /// Light from all directions, such as the sky.
-    "environment" => Environment(Environment),
+    /// Kind of a light. In scene files, its key stands beside the other keys of the light.
+    pub enum LightKind: LightDesc {
+        "point" => Point(Point),
+        "directional" => Directional(Directional),
+        "spot" => Spot(Spot),
+        "sphere" => Sphere(SphereLight),
+        "rectangle" => Rectangle(RectangleLight),
+        "disk" => Disk(DiskLight),
+        "environment" => Environment(Environment),
+    }
 }
 
-impl FieldValue for LightKind {
-    const TYPE: ValueType = ValueType::OneOf(Self::FIELDS);
+/// Keys of all kinds of lights, of which a light has exactly one.
+pub const KIND_KEYS: &[&str] = LightKind::KEYS;
 
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()
+impl LightKind {
+    /// Creates a light of the kind `key` by [`LightDesc::place`]; `None` if there is no such kind.
+    pub fn placed(key: &str, placement: &Placement) -> Option<Self> {
+        let mut kind = Self::of_kind(key)?;
+        kind.place(placement);
+        Some(kind)
     }
 }
 

@@ -1,11 +1,11 @@
-//! Light from a sphere.
+//! Light from a sphere. Points inside of it are lit from all sides.
 
 use crate::light::{EmissiveSurface, Handles, LightDesc, LightForm, Placement, registry};
 use crate::value::description;
 use glam::DVec3;
 
 description! {
-    /// Light from a sphere. Points inside of it are lit from all sides.
+    /// Light from a sphere, such as a bulb: soft shadows.
     pub struct SphereLight: Copy {
         /// Centre of the sphere.
         center: [f64; 3], in COORDINATE "scene units";
@@ -24,8 +24,7 @@ impl LightDesc for SphereLight {
         Handles { position: Some(&mut self.center), ..Handles::default() }
     }
 
-    fn placed(placement: &Placement) -> Self {
-        let (center, radius) = registry::rounded_ball(placement);
-        Self { center, radius }
+    fn place(&mut self, placement: &Placement) {
+        (self.center, self.radius) = registry::rounded_ball(placement);
     }
 }

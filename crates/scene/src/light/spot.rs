@@ -1,4 +1,5 @@
-//! Spot light: its description, and the cone that limits its light.
+//! Spot light: its description, and the cone that limits its light. Between the inner and the outer
+//! cone the light decreases smoothly to zero.
 
 use crate::light::{Handles, LightDesc, LightForm, Placement};
 use crate::value::{KeyNode, ValidationError, description, unit};
@@ -6,8 +7,7 @@ use glam::DVec3;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 
 description! {
-    /// Light from one point into a cone. Between the inner and the outer cone it decreases smoothly
-    /// to zero.
+    /// Light from one point into a cone, such as a spotlight.
     pub struct Spot: Copy {
         /// Position of the light: the apex of the cone.
         position: [f64; 3], in COORDINATE "scene units";
@@ -50,10 +50,10 @@ impl LightDesc for Spot {
         }
     }
 
-    fn placed(placement: &Placement) -> Self {
+    fn place(&mut self, placement: &Placement) {
         let Placement { position, direction, .. } = *placement;
         let (outer_angle, inner_angle) = (CREATED_ANGLE, 0.5 * CREATED_ANGLE);
-        Self { position, direction, outer_angle, inner_angle }
+        *self = Self { position, direction, outer_angle, inner_angle };
     }
 }
 

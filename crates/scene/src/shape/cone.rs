@@ -29,10 +29,10 @@ impl ShapeDesc for Cone {
         axis_faults(self.validator(), [self.base, self.apex], "apex", sizes)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let top = base + DVec3::Y * size.y;
         let radius = size.x.min(size.z) / 2.0;
-        Self { base: base.to_array(), apex: top.to_array(), radius }
+        *self = Self { base: base.to_array(), apex: top.to_array(), radius };
     }
 
     by_axis!(base, apex);

@@ -60,8 +60,8 @@ macro_rules! compounds {
                 )]
             }
 
-            fn fitted_to(base: DVec3, size: DVec3) -> Self {
-                Self { of: fitted_to(base, size).map(CsgOperand::new).into() }
+            fn fit(&mut self, base: DVec3, size: DVec3) {
+                self.of = fitted_parts(base, size).map(CsgOperand::new).into();
             }
 
             fn parts(&self) -> Option<&[CsgOperand]> {
@@ -99,8 +99,9 @@ compounds! {
 
 /// Returns the parts of a new compound that fills a box on `base`: a block of nine tenths of
 /// `size`, and a ball at its upper right near corner.
-fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
-    let block = Cuboid::fitted_to(base, size * 0.9);
+fn fitted_parts(base: DVec3, size: DVec3) -> [Shape; 2] {
+    let mut block = Cuboid::default();
+    block.fit(base, size * 0.9);
     let radius = 0.4 * size.min_element();
     let corner = base + DVec3::new(0.5 * size.x, size.y, 0.5 * size.z) - radius;
     let ball = Sphere { center: corner.to_array(), radius };

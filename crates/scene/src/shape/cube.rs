@@ -25,10 +25,10 @@ impl ShapeDesc for Cube {
         prismoid(DVec3::from_array(self.corner), &square(e), e, 1.0, self.rotation)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let edge = size.min_element();
         let corner = corner_of_centered(base, edge, edge);
-        Self { corner, edge, rotation: 0.0 }
+        *self = Self { corner, edge, rotation: 0.0 };
     }
 
     by_corner_and_rotation!();

@@ -25,8 +25,8 @@ impl ShapeDesc for Cuboid {
         prismoid(corner, &base, y, 1.0, 0.0)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
-        Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() }
+    fn fit(&mut self, base: DVec3, size: DVec3) {
+        *self = Self { center: [base.x, base.y + size.y / 2.0, base.z], size: size.to_array() };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

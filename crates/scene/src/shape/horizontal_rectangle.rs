@@ -27,9 +27,9 @@ impl ShapeDesc for HorizontalRectangle {
         })
     }
 
-    /// Creates the rectangle that is the upper side of a box; see [`ShapeDesc::fitted_to`].
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
-        Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
+    /// Creates the rectangle that is the upper side of a box; see [`ShapeDesc::fit`].
+    fn fit(&mut self, base: DVec3, size: DVec3) {
+        *self = Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

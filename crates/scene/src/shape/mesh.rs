@@ -94,11 +94,6 @@ impl ShapeDesc for MeshDesc {
             mesh,
         })
     }
-
-    /// Creates the placeholder, because only a transform moves a mesh.
-    fn fitted_to(_: DVec3, _: DVec3) -> Self {
-        Self::default()
-    }
 }
 
 impl Shape {
@@ -131,7 +126,7 @@ mod tests {
     fn placeholder_is_icosahedron_on_origin() {
         let mesh = &PLACEHOLDER.mesh;
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 20));
-        let form = MeshDesc::fitted_to(DVec3::ZERO, DVec3::ONE).form();
+        let form = MeshDesc::default().form();
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");

@@ -24,8 +24,8 @@ impl ShapeDesc for Plane {
     }
 
     /// Creates the horizontal plane through `base`.
-    fn fitted_to(base: DVec3, _: DVec3) -> Self {
-        Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] }
+    fn fit(&mut self, base: DVec3, _: DVec3) {
+        *self = Self { point: base.to_array(), normal: [0.0, 1.0, 0.0] };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

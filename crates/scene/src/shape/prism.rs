@@ -30,10 +30,10 @@ impl ShapeDesc for Prism {
         prismoid(DVec3::from_array(self.corner), &base, self.height, 1.0, self.rotation)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let side = size.x;
         let corner = corner_of_centered(base, side, side * 0.75f64.sqrt());
-        Self { corner, side, height: size.y, rotation: 0.0 }
+        *self = Self { corner, side, height: size.y, rotation: 0.0 };
     }
 
     by_corner_and_rotation!();

@@ -35,10 +35,10 @@ impl ShapeDesc for Pyramid {
         prismoid(corner, &square(self.side), height, top_over_base, self.rotation)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let side = size.x.min(size.z);
         let corner = corner_of_centered(base, side, side);
-        Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 }
+        *self = Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 };
     }
 
     by_corner_and_rotation!();

@@ -60,13 +60,13 @@ impl ShapeDesc for Rectangle {
             .errors()
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
-        Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
+        *self = Self {
             center: [base.x, base.y + size.y / 2.0, base.z],
             size: [size.x, size.y],
             normal: [0.0, 0.0, 1.0],
             up: [0.0, 1.0, 0.0],
-        }
+        };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

@@ -5,11 +5,8 @@ use crate::shape::{
     MeshDesc, Plane, Prism, Pyramid,
 };
 use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, TransformOp, Union, UnitFrustum};
-use crate::value::{
-    Description, Field, FieldValue, KeyNode, ValidationError, ValueType, one_of, rounded_to,
-};
+use crate::value::{Field, KeyNode, ValidationError, kinds, rounded_to};
 use glam::{DMat3, DVec3};
-use std::ops::{Deref, DerefMut};
 use zerkalo_kernel::primitive::Form;
 
 /// Description of one kind of shape, with the keys that users write in scene files.
@@ -22,11 +19,9 @@ pub trait ShapeDesc: KeyNode {
         self.validator().lengths(self).errors()
     }
 
-    /// Creates an upright instance that roughly fills a box. `base` is the centre of its lower
+    /// Makes the shape upright, so that it roughly fills a box. `base` is the centre of its lower
     /// side.
-    fn fitted_to(base: DVec3, size: DVec3) -> Self
-    where
-        Self: Sized;
+    fn fit(&mut self, _base: DVec3, _size: DVec3) {}
 
     /// Returns the points that move the shape if a vector is added to all of them; empty if only a
     /// transform can.
@@ -73,94 +68,41 @@ pub(crate) fn wrapped_angle(rotation: f64, degrees: f64) -> f64 {
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-macro_rules! kinds {
-    ($($key:literal => $kind:ident),+ $(,)?) => {
-        /// Shape of an object. In scene files it is a table with one key, the kind.
-        #[derive(Clone, Debug, PartialEq)]
-        pub enum Shape {
-            $(
-                #[doc = concat!("`shape.", $key, "`")]
-                $kind($kind),
-            )+
-        }
-
-        one_of! {
-            Shape { $($key => $kind),+ }
-        }
-
-        // A static, because the table refers to itself through the parts of compounds.
-        static KIND_TABLE: [Field; [$($key),+].len()] = [
-            $(Field::required($key, ValueType::Table($kind::FIELDS), "", $kind::DOC),)+
-        ];
-
-        /// Every kind of shape, with its key, its fields and its help text.
-        pub const KINDS: &[Field] = &KIND_TABLE;
-
-        /// Key and example of every kind of shape, in the order of [`KINDS`].
-        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE)),+];
-
-        impl Shape {
-            /// Creates a shape by [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
-            pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
-                match key {
-                    $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
-                    _ => None,
-                }
-            }
-        }
-
-        impl Deref for Shape {
-            type Target = dyn ShapeDesc;
-
-            fn deref(&self) -> &Self::Target {
-                match self {
-                    $(Self::$kind(kind) => kind,)+
-                }
-            }
-        }
-
-        impl DerefMut for Shape {
-            fn deref_mut(&mut self) -> &mut Self::Target {
-                match self {
-                    $(Self::$kind(kind) => kind,)+
-                }
-            }
-        }
-    };
-}
-
 kinds! {
-    "sphere" => Sphere,
-    "cube" => Cube,
-    "box" => Cuboid,
-    "pyramid" => Pyramid,
-    "prism" => Prism,
-    "cylinder" => Cylinder,
-    "cone" => Cone,
-    "tapered_cylinder" => TaperedCylinder,
-    "unit_frustum" => UnitFrustum,
-    "torus" => Torus,
-    "platform" => HorizontalRectangle,
-    "rectangle" => Rectangle,
-    "plane" => Plane,
-    "mesh" => MeshDesc,
-    "union" => Union,
-    "intersection" => Intersection,
-    "difference" => Difference,
-}
-
-impl FieldValue for Shape {
-    const TYPE: ValueType = ValueType::OneOf(KINDS);
-
-    fn errors(&self, field: &Field) -> Vec<ValidationError> {
-        self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()
+    /// Shape of an object. In scene files it is a table with one key, the kind.
+    pub enum Shape: ShapeDesc {
+        "sphere" => Sphere(Sphere),
+        "cube" => Cube(Cube),
+        "box" => Cuboid(Cuboid),
+        "pyramid" => Pyramid(Pyramid),
+        "prism" => Prism(Prism),
+        "cylinder" => Cylinder(Cylinder),
+        "cone" => Cone(Cone),
+        "tapered_cylinder" => TaperedCylinder(TaperedCylinder),
+        "unit_frustum" => UnitFrustum(UnitFrustum),
+        "torus" => Torus(Torus),
+        "platform" => HorizontalRectangle(HorizontalRectangle),
+        "rectangle" => Rectangle(Rectangle),
+        "plane" => Plane(Plane),
+        "mesh" => MeshDesc(MeshDesc),
+        "union" => Union(Union),
+        "intersection" => Intersection(Intersection),
+        "difference" => Difference(Difference),
     }
 }
 
+/// Every kind of shape, with its key, its fields and its help text.
+pub const KINDS: &[Field] = Shape::FIELDS;
+
+/// Key and example of every kind of shape, in the order of [`KINDS`].
+pub const EXAMPLES: &[(&str, &str)] = Shape::EXAMPLES;
+
 impl Shape {
-    /// Returns the validation errors; each key begins with the kind.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        (**self).faults().into_iter().map(|fault| fault.prefixed(self.key())).collect()
+    /// Creates a shape of the kind `key` by [`ShapeDesc::fit`]; `None` if there is no such kind.
+    pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
+        let mut shape = Self::of_kind(key)?;
+        shape.fit(base, size);
+        Some(shape)
     }
 
     /// Returns the first anchor point, or the origin.

@@ -21,9 +21,9 @@ impl ShapeDesc for Sphere {
         Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let radius = round_nice(size.min_element() / 2.0, size.min_element());
-        Self { center: [base.x, base.y + radius, base.z], radius }
+        *self = Self { center: [base.x, base.y + radius, base.z], radius };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

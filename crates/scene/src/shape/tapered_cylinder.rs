@@ -40,15 +40,15 @@ impl ShapeDesc for TaperedCylinder {
         axis_faults(self.validator().and(both_zero), [self.base, self.top], "top", sizes)
     }
 
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let top = base + DVec3::Y * size.y;
         let radius = size.x.min(size.z) / 2.0;
-        Self {
+        *self = Self {
             base: base.to_array(),
             top: top.to_array(),
             base_radius: radius,
             top_radius: 0.6 * radius,
-        }
+        };
     }
 
     by_axis!(base, top);

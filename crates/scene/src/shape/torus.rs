@@ -39,12 +39,12 @@ impl ShapeDesc for Torus {
     }
 
     /// Creates a flat torus whose tube is at most a third of its ring.
-    fn fitted_to(base: DVec3, size: DVec3) -> Self {
+    fn fit(&mut self, base: DVec3, size: DVec3) {
         let across = size.x.min(size.z);
         let tube = round_nice((across / 8.0).min(size.y / 2.0), across);
         let ring = round_nice(3.0 * across / 8.0, across);
         let center = [base.x, base.y + tube, base.z];
-        Self { center, axis: [0.0, 1.0, 0.0], ring, tube }
+        *self = Self { center, axis: [0.0, 1.0, 0.0], ring, tube };
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {

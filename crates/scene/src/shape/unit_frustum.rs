@@ -22,9 +22,9 @@ impl ShapeDesc for UnitFrustum {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }
 
-    /// Creates a cylinder at the origin, because only a transform moves this shape.
-    fn fitted_to(_: DVec3, _: DVec3) -> Self {
-        Self { s: 1.0 }
+    /// Becomes a cylinder, which only a transform moves.
+    fn fit(&mut self, _: DVec3, _: DVec3) {
+        self.s = 1.0;
     }
 
     fn upright(&self) -> Option<TransformOp> {

@@ -1,4 +1,5 @@
-//! Macro that declares values of one of several kinds: [`one_of!`].
+//! Macros that declare values of one of several kinds: [`one_of!`] with single values, [`kinds!`] with
+//! tables.
 
 /// Declares an enum whose variants have one value each. In scene files such an enum is a table with
 /// one key, the name of the variant. Each variant has its help text, key, range and unit, written as
@@ -125,3 +126,108 @@ macro_rules! one_of {
     };
 }
 pub(crate) use one_of;
+
+/// Declares an enum of descriptions, each with its key in scene files. It dereferences to the trait
+/// that all of them implement, which has the method `faults`. The help text of a key is that of the
+/// description.
+///
+/// ```ignore
+/// kinds! {
+///     /// Shape of an object.
+///     pub enum Shape: ShapeDesc {
+///         "sphere" => Sphere(Sphere),
+///         "box" => Cuboid(Cuboid),
+///     }
+/// }
+/// ```
+macro_rules! kinds {
+    (
+        $(#[$attribute:meta])+
+        pub enum $name:ident: $description:ident {
+            $($key:literal => $variant:ident($kind:ident),)+
+        }
+    ) => {
+        $(#[$attribute])+
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum $name {
+            $(
+                #[doc = concat!("`", $key, "`")]
+                $variant($kind),
+            )+
+        }
+
+        $crate::value::one_of! {
+            $name { $($key => $variant),+ }
+        }
+
+        // A static, because the table may refer to itself through the parts of compounds.
+        static KIND_TABLE: [$crate::value::Field; [$($key),+].len()] = [$(
+            $crate::value::Field::required(
+                $key,
+                <$kind as $crate::value::FieldValue>::TYPE,
+                "",
+                <$kind as $crate::value::Description>::DOC,
+            )
+            .or("another kind is needed"),
+        )+];
+
+        impl $name {
+            /// Every kind, with its key, its fields and its help text. Exactly one is given.
+            pub const FIELDS: &[$crate::value::Field] = &KIND_TABLE;
+
+            /// Keys of all kinds.
+            pub const KEYS: &[&str] = &[$($key),+];
+
+            /// Key and example of every kind, in the order of [`Self::FIELDS`].
+            pub const EXAMPLES: &[(&str, &str)] =
+                &[$(($key, <$kind as $crate::value::Description>::EXAMPLE)),+];
+
+            /// Creates the default value of the kind `key`; `None` if there is no such kind.
+            fn of_kind(key: &str) -> Option<Self> {
+                let mut value = Self::default();
+                $crate::value::KeyNode::make_child(&mut value, key)?;
+                Some(value)
+            }
+
+            /// Returns the validation errors; each key begins with the kind.
+            pub fn faults(&self) -> Vec<$crate::value::ValidationError> {
+                (**self).faults().into_iter().map(|error| error.prefixed(self.key())).collect()
+            }
+        }
+
+        $(
+            impl From<$kind> for $name {
+                fn from(kind: $kind) -> Self {
+                    Self::$variant(kind)
+                }
+            }
+        )+
+
+        impl $crate::value::FieldValue for $name {
+            const TYPE: $crate::value::ValueType = $crate::value::ValueType::OneOf(Self::FIELDS);
+
+            fn errors(&self, field: &$crate::value::Field) -> Vec<$crate::value::ValidationError> {
+                self.faults().into_iter().map(|error| error.prefixed(field.name)).collect()
+            }
+        }
+
+        impl std::ops::Deref for $name {
+            type Target = dyn $description;
+
+            fn deref(&self) -> &Self::Target {
+                match self {
+                    $(Self::$variant(kind) => kind,)+
+                }
+            }
+        }
+
+        impl std::ops::DerefMut for $name {
+            fn deref_mut(&mut self) -> &mut Self::Target {
+                match self {
+                    $(Self::$variant(kind) => kind,)+
+                }
+            }
+        }
+    };
+}
+pub(crate) use kinds;
