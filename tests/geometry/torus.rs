@@ -148,7 +148,7 @@ fn torus_hits_are_roots_of_the_quartic() {
 #[test]
 fn torus_casts_shadows_on_itself() {
     let form = torus(0.3);
-    assert!(!form.is_convex() && !BoundingVolume::new(&form).is_convex());
+    assert!(!form.is_convex());
     let inner = DVec3::new(0.7 - 1e-6, 0.0, 0.0);
     let rays =
         [(inner, DVec3::NEG_X), (inner, DVec3::Y), (DVec3::new(1.3 + 1e-6, 0.0, 0.0), DVec3::X)];

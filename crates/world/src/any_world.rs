@@ -1,6 +1,6 @@
 //! Worlds in single or double precision behind one type.
 
-use crate::analysis::precision;
+use crate::analysis::precision::single_suffices;
 use crate::compile::RecenteredGeometry;
 use crate::integrator::first_hit::FirstHit;
 use crate::world::{World, WorldInfo};
@@ -40,11 +40,6 @@ pub enum AnyWorld {
 /// Returns `true` if [`Precision::Auto`] chooses double precision for `scene`.
 pub fn requires_double(scene: &Scene) -> bool {
     !single_suffices(scene, &RecenteredGeometry::new(scene))
-}
-
-fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> bool {
-    let RecenteredGeometry { origin, forms, extent } = geometry;
-    precision::single_suffices(scene, forms, *origin, *extent)
 }
 
 impl AnyWorld {

@@ -8,7 +8,7 @@ use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::culling::tile::{CullingMode, FrustumCuller, LightBounds, TileCandidates, outside_only};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
-use crate::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
+use crate::integrator::nested_dielectrics::{NestedDielectrics, may_reach};
 use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::choice::LightChoice;
 use crate::lights::emissive_sheets::{Emits, move_off_surfaces};
@@ -264,7 +264,8 @@ impl<S: Float> CompiledLights<S> {
         let start = start_region(scene, camera);
         let is_entered = |form: usize| {
             let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
-            materials.of_object[form].iter().any(transmits) || start.reaches(&geometry.forms[form])
+            materials.of_object[form].iter().any(transmits)
+                || may_reach(&start, &geometry.forms[form])
         };
         let objects = ObjectGeometry {
             scene,
@@ -371,7 +372,7 @@ fn structure_of(scene: &Scene, forms: &[Form]) -> AccelerationStructure {
 }
 
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
-fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
+fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> BoundingSphere {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
     let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
@@ -381,7 +382,7 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
         let error = F32_RAY_ERROR * (lens.radius + camera.eye().abs().max_element());
         lens.blur(near) + error
     });
-    StartRegion { eye: camera.eye(), radius: near * farthest_corner + lens }
+    BoundingSphere { center: camera.eye(), radius: near * farthest_corner + lens }
 }
 
 impl<L: SimdFloat> World<L> {
@@ -414,7 +415,7 @@ impl<L: SimdFloat> World<L> {
             CompiledLights::new(scene, recentered, &materials, primitives, &camera, &groups);
         let start = start_region(scene, &camera);
         let nested_dielectrics =
-            NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, start);
+            NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
         let entered = nested_dielectrics.as_ref().map(NestedDielectrics::entered);
         let entered = entered.unwrap_or_else(|| vec![false; bsdf_of.len()]);
         let forms = primitives.iter().map(|id| &recentered.forms[id.form]);

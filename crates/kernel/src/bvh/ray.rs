@@ -84,8 +84,6 @@ impl<L: SimdFloat> Hit<L> {
         if tie.any() {
             nearer = nearer | (tie & other.primitive.lt(self.primitive));
         }
-        self.t = L::select(nearer, other.t, self.t);
-        self.primitive = L::select(nearer, other.primitive, self.primitive);
-        self.triangle = L::select(nearer, other.triangle, self.triangle);
+        self.take_in(nearer, other.t, (other.primitive, other.triangle));
     }
 }

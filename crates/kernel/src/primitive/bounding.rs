@@ -101,7 +101,6 @@ pub struct BoundingVolume {
     pub ball: BoundingSphere,
     /// Plane that contains flat geometry.
     plane: Option<HalfSpace>,
-    convex: bool,
     /// Largest distance between the end of a shadow ray and the position of its light.
     slack: f64,
 }
@@ -138,18 +137,12 @@ fn ray_error(point: DVec3) -> f64 {
 impl BoundingVolume {
     /// Creates the bounding volume of `form`.
     pub fn new(form: &Form) -> Self {
-        let (ball, convex) = (form.bounding_sphere(), form.is_convex());
-        Self { ball, plane: form.plane(), convex, slack: 0.0 }
+        Self { ball: form.bounding_sphere(), plane: form.plane(), slack: 0.0 }
     }
 
     /// Returns `true` if the object is flat. A ray that leaves a flat object cannot hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
-    }
-
-    /// See [`Form::is_convex`].
-    pub fn is_convex(&self) -> bool {
-        self.convex
     }
 
     /// Returns a sphere that contains the part of the object that rays of `frustum` can hit; `None`

@@ -7,6 +7,7 @@
 //! ratio.
 
 use crate::analysis::clearance::clearance;
+use crate::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::ops::Range;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
@@ -48,9 +49,8 @@ const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 const MOST_PAIRS: usize = 1 << 20;
 
 /// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
-/// `forms` are all objects, relative to `origin`. `extent` is the largest magnitude of a coordinate
-/// of the objects and the lens.
-pub(crate) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
+pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> bool {
+    let RecenteredGeometry { origin, ref forms, extent } = *geometry;
     let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;

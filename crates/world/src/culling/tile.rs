@@ -132,10 +132,10 @@ impl FrustumCuller {
     pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
-        // A shadow ray that leaves the outside of a convex primitive cannot hit it again.
-        let self_shadowing = |(b, outside_only): (&BoundingVolume, &bool)| {
-            !(outside_only | (b.is_flat() & b.is_convex()))
-        };
+        // A shadow ray that leaves a flat primitive, or the outside of a convex one, cannot hit it
+        // again.
+        let self_shadowing =
+            |(b, outside_only): (&BoundingVolume, &bool)| !(*outside_only || b.is_flat());
         let self_shadowing = bounds.iter().zip(outside_only).map(self_shadowing).collect();
         Self { lights, self_shadowing, bounds }
     }

@@ -157,13 +157,10 @@ impl<S: Float> Contacts<S> {
         (transparent, priority_of): (&[bool], &[u32]),
         (epsilon, input_error): (f64, f64),
     ) -> Option<Self> {
-        let mut first = vec![0; forms.len()];
+        let first = first_primitives(forms, primitives);
         let mut transmits = vec![false; forms.len()];
-        for (primitive, source) in (0..).zip(primitives) {
-            if source.part == 0 {
-                first[source.form] = primitive;
-            }
-            transmits[source.form] |= transparent[primitive as usize];
+        for (source, transparent) in primitives.iter().zip(transparent) {
+            transmits[source.form] |= transparent;
         }
         let mut touching = vec![Vec::new(); forms.len()];
         for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
@@ -333,6 +330,15 @@ fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
             (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
         })
     })
+}
+
+/// Returns the id of the first primitive of each form.
+pub(crate) fn first_primitives(forms: &[Form], primitives: &[PrimitiveId]) -> Vec<u32> {
+    let mut first = vec![0; forms.len()];
+    for (primitive, source) in (0..).zip(primitives).filter(|(_, source)| source.part == 0) {
+        first[source.form] = primitive;
+    }
+    first
 }
 
 /// Returns the indices of all pairs of objects for which `wanted` is true and whose bounding boxes

@@ -2,6 +2,7 @@
 //! a size.
 
 use crate::culling::light_buffer::RayStart;
+use crate::integrator::nested_dielectrics::attenuated;
 use crate::integrator::vertex::Vertex;
 use crate::lights::choice::LightChoice;
 use std::f64::consts::FRAC_1_PI;
@@ -47,17 +48,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     #[inline(always)]
     pub fn unoccluded(&self, value: Vec3<L>, light: &LightSample<L>) -> Vec3<L> {
         let radiance = self.path.throughput.component_mul(value).component_mul(light.irradiance);
-        self.attenuated(radiance, light.distance)
-    }
-
-    /// Returns what the medium in front of the surface lets through of `radiance` from a light at
-    /// `distance`.
-    #[inline(always)]
-    fn attenuated(&self, radiance: Vec3<L>, distance: L) -> Vec3<L> {
-        match self.media.and_then(|media| media.transmittance(distance)) {
-            Some(left) => radiance.component_mul(left),
-            None => radiance,
-        }
+        attenuated(self.media, radiance, light.distance)
     }
 
     /// Returns the lanes with a diffuse part or highlights that face the light from `wi`.
@@ -184,7 +175,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 if let Some(factor) = cone {
                     radiance = radiance * factor;
                 }
-                vertex.attenuated(radiance, distance).component_mul(lights.emission(stratum))
+                attenuated(vertex.media, radiance, distance).component_mul(lights.emission(stratum))
             });
         }
     }

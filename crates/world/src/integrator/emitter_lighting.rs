@@ -13,7 +13,7 @@
 use crate::integrator::direct_lighting::cosine_density;
 use crate::integrator::environment_lighting::visible_environments;
 use crate::integrator::interaction::SurfaceInteraction;
-use crate::integrator::nested_dielectrics::Media;
+use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
 use crate::world::{LightSource, World};
@@ -55,15 +55,12 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
             let density = light.density(origin, t, L::from_id(0));
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
-        if let Some(left) = media.and_then(|media| media.transmittance(t)) {
-            radiance = radiance.component_mul(left);
-        }
+        radiance = attenuated(media, radiance, t);
         out.groups[source.group] += source.emitted(radiance).masked(seen);
     }
     let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
     if !world.lights.environments.is_empty() && escaped.any() {
-        let left = media.and_then(|media| media.transmittance(L::from_f64(L::MAX)));
-        visible_environments(world, path, left, escaped, out);
+        visible_environments(world, path, escaped, media, out);
     }
 }
 
@@ -125,7 +122,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     pub fn emitter_lighting(&mut self, rays: &ReflectedRays<L>) {
         let (world, interaction) = (self.world, self.interaction);
         let mut glossy = L::mask(false);
-        for (index, lanes) in interaction.bsdfs(rays.lanes.and_not(interaction.shaded)) {
+        for (index, lanes) in interaction.bsdfs(rays.lanes.and_not(interaction.covered)) {
             if !world.bsdfs[index].is_delta() {
                 glossy = glossy | lanes;
             }

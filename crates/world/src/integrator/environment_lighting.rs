@@ -12,6 +12,7 @@
 use crate::integrator::direct_lighting::cosine_density;
 use crate::integrator::emitter_lighting::{ReflectedRays, power_heuristic};
 use crate::integrator::indirect_diffuse::NO_DENSITY;
+use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
 use crate::world::{EnvironmentSource, LightSource, World};
@@ -25,13 +26,12 @@ use zerkalo_scene::light::LightSample;
 const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments, weighted for multiple importance sampling, to
-/// `out`. The rays of `lanes` hit no surface. `transmittance` is that of the medium around the rays;
-/// `None` if no medium absorbs light.
+/// `out`. The rays of `lanes`, in `media`, hit no surface.
 pub(crate) fn visible_environments<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
-    transmittance: Option<Vec3<L>>,
     lanes: L::Mask,
+    media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
     let lanes = lanes & path.lobe_density.gt(L::from_f64(NO_DENSITY));
@@ -41,10 +41,8 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     for source in world.lights.environments.iter().filter(|source| source.visible) {
         let (radiance, density) = source.light.radiance(path.ray.direction, lanes);
         let weight = power_heuristic(path.lobe_density, density);
-        let mut radiance = path.throughput.component_mul(radiance) * weight;
-        if let Some(left) = transmittance {
-            radiance = radiance.component_mul(left);
-        }
+        let radiance = path.throughput.component_mul(radiance) * weight;
+        let radiance = attenuated(media, radiance, L::from_f64(L::MAX));
         out.groups[source.group] += source.emitted(radiance).masked(lanes);
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Lanes whose BSDF has a reflection lobe.
     pub reflecting: L::Mask,
     /// Lanes that get no light from lights, because a coincident surface is in front of them.
-    pub shaded: L::Mask,
+    pub covered: L::Mask,
 }
 
 impl<L: SimdFloat> SurfaceInteraction<L> {
@@ -65,11 +65,11 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Shades the hit points in `lanes`: no lights are sampled for them.
+    /// Covers the hit points in `lanes`: no lights are sampled for them.
     #[inline(always)]
-    pub fn shade(&mut self, lanes: L::Mask) {
+    pub fn cover(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
-        self.shaded = self.shaded | lanes;
+        self.covered = self.covered | lanes;
     }
 
     /// Returns the mirror image of `direction` at the geometric surface.
@@ -190,6 +190,6 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
         direct_mask: lanes_if(bsdf.has_direct),
         highlight_mask: lanes_if(bsdf.has_highlight()),
         reflecting: lanes_if(bsdf.reflection.is_some()),
-        shaded: L::mask(false),
+        covered: L::mask(false),
     }
 }

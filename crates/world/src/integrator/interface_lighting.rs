@@ -9,7 +9,7 @@
 //! solid, and at thin surfaces.
 
 use crate::integrator::emitter_lighting::power_heuristic;
-use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics};
+use crate::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics, attenuated};
 use crate::integrator::vertex::Vertex;
 use crate::world::LightSource;
 use zerkalo_kernel::bvh::Ray;
@@ -60,7 +60,7 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
                 }
             }
         }
-        let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
+        let reflecting = rough.and_not(hit.suppressed | coincident | interaction.covered);
         let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
         Self { hit, query, reflecting, transmitting }
     }
@@ -160,10 +160,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {
             let radiance = vertex.path.throughput.component_mul(value);
-            source.emitted(match side.media.transmittance(light.distance) {
-                Some(left) => radiance.component_mul(left),
-                None => radiance,
-            })
+            source.emitted(attenuated(Some(side.media), radiance, light.distance))
         });
     }
 }

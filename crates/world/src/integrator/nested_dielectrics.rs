@@ -10,10 +10,9 @@ use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::Contacts;
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::vertex::Vertex;
-use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinct};
-use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId};
+use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
 use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
 /// Largest number of solids that a medium stack holds: those listed last in the scene file.
@@ -105,25 +104,16 @@ impl<L: SimdFloat> Media<'_, L> {
     /// Returns the fraction of light that is left after `distance` [scene units] by Beer's law;
     /// `None` if no solid of the world absorbs light. `distance` may be the largest finite number.
     #[inline(always)]
-    pub fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
+    fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
         let absorption = self.nested_dielectrics.absorption.as_ref()?;
         Some(transmittance(absorption, self.stack.top(), distance))
     }
 }
 
-/// Region in which camera rays start: a sphere around the eye.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StartRegion {
-    pub eye: DVec3,
-    pub radius: f64,
-}
-
-impl StartRegion {
-    /// Returns `true` if the bounding box of an object overlaps the region, or if it has none.
-    pub fn reaches(&self, form: &Form) -> bool {
-        form.bounds()
-            .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
-    }
+/// Returns `true` if the bounding box of an object overlaps the sphere `ball`, or if it has none.
+pub(crate) fn may_reach(ball: &BoundingSphere, form: &Form) -> bool {
+    let reaches = |bounds| box_distance(bounds, ball.center) <= ball.radius;
+    form.bounds().is_none_or(reaches)
 }
 
 /// Transmissive surfaces of a scene, and the media that they bound.
@@ -173,13 +163,13 @@ impl<L: SimdFloat> InterfaceHit<L> {
 
 impl<L: SimdFloat> NestedDielectrics<L> {
     /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are those with the indices
-    /// `bsdf_of`; `None` if no BSDF transmits. Camera rays start in the region `start`.
+    /// `bsdf_of`; `None` if no BSDF transmits. Camera rays start in the sphere `start`.
     pub fn new(
         geometry: &RecenteredGeometry,
         primitives: &[PrimitiveId],
         bsdf_of: &[u32],
         bsdfs: &[Bsdf<L::Scalar>],
-        start: StartRegion,
+        start: &BoundingSphere,
     ) -> Option<Self> {
         let forms = &geometry.forms[..];
         let transmission_of = |bsdf: u32| bsdfs[bsdf as usize].transmission;
@@ -210,7 +200,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let rounding = (L::EPSILON, geometry.input_error());
         let contacts = Contacts::new(forms, primitives, (&transparent, &priority_of), rounding);
         let solid_around_eye = |(form, index): (usize, &Option<_>)| {
-            let may_contain_eye = index.is_some() && start.reaches(&forms[form]);
+            let may_contain_eye = index.is_some() && may_reach(start, &forms[form]);
             may_contain_eye
                 .then(|| (form as u32 + 1, Aggregate::with_tree(&forms[form..=form], false)))
         };
@@ -284,6 +274,19 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             medium_reflected,
             medium_transmitted,
         })
+    }
+}
+
+/// Returns what `media`, if any, let through of `radiance` along rays of the length `distance`.
+#[inline(always)]
+pub(crate) fn attenuated<L: SimdFloat>(
+    media: Option<Media<'_, L>>,
+    radiance: Vec3<L>,
+    distance: L,
+) -> Vec3<L> {
+    match media.and_then(|media| media.transmittance(distance)) {
+        Some(transmittance) => radiance.component_mul(transmittance),
+        None => radiance,
     }
 }
 

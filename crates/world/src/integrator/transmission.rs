@@ -194,7 +194,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             // The surface that the rays have left is in front of the surface that they hit, and
             // occludes all lights on the side of the rays.
             if world.shadows {
-                interaction.shade(next.lanes);
+                interaction.cover(next.lanes);
             }
             (layer, coincident_lanes) = (next.layer, next.lanes);
             offset = offset.max(next.offset.masked(coincident_lanes));
@@ -213,7 +213,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                     *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
                     if let (Some(next), true) = (behind, world.shadows) {
-                        interaction.shade(next.lanes);
+                        interaction.cover(next.lanes);
                     }
                 }
             }

@@ -3,7 +3,7 @@
 use crate::culling::tile::TileCandidates;
 use crate::integrator::emitter_lighting::{ReflectedRays, eval_lobe};
 use crate::integrator::interaction::SurfaceInteraction;
-use crate::integrator::nested_dielectrics::Media;
+use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::world::World;
 use zerkalo_kernel::bvh::Hit;
@@ -39,9 +39,7 @@ pub(crate) fn add_background<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) -> L::Mask {
-    if let Some(left) = media.and_then(|media| media.transmittance(t)) {
-        path.throughput = path.throughput.component_mul(left);
-    }
+    path.throughput = attenuated(media, path.throughput, t);
     let is_hit = t.lt(L::from_f64(L::MAX));
     if let Some(group) = world.background {
         out.groups[group] += path.throughput.masked(active.and_not(is_hit));

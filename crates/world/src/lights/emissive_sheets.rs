@@ -12,11 +12,13 @@
 
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::touching_pairs;
-use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
+use crate::lights::emissive_forms::{
+    triangles_of_mesh, triangles_of_parallelogram, triangles_of_polyhedron,
+};
 use crate::lights::emitters::CONTACT_LIFTS;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
-use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace, ParallelogramForm};
+use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace};
 
 /// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
 /// points. At this distance the surface does not count as covering them (see [`CONTACT_LIFTS`]).
@@ -201,10 +203,7 @@ fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
 /// Returns points inside of the faces of a form; none for forms that are not made of triangles.
 fn points_on(form: &Form) -> Vec<DVec3> {
     let triangles = match form {
-        Form::Parallelogram(ParallelogramForm { corner, u, v }) => {
-            let (corner, far) = (*corner, *corner + *u + *v);
-            vec![[corner, corner + *u, far], [corner, far, corner + *v]]
-        }
+        Form::Parallelogram(form) => triangles_of_parallelogram(form),
         Form::ConvexPolyhedron(form) => triangles_of_polyhedron(form),
         Form::Mesh(mesh) => {
             triangles_of_mesh(mesh, form.triangles().div_ceil(MAX_POINTS).max(1)).collect()

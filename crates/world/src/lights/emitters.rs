@@ -11,7 +11,7 @@
 //! start behind their surfaces. Shadow rays are tested against these objects a second time, up to
 //! the surface from which the point was lifted.
 
-use crate::integrator::coincident_surfaces::touching_pairs;
+use crate::integrator::coincident_surfaces::{first_primitives, touching_pairs};
 use crate::lights::emissive_forms::surface_of;
 use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
@@ -222,10 +222,7 @@ impl ObjectGeometry<'_> {
             return Vec::new();
         }
         let mut touching: HashMap<usize, Vec<TouchingObject>> = HashMap::new();
-        let mut first = vec![0; forms.len()];
-        for (primitive, source) in (0..).zip(primitives).filter(|(_, source)| source.part == 0) {
-            first[source.form] = primitive;
-        }
+        let first = first_primitives(forms, primitives);
         let is_behind = |form: usize| forms[form].is_flat() || is_entered(form);
         let wanted = |a: usize, b: usize| {
             (emits.contains(&a) && is_behind(b)) || (emits.contains(&b) && is_behind(a))

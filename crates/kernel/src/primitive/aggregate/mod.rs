@@ -205,8 +205,9 @@ impl<L: SimdFloat> Aggregate<L> {
         self.sources.is_empty()
     }
 
+    #[inline(always)]
     fn batch_index(&self, primitive: u32) -> usize {
-        self.batches.partition_point(|batch| batch.end <= primitive)
+        self.batches.iter().take_while(|batch| batch.end <= primitive).count()
     }
 
     /// Returns the closest hit of each ray with the primitives of `set`; at equal distances that of
@@ -383,13 +384,8 @@ impl<L: SimdFloat> Aggregate<L> {
     /// [`Hit::triangle`].
     #[inline(always)]
     pub fn surface(&self, primitive: u32, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
-        for batch in &self.batches {
-            if primitive < batch.end {
-                let i = (primitive - batch.base) as usize;
-                return batch.batch.surface(i, triangle, point);
-            }
-        }
-        unreachable!("every primitive belongs to a batch")
+        let batch = &self.batches[self.batch_index(primitive)];
+        batch.batch.surface((primitive - batch.base) as usize, triangle, point)
     }
 
     /// Returns the meshes, which have the highest numbers of the aggregate.
