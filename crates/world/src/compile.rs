@@ -6,7 +6,7 @@ use crate::analysis::radiance_range::SceneDistances;
 use crate::analysis::truncation_bias::truncation_bounds;
 use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use crate::culling::tile::{CullingMode, FrustumCuller, LightBounds, TileCandidates, outside_only};
+use crate::culling::tile::{CullingMode, FrustumCuller, LightBounds, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, may_reach};
 use crate::integrator::surface_textures::SurfaceTextures;
@@ -352,11 +352,25 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns a sphere around the lens if all camera rays start there. With a near plane, they start on
-/// the plane and thus possibly inside a primitive.
-fn lens_of(scene: &Scene, camera: &PerspectiveCamera) -> Option<BoundingSphere> {
+/// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths are
+/// inside of a solid only if they start there or are transmitted.
+fn outside_only<L: SimdFloat>(
+    scene: &Scene,
+    camera: &PerspectiveCamera,
+    (recentered, primitives): (&RecenteredGeometry, &[PrimitiveId]),
+    nested_dielectrics: Option<&NestedDielectrics<L>>,
+) -> Vec<bool> {
+    // All camera rays start on the lens. With a near plane, they start on the plane and thus possibly
+    // inside a primitive.
     let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
-    (scene.camera.near == 0.0).then_some(lens)
+    let may_contain_start =
+        |form: &Form| scene.camera.near > 0.0 || form.bounding_sphere().overlaps(&lens);
+    let is_outside_only = |(primitive, id): (usize, &PrimitiveId)| {
+        let form = &recentered.forms[id.form];
+        let is_entered = nested_dielectrics.is_some_and(|nested| nested.is_entered(primitive));
+        form.is_convex() && form.is_solid() && !is_entered && !may_contain_start(form)
+    };
+    primitives.iter().enumerate().map(is_outside_only).collect()
 }
 
 /// Returns the structure that finds the hits of rays with `forms`.
@@ -397,7 +411,6 @@ impl<L: SimdFloat> World<L> {
         recentered: &RecenteredGeometry,
         merge_lights: bool,
     ) -> Self {
-        let level = scene.trace.ray_types;
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
@@ -416,23 +429,19 @@ impl<L: SimdFloat> World<L> {
         let start = start_region(scene, &camera);
         let nested_dielectrics =
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
-        let entered = nested_dielectrics.as_ref().map(NestedDielectrics::entered);
-        let entered = entered.unwrap_or_else(|| vec![false; bsdf_of.len()]);
-        let forms = primitives.iter().map(|id| &recentered.forms[id.form]);
-        let outside_only = outside_only(forms, lens_of(scene, &camera), &entered);
+        let placed = (recentered, &primitives[..]);
+        let outside_only = outside_only(scene, &camera, placed, nested_dielectrics.as_ref());
         let culling =
             CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
-        let smooth =
-            geometry.is_smooth() || textures.as_ref().is_some_and(SurfaceTextures::is_bumped);
-        let colored =
-            geometry.is_colored() || textures.as_ref().is_some_and(SurfaceTextures::is_colored);
+        let smooth = geometry.is_smooth() || textures.is_bumped();
+        let colored = geometry.is_colored() || textures.is_colored();
         let has_background = scene.background.color.0 != [0.0; 3];
         let mut world = Self {
             smooth,
             colored,
             simple: !smooth && !colored && geometry.has_no_tree(),
             surface_textures: textures,
-            shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
+            shadows: scene.trace.ray_types >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },
             diffuse_limits: materials.diffuse_limits(scene),
             min_weight: scene.trace.min_throughput,

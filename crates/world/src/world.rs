@@ -82,7 +82,7 @@ pub struct World<L: SimdFloat> {
     /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
     /// lists, without BVH and bounding boxes. Kernels have a faster instance for such worlds.
     pub(super) simple: bool,
-    pub(super) surface_textures: Option<SurfaceTextures<L>>,
+    pub(super) surface_textures: SurfaceTextures<L>,
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,

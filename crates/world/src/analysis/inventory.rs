@@ -1,7 +1,6 @@
 //! Inventory: list of the features that a compiled scene contains, such as numbers of primitives
 //! and kinds of materials, for the user.
 
-use crate::integrator::surface_textures::SurfaceTextures;
 use crate::lights::groups::LightGroupSource;
 use crate::world::World;
 use zerkalo_kernel::lanes::SimdFloat;
@@ -15,8 +14,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
     let groups = &world.info.groups.members;
     let (emissive, unsampled) = world.lights.emitters.object_counts();
     let mut parts = vec![world.geometry.to_string()];
-    let textures = world.surface_textures.as_ref().map(SurfaceTextures::features);
-    parts.extend(textures.into_iter().flatten().map(String::from));
+    parts.extend(world.surface_textures.features().into_iter().map(String::from));
     parts.extend(material_features(scene, world));
     let counted = |n: usize, name: &str| match n {
         0 => None,

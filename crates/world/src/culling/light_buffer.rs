@@ -13,7 +13,7 @@ use zerkalo_scene::value::{ascending, total_order};
 
 /// Largest number of occluders in the list of a cell. If more primitives overlap the cell, those
 /// closest to the light are kept.
-const MAX_PER_CELL: usize = 16;
+const MAX_PER_CELL: u32 = 16;
 
 /// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested.
 const NO_PRIMITIVE: u32 = u32::MAX;
@@ -100,7 +100,7 @@ impl<S: Float> LightBuffer<S> {
         let ProjectedBounds { projection, rects, side } = ProjectedBounds::new(target, &balls);
         let count = projection.faces() * side * side;
         let (mut counts, mut complete_to) =
-            (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
+            (vec![0u32; count], vec![S::from_f64(f64::INFINITY); count]);
         let mut placed: Vec<(usize, Entry<S>)> = Vec::new();
         let mut overflowed = 0;
         for number in order {
@@ -125,28 +125,20 @@ impl<S: Float> LightBuffer<S> {
                 return None;
             }
         }
-        let max_coordinate = S::from_f64(max_coordinate);
+        // The sort is stable, so that the entries of a cell stay sorted by depth.
+        placed.sort_by_key(|(cell, _)| *cell);
         let mut end = 0;
-        let cell = |(count, complete_to): (&usize, &S)| {
-            let cell = Cell { first: end, end, complete_to: *complete_to };
-            end += *count as u32;
-            cell
+        let cell = |(count, complete_to): (u32, S)| {
+            end += count;
+            Cell { first: end - count, end, complete_to }
         };
-        let cells = counts.iter().zip(&complete_to).map(cell).collect();
-        let mut buffer = Self { projection, side, max_coordinate, cells, entries: Vec::new() };
-        buffer.distribute(placed);
-        Some(buffer)
-    }
-
-    /// Stores entries, each with its cell, in the order of the cells. Before, `end` of each cell
-    /// equals `first`, and the cells are as far apart as their entries need.
-    fn distribute(&mut self, placed: Vec<(usize, Entry<S>)>) {
-        let empty = Entry { number: 0, exempt_primitive: NO_PRIMITIVE, near: S::default() };
-        self.entries = vec![empty; placed.len()];
-        for (cell, entry) in placed {
-            self.entries[self.cells[cell].end as usize] = entry;
-            self.cells[cell].end += 1;
-        }
+        Some(Self {
+            projection,
+            side,
+            max_coordinate: S::from_f64(max_coordinate),
+            cells: counts.into_iter().zip(complete_to).map(cell).collect(),
+            entries: placed.into_iter().map(|(_, entry)| entry).collect(),
+        })
     }
 
     /// Returns the lanes of `active` whose ray is occluded, as [`Aggregate::occluded`] does.

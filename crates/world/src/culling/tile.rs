@@ -100,24 +100,6 @@ impl CullingMode {
     }
 }
 
-/// Returns for each of `forms` whether it is a convex solid that rays hit only from outside. Paths
-/// are inside a solid only if they start there or are transmitted, as `entered` says for each.
-/// `start` is a sphere around the origins of all camera rays; `None` if they may start anywhere.
-pub(crate) fn outside_only<'a>(
-    forms: impl Iterator<Item = &'a Form>,
-    start: Option<BoundingSphere>,
-    entered: &[bool],
-) -> Vec<bool> {
-    let is_outside = |(form, entered): (&Form, &bool)| {
-        let excludes_start = |start| !form.bounding_sphere().overlaps(start);
-        form.is_convex()
-            && !form.is_flat()
-            && !entered
-            && start.as_ref().is_some_and(excludes_start)
-    };
-    forms.zip(entered).map(is_outside).collect()
-}
-
 /// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
     bounds: Vec<BoundingVolume>,
@@ -128,7 +110,7 @@ pub(crate) struct FrustumCuller {
 }
 
 impl FrustumCuller {
-    /// Creates the culler of the primitives `forms`; see [`outside_only`].
+    /// Creates the culler of the primitives `forms`. `outside_only` is that of the world.
     pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();

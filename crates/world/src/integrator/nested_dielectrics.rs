@@ -211,9 +211,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         Some(Self { priority_of, indices, absorption, around_eye, contacts })
     }
 
-    /// Returns, for each primitive, `true` if it bounds a solid that paths can be inside of.
-    pub fn entered(&self) -> Vec<bool> {
-        self.priority_of.iter().map(|priority| *priority > 0).collect()
+    /// Returns `true` if `primitive` bounds a solid that paths can be inside of.
+    pub fn is_entered(&self, primitive: usize) -> bool {
+        self.priority_of[primitive] > 0
     }
 
     /// Adds to `media` the solids in which camera rays start: those whose boundary the ray first hits

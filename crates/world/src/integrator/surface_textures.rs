@@ -20,7 +20,7 @@ struct SurfaceTexture<S> {
 
 /// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
-    /// `None` for primitives with neither.
+    /// `None` for primitives with neither. Empty if no material has any.
     of_primitive: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
@@ -48,20 +48,19 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
 }
 
 impl<L: SimdFloat> SurfaceTextures<L> {
-    /// Compiles the textures and bump maps of `primitives`, in coordinates relative to `origin`;
-    /// `None` if no material has any.
+    /// Compiles the textures and bump maps of `primitives`, in coordinates relative to `origin`.
     pub fn new<'a>(
         scene: &Scene,
         primitives: &[PrimitiveId],
         origin: DVec3,
         material_of: impl Fn(&PrimitiveId) -> &'a Material,
-    ) -> Option<Self> {
+    ) -> Self {
         let has_texture = |m: &Material| {
             m.texture.as_ref().is_some_and(Texture::has_effect)
                 || m.bump.as_ref().is_some_and(Bump::has_effect)
         };
         if !primitives.iter().any(|id| has_texture(material_of(id))) {
-            return None;
+            return Self { of_primitive: Vec::new() };
         }
         let world_from_scene = DAffine3::from_translation(-origin);
         let input_error = f64::EPSILON * origin.abs().max_element();
@@ -99,7 +98,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
                 bump: bump.and_then(|b| Some((mapping_of(&b.placement()), BumpMap::new(b)?))),
             })
         });
-        Some(Self { of_primitive: of_primitive.collect() })
+        Self { of_primitive: of_primitive.collect() }
     }
 
     fn textures(&self) -> impl Iterator<Item = &SurfaceTexture<L::Scalar>> {
@@ -148,7 +147,7 @@ fn surface_texture<L: SimdFloat>(
     world: &World<L>,
     primitive: u32,
 ) -> Option<&SurfaceTexture<L::Scalar>> {
-    world.surface_textures.as_ref()?.of_primitive[primitive as usize].as_ref()
+    world.surface_textures.of_primitive.get(primitive as usize)?.as_ref()
 }
 
 /// Returns the factor of the albedo from vertex colour and texture; `None` if there is neither.
