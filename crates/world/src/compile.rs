@@ -111,10 +111,6 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.of_object[primitive.form][primitive.part]
     }
 
-    fn material(&self, primitive: &PrimitiveId) -> &'a Material {
-        self.materials[self.index(primitive) as usize]
-    }
-
     fn of_parts(&self, object: usize) -> Vec<&'a Material> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
@@ -357,7 +353,8 @@ impl<S: Float> CompiledCulling<S> {
 fn outside_only<L: SimdFloat>(
     scene: &Scene,
     camera: &PerspectiveCamera,
-    (recentered, primitives): (&RecenteredGeometry, &[PrimitiveId]),
+    forms: &[Form],
+    primitives: &[PrimitiveId],
     nested_dielectrics: Option<&NestedDielectrics<L>>,
 ) -> Vec<bool> {
     // All camera rays start on the lens. With a near plane, they start on the plane and thus possibly
@@ -366,23 +363,24 @@ fn outside_only<L: SimdFloat>(
     let may_contain_start =
         |form: &Form| scene.camera.near > 0.0 || form.bounding_sphere().overlaps(&lens);
     let is_outside_only = |(primitive, id): (usize, &PrimitiveId)| {
-        let form = &recentered.forms[id.form];
+        let form = &forms[id.form];
         let is_entered = nested_dielectrics.is_some_and(|nested| nested.is_entered(primitive));
         form.is_convex() && form.is_solid() && !is_entered && !may_contain_start(form)
     };
     primitives.iter().enumerate().map(is_outside_only).collect()
 }
 
-/// Returns the structure that finds the hits of rays with `forms`.
-fn structure_of(scene: &Scene, forms: &[Form]) -> AccelerationStructure {
-    match scene.trace.acceleration {
+/// Compiles `forms`, with the acceleration structure that the scene selects.
+fn aggregate<L: SimdFloat>(scene: &Scene, forms: &[Form]) -> Aggregate<L> {
+    let structure = match scene.trace.acceleration {
         Acceleration::Auto => AccelerationStructure::fastest(forms),
         Acceleration::None => AccelerationStructure::List("bare list"),
         Acceleration::ScreenBounds => AccelerationStructure::List("screen rectangles"),
         Acceleration::Obb => AccelerationStructure::Boxes { oriented: true },
         Acceleration::Aabb => AccelerationStructure::Boxes { oriented: false },
         Acceleration::Bvh => AccelerationStructure::Bvh,
-    }
+    };
+    Aggregate::with_structure(forms, structure)
 }
 
 /// Returns a sphere around the eye that contains the lens and every start point on the near plane.
@@ -405,7 +403,6 @@ impl<L: SimdFloat> World<L> {
         Self::compile(scene, &RecenteredGeometry::new(scene), false)
     }
 
-    #[inline(never)]
     pub(super) fn compile(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -416,12 +413,12 @@ impl<L: SimdFloat> World<L> {
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
         let moved = materials.move_emissive_sheets(recentered, camera.eye());
         let recentered = moved.as_ref().unwrap_or(recentered);
-        let structure = structure_of(scene, &recentered.forms);
-        let geometry = Aggregate::with_structure(&recentered.forms, structure);
+        let geometry = aggregate(scene, &recentered.forms);
         let primitives = &geometry.sources;
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
-        let material_of = |id: &PrimitiveId| materials.material(id);
-        let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
+        let textures = SurfaceTextures::new(scene, primitives, recentered.origin, |id| {
+            materials.materials[materials.index(id) as usize]
+        });
         let reflected = (materials.has_direct(), materials.has_ambient());
         let groups = LightGroups::new(scene, reflected, merge_lights);
         let (lights, scales) =
@@ -429,8 +426,8 @@ impl<L: SimdFloat> World<L> {
         let start = start_region(scene, &camera);
         let nested_dielectrics =
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
-        let placed = (recentered, &primitives[..]);
-        let outside_only = outside_only(scene, &camera, placed, nested_dielectrics.as_ref());
+        let nested = nested_dielectrics.as_ref();
+        let outside_only = outside_only(scene, &camera, &recentered.forms, primitives, nested);
         let culling =
             CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
         let smooth = geometry.is_smooth() || textures.is_bumped();

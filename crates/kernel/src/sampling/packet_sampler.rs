@@ -143,13 +143,7 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     /// Creates the sampler of a packet with samples of the pixel with the [`Sampler::key`] `key`.
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
-        PacketSampler {
-            points: self,
-            key: L::SimdU32::splat(key),
-            single_key: Some(key),
-            first_lobe: 0,
-            first_choice: 0,
-        }
+        PacketSampler { single_key: Some(key), ..self.for_pixels(L::SimdU32::splat(key)) }
     }
 
     /// Creates the sampler of a packet with samples of several pixels, with the key of each lane.

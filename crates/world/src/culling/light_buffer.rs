@@ -77,12 +77,12 @@ impl<S: Float> LightBuffer<S> {
     /// Creates the light buffer of a light. Returns `None` if at least half of `occluders` are left
     /// out of most cells that they overlap, so that too many shadow rays would traverse the BVH.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
-        let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
             LightTarget::Point(light) => *light,
             LightTarget::Direction(_) => DVec3::ZERO,
         };
-        let coordinates = occluders.iter().map(|s| farthest(&s.ball));
+        let coordinates =
+            occluders.iter().map(|s| s.ball.center.abs().max_element() + s.ball.radius);
         let max_coordinate = coordinates.fold(light.abs().max_element(), f64::max);
         // Bounding spheres relative to the light, with a margin for rounding errors of rays.
         let relative_to_light = |s: &Occluder| BoundingSphere {
@@ -96,11 +96,10 @@ impl<S: Float> LightBuffer<S> {
         };
         let near: Vec<f64> = balls.iter().map(near_depth).collect();
         let order = ascending(near.iter().copied().map(total_order).collect());
-
         let ProjectedBounds { projection, rects, side } = ProjectedBounds::new(target, &balls);
-        let count = projection.faces() * side * side;
-        let (mut counts, mut complete_to) =
-            (vec![0u32; count], vec![S::from_f64(f64::INFINITY); count]);
+        // Until all entries are placed, `end` is the number of a cell's entries.
+        let empty = Cell { first: 0, end: 0, complete_to: S::from_f64(f64::INFINITY) };
+        let mut cells = vec![empty; projection.faces() * side * side];
         let mut placed: Vec<(usize, Entry<S>)> = Vec::new();
         let mut overflowed = 0;
         for number in order {
@@ -109,14 +108,15 @@ impl<S: Float> LightBuffer<S> {
             // Number of cells that hold the occluder, minus the number of cells that are too full
             // for it.
             let mut balance = 0;
-            for cell in rects[number].iter().flat_map(|rect| rect.cells(side)) {
-                if counts[cell] < MAX_PER_CELL {
-                    counts[cell] += 1;
-                    placed.push((cell, Entry { number: number as u32, exempt_primitive, near }));
+            for index in rects[number].iter().flat_map(|rect| rect.cells(side)) {
+                let cell = &mut cells[index];
+                if cell.end < MAX_PER_CELL {
+                    placed.push((index, Entry { number: number as u32, exempt_primitive, near }));
+                    cell.end += 1;
                     balance += 1;
                 } else {
-                    complete_to[cell] =
-                        if complete_to[cell] < near { complete_to[cell] } else { near };
+                    cell.complete_to =
+                        if near < cell.complete_to { near } else { cell.complete_to };
                     balance -= 1;
                 }
             }
@@ -128,17 +128,13 @@ impl<S: Float> LightBuffer<S> {
         // The sort is stable, so that the entries of a cell stay sorted by depth.
         placed.sort_by_key(|(cell, _)| *cell);
         let mut end = 0;
-        let cell = |(count, complete_to): (u32, S)| {
-            end += count;
-            Cell { first: end - count, end, complete_to }
-        };
-        Some(Self {
-            projection,
-            side,
-            max_coordinate: S::from_f64(max_coordinate),
-            cells: counts.into_iter().zip(complete_to).map(cell).collect(),
-            entries: placed.into_iter().map(|(_, entry)| entry).collect(),
-        })
+        for cell in &mut cells {
+            (cell.first, cell.end) = (end, end + cell.end);
+            end = cell.end;
+        }
+        let entries = placed.into_iter().map(|(_, entry)| entry).collect();
+        let max_coordinate = S::from_f64(max_coordinate);
+        Some(Self { projection, side, max_coordinate, cells, entries })
     }
 
     /// Returns the lanes of `active` whose ray is occluded, as [`Aggregate::occluded`] does.

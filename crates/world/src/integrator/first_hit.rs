@@ -26,7 +26,6 @@ impl<L: SimdFloat> World<L> {
     /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
     /// same length. A point is a position in the picture: a column and a row in pixels, with
     /// fractions.
-    #[inline(never)]
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         for (points, hits) in points.chunks(L::WIDTH).zip(hits.chunks_mut(L::WIDTH)) {
             trace_packet(self, points, hits);

@@ -65,7 +65,7 @@ pub struct Aggregate<L: SimdFloat> {
     all: PrimitiveSet,
     bvh: Option<SceneBvh>,
     /// Primitives in the BVH, each as the index of its batch and its number in the batch.
-    in_bvh: Vec<(u32, u32)>,
+    in_bvh: Vec<(usize, usize)>,
     /// Bounding box of each primitive; `None` for an infinite primitive. Empty if no boxes are
     /// used.
     boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
@@ -79,7 +79,7 @@ pub struct Aggregate<L: SimdFloat> {
 pub struct PrimitiveSet {
     /// Primitives that are tested one by one: the index of a batch, and a range of primitive
     /// numbers in this batch.
-    ranges: Vec<(u32, Range<u32>)>,
+    ranges: Vec<(usize, Range<usize>)>,
     /// `true` if the subset also includes all primitives of the BVH.
     bvh: bool,
 }
@@ -129,14 +129,14 @@ impl<L: SimdFloat> Aggregate<L> {
                 (false, false) => how_listed,
             };
             out.counts.push(format!("{label} ({how})"));
-            let index = out.batches.len() as u32;
+            let index = out.batches.len();
             if in_bvh {
                 for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
                     bounds.extend(forms[source.form].bounds());
-                    out.in_bvh.push((index, i as u32));
+                    out.in_bvh.push((index, i));
                 }
             } else {
-                out.all.ranges.push((index, 0..sources.len() as u32));
+                out.all.ranges.push((index, 0..sources.len()));
             }
             let base = out.sources.len() as u32;
             out.sources.extend(&sources);
@@ -153,10 +153,10 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Returns the set of all primitives in the BVH and of the others that `wanted` accepts.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
-        let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
+        let mut ranges: Vec<(usize, Range<usize>)> = Vec::new();
         for (index, range) in &self.all.ranges {
-            let base = self.batches[*index as usize].base;
-            for i in range.clone().filter(|i| wanted(base + i)) {
+            let base = self.batches[*index].base;
+            for i in range.clone().filter(|i| wanted(base + *i as u32)) {
                 match ranges.last_mut() {
                     Some((last, run)) if last == index && run.end == i => run.end += 1,
                     _ => ranges.push((*index, i..i + 1)),
@@ -172,8 +172,8 @@ impl<L: SimdFloat> Aggregate<L> {
         let mut ranges = self.all.ranges.clone();
         for primitive in primitives {
             let index = self.batch_index(*primitive);
-            let i = primitive - self.batches[index].base;
-            ranges.push((index as u32, i..i + 1));
+            let i = (primitive - self.batches[index].base) as usize;
+            ranges.push((index, i..i + 1));
         }
         ranges.sort_unstable_by_key(|(index, range)| (*index, range.start));
         PrimitiveSet { ranges, bvh: false }
@@ -181,7 +181,7 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Returns the numbers of the primitives in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
-        let number = |(index, i): &(u32, u32)| self.batches[*index as usize].base + i;
+        let number = |(index, i): &(usize, usize)| self.batches[*index].base + *i as u32;
         self.in_bvh.iter().map(number).collect()
     }
 
@@ -237,8 +237,8 @@ impl<L: SimdFloat> Aggregate<L> {
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = no_hit(wanted);
         for (index, range) in &set.ranges {
-            let batch = &self.batches[*index as usize];
-            batch.batch.closest(indices(range), batch.base, ray, &mut hit);
+            let batch = &self.batches[*index];
+            batch.batch.closest(range.clone(), batch.base, ray, &mut hit);
         }
         hit
     }
@@ -247,11 +247,11 @@ impl<L: SimdFloat> Aggregate<L> {
     fn closest_bvh(&self, bvh: &SceneBvh, ray: &Ray<L>, mut hit: Hit<L>) -> Hit<L> {
         bvh.traverse(ray, hit.t, |primitive, limit| {
             let (index, i) = self.in_bvh[primitive];
-            let batch = &self.batches[index as usize];
+            let batch = &self.batches[index];
             // The limit is widened by rounding errors, so that `merge` sees hits at the distance of
             // the current hit, too, and keeps the primitive with the lower number.
             let mut new = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
-            batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut new);
+            batch.batch.closest(i..i + 1, batch.base, ray, &mut new);
             // Inactive lanes have a negative limit; here they become misses.
             new.t = L::select(new.t.gt(L::zero()), new.t, L::from_f64(L::MAX));
             hit.merge(&new);
@@ -265,10 +265,10 @@ impl<L: SimdFloat> Aggregate<L> {
     fn boxed<'a>(
         &'a self,
         set: &'a PrimitiveSet,
-    ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a PrimitiveBox<L::Scalar>>)> {
+    ) -> impl Iterator<Item = (&'a BatchRange<L>, usize, Option<&'a PrimitiveBox<L::Scalar>>)> {
         set.ranges.iter().flat_map(move |(index, range)| {
-            let batch = &self.batches[*index as usize];
-            range.clone().map(move |i| (batch, i, self.boxes[(batch.base + i) as usize].as_ref()))
+            let batch = &self.batches[*index];
+            range.clone().map(move |i| (batch, i, self.boxes[batch.base as usize + i].as_ref()))
         })
     }
 
@@ -276,7 +276,7 @@ impl<L: SimdFloat> Aggregate<L> {
     fn closest_boxed(&self, ray: &Ray<L>, set: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
         for (batch, i, bounds) in self.boxed(set) {
             if bounds.is_none_or(|bounds| bounds.meets(ray, hit.t).any()) {
-                batch.batch.closest(indices(&(i..i + 1)), batch.base, ray, &mut hit);
+                batch.batch.closest(i..i + 1, batch.base, ray, &mut hit);
             }
         }
         hit
@@ -295,7 +295,7 @@ impl<L: SimdFloat> Aggregate<L> {
             let open = wanted.and_not(occluded);
             let open = bounds.map_or(open, |bounds| open & bounds.meets(ray, limit));
             if open.any() {
-                let new = batch.batch.occluded(indices(&(i..i + 1)), ray, limit, open);
+                let new = batch.batch.occluded(i..i + 1, ray, limit, open);
                 occluded = occluded | (new & open);
                 if wanted.and_not(occluded).none() {
                     break;
@@ -334,8 +334,8 @@ impl<L: SimdFloat> Aggregate<L> {
         let mut occluded = L::mask(false);
         for (index, range) in &set.ranges {
             let open = wanted.and_not(occluded);
-            let batch = &self.batches[*index as usize].batch;
-            occluded = occluded | batch.occluded(indices(range), ray, limit, open);
+            let batch = &self.batches[*index].batch;
+            occluded = occluded | batch.occluded(range.clone(), ray, limit, open);
             if wanted.and_not(occluded).none() {
                 break;
             }
@@ -348,7 +348,7 @@ impl<L: SimdFloat> Aggregate<L> {
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (index, i) = self.in_bvh[number as usize];
-        self.batches[index as usize].batch.occluded(indices(&(i..i + 1)), ray, limit, wanted)
+        self.batches[index].batch.occluded(i..i + 1, ray, limit, wanted)
     }
 
     #[inline(never)]
@@ -444,10 +444,6 @@ impl<L: SimdFloat> Aggregate<L> {
 #[inline(always)]
 fn no_hit<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
-}
-
-fn indices(range: &Range<u32>) -> Range<usize> {
-    range.start as usize..range.end as usize
 }
 
 impl<L: SimdFloat> fmt::Display for Aggregate<L> {
