@@ -7,6 +7,7 @@ use crate::primitive::canonical::{
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use crate::primitive::csg::{SolidPrimitive, Span};
+use crate::primitive::plane::Plane;
 use glam::{DAffine3, DVec3};
 
 /// Bounded intersection of half-spaces, with its corners.
@@ -67,19 +68,14 @@ struct Slab<S> {
     high: S,
 }
 
-/// Single face: the points p with normal . (p - center) <= high.
-struct Face<S> {
-    normal: [S; 3],
-    high: S,
-}
-
 /// Convex polyhedron compiled for ray intersection: bounding sphere, slabs, single faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     slabs: Vec<Slab<S>>,
-    faces: Vec<Face<S>>,
+    /// Single faces, relative to `center`.
+    faces: Vec<Plane<S>>,
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
@@ -112,7 +108,7 @@ impl<S: Float> ConvexPolyhedron<S> {
                     let low = -(faces[j].offset - faces[j].normal.dot(center));
                     out.slabs.push(Slab { normal, low: S::from_f64(low), high: S::from_f64(high) });
                 }
-                None => out.faces.push(Face { normal, high: S::from_f64(high) }),
+                None => out.faces.push(Plane { normal, offset: S::from_f64(high) }),
             }
         }
         out
@@ -151,7 +147,7 @@ impl<S: Float> ConvexPolyhedron<S> {
         for face in &self.faces {
             let normal = Vec3::splat(face.normal);
             let speed = steep(ray.direction.dot(normal));
-            let t = (L::splat(face.high) - from_center.dot(normal)) / speed;
+            let t = (L::splat(face.offset) - from_center.dot(normal)) / speed;
             let entering = speed.lt(L::zero());
             enter = L::select(entering, t.max(enter), enter);
             leave = L::select(entering, leave, t.min(leave));
@@ -186,7 +182,7 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConvexPolyhedron<L::Scalar> {
         }
         for face in &self.faces {
             let n = Vec3::splat(face.normal);
-            let distance = from_center.dot(n) - L::splat(face.high);
+            let distance = from_center.dot(n) - L::splat(face.offset);
             let nearer = distance.gt(outside);
             outside = L::select(nearer, distance, outside);
             normal = Vec3::select(nearer, n, normal);
@@ -226,7 +222,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
             face(-normal, -L::splat(slab.low));
         }
         for half_space in &self.faces {
-            face(Vec3::splat(half_space.normal), L::splat(half_space.high));
+            face(Vec3::splat(half_space.normal), L::splat(half_space.offset));
         }
         let (enter_cosine, leave_cosine) = cosines;
         Some(Span { enter, leave, enter_cosine, leave_cosine, meets })

@@ -58,8 +58,8 @@ impl CanonicalShape for PlaneForm {
 /// Infinite plane compiled for ray intersection.
 #[derive(Clone, Copy)]
 pub struct Plane<S> {
-    normal: [S; 3],
-    offset: S,
+    pub normal: [S; 3],
+    pub offset: S,
 }
 
 impl<S: Float> Plane<S> {

@@ -11,7 +11,7 @@ use zerkalo_kernel::sampling::warp;
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
 /// Family of distributions of microfacet normals.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FacetNormals {
     /// Beckmann distribution.
     Beckmann,

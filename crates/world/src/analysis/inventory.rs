@@ -5,7 +5,7 @@ use crate::lights::groups::LightGroupSource;
 use crate::world::World;
 use zerkalo_kernel::lanes::SimdFloat;
 use zerkalo_scene::light::KIND_KEYS;
-use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel, Transmission};
+use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel};
 use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 
 /// Returns the list of the features of `world`, which was compiled from `scene`: separated by
@@ -22,13 +22,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         n => Some(format!("{n} {name}s")),
     };
     let light_count = |kind: &str| {
-        let is_kind = |source: &&LightGroupSource| match source {
-            LightGroupSource::Light(i) => scene.lights[*i].kind.key() == kind,
-            LightGroupSource::Ambient
-            | LightGroupSource::Background
-            | LightGroupSource::Material(_)
-            | LightGroupSource::Shared(_) => false,
-        };
+        let is_kind = |source: &&LightGroupSource| matches!(source, LightGroupSource::Light(i) if scene.lights[*i].kind.key() == kind);
         groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
     };
     for kind in KIND_KEYS {
@@ -66,40 +60,29 @@ fn material_features<L: SimdFloat>(
     scene: &Scene,
     world: &World<L>,
 ) -> impl Iterator<Item = String> {
-    let bsdfs = &world.bsdfs;
-    let any_specular =
-        |test: fn(&SpecularModel<L::Scalar>) -> bool| bsdfs.iter().any(|bsdf| test(&bsdf.specular));
+    let any = |test: &dyn Fn(&Bsdf<L::Scalar>) -> bool| world.bsdfs.iter().any(test);
     let any_lobe = |test: fn(&ReflectionLobe<L::Scalar>) -> bool| {
-        bsdfs.iter().any(|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
-    };
-    let any_transmission = |dielectric: bool| {
-        let is_kind = |t: &Transmission<L::Scalar>| t.dielectric == dielectric;
-        bsdfs.iter().any(|bsdf| bsdf.transmission.as_ref().is_some_and(is_kind))
-    };
-    let any_facets = |test: fn(&FacetNormals) -> bool| {
-        let is_kind = |bsdf: &&Bsdf<_>| bsdf.reflection.is_some();
-        bsdfs.iter().filter(is_kind).any(|bsdf| match &bsdf.lobe {
-            ReflectionLobe::Microfacet(facets) => test(&facets.normals),
-            ReflectionLobe::Mirror
-            | ReflectionLobe::Cone { .. }
-            | ReflectionLobe::Square { .. } => false,
-        })
+        any(&|bsdf| bsdf.reflection.is_some() && test(&bsdf.lobe))
     };
     let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
     present([
-        (any_specular(|s| matches!(s, SpecularModel::Phong { .. })), "Phong"),
-        (any_specular(|s| matches!(s, SpecularModel::Microfacet { .. })), "Cook-Torrance"),
+        (any(&|b| matches!(b.specular, SpecularModel::Phong { .. })), "Phong"),
+        (any(&|b| matches!(b.specular, SpecularModel::Microfacet { .. })), "Cook-Torrance"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Mirror)), "perfect mirror"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Cone { .. })), "cone lobe"),
         (any_lobe(|lobe| matches!(lobe, ReflectionLobe::Square { .. })), "square lobe"),
-        (any_facets(|normals| matches!(normals, FacetNormals::Beckmann)), "Beckmann lobe"),
-        (any_facets(|normals| matches!(normals, FacetNormals::Ggx)), "GGX lobe"),
-        (any_transmission(false), "transmission"),
-        (any_transmission(true), "dielectric"),
-        (bsdfs.iter().any(|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
-        (bsdfs.iter().any(Bsdf::absorbs), "absorption"),
+        (any_lobe(|lobe| has_facets(lobe, FacetNormals::Beckmann)), "Beckmann lobe"),
+        (any_lobe(|lobe| has_facets(lobe, FacetNormals::Ggx)), "GGX lobe"),
+        (any(&|b| b.transmission.as_ref().is_some_and(|t| !t.dielectric)), "transmission"),
+        (any(&|b| b.transmission.as_ref().is_some_and(|t| t.dielectric)), "dielectric"),
+        (any(&|b| b.transmission.is_some() && !b.is_delta()), "rough transmission"),
+        (any(&Bsdf::absorbs), "absorption"),
         (absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)), "absorbing horizon"),
     ])
+}
+
+fn has_facets<S>(lobe: &ReflectionLobe<S>, normals: FacetNormals) -> bool {
+    matches!(lobe, ReflectionLobe::Microfacet(facets) if facets.normals == normals)
 }
 
 /// Returns the names in `features` whose flag is `true`: the features that are present.
