@@ -6,7 +6,7 @@
 //! - tori in compounds
 
 use crate::harness::*;
-use zerkalo_kernel::primitive::{BoundingVolume, TorusForm};
+use zerkalo_kernel::primitive::TorusForm;
 
 /// Ratios of the tube's radius to the ring's radius.
 const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];

@@ -23,7 +23,7 @@ use zerkalo_kernel::primitive::{
     AccelerationStructure, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
 use zerkalo_scene::camera::PerspectiveCamera;
-use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface, Light};
+use zerkalo_scene::light::{CompiledLight, DeltaLight, EmissiveSurface};
 use zerkalo_scene::material::{Bsdf, Material};
 use zerkalo_scene::{Acceleration, BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 
@@ -201,18 +201,6 @@ fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface
     lifts.fold(lift.min(max_lift), f64::max)
 }
 
-fn shadow_ray_target<S: Float>(
-    geometry: &RecenteredGeometry,
-    light: &Light,
-    delta: DeltaLight<S>,
-) -> ShadowRayTarget<S> {
-    let on_surface = light.apex().and_then(|position| {
-        let position = position - geometry.origin;
-        OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
-    });
-    ShadowRayTarget { light: delta, on_surface }
-}
-
 /// Lights and emissive objects of a scene.
 pub(super) struct CompiledLights<S> {
     /// Lights without a size to which all paths trace shadow rays.
@@ -246,13 +234,21 @@ impl<S: Float> CompiledLights<S> {
             let lift = |surface: &EmissiveSurface| light_lift::<S>(geometry, surface);
             let Some(compiled) = light.compile(geometry.origin, lift) else { continue };
             ranges.insert(index, distances.light(&compiled, light.visible));
-            let source = source.with_light((), light.visible);
             match compiled {
                 CompiledLight::Delta(delta) => {
-                    delta_lights.push(source.with_light(shadow_ray_target(geometry, light, delta)));
+                    let on_surface = light.apex().and_then(|position| {
+                        let position = position - geometry.origin;
+                        OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
+                    });
+                    let target = ShadowRayTarget { light: delta, on_surface };
+                    delta_lights.push(source.with_light(target, light.visible));
                 }
-                CompiledLight::Emitter(emitter) => emitters.push(source.with_light(Some(emitter))),
-                CompiledLight::Environment(sky) => environments.push(source.with_light(sky)),
+                CompiledLight::Emitter(emitter) => {
+                    emitters.push(source.with_light(Some(emitter), light.visible));
+                }
+                CompiledLight::Environment(sky) => {
+                    environments.push(source.with_light(sky, light.visible));
+                }
             }
         }
         let scales = groups.scales::<S>(scene, &ranges, &distances);

@@ -7,6 +7,9 @@ use glam::{DAffine3, DMat3, DVec3};
 /// Axis-parallel box: its lowest and its highest corner.
 pub type Bounds = (DVec3, DVec3);
 
+/// Box without finite bounds.
+pub const UNBOUNDED: Bounds = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+
 /// Half-space: the points p with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
@@ -77,7 +80,7 @@ pub struct Proxy {
 impl Proxy {
     /// Creates a proxy. `bounds` is `None` for an object without finite bounds.
     pub fn new(faces: Vec<ProxyFace>, bounds: Option<Bounds>) -> Self {
-        let (low, high) = bounds.unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
+        let (low, high) = bounds.unwrap_or(UNBOUNDED);
         Self { faces, low, high }
     }
 
@@ -211,6 +214,36 @@ pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     let length2 = along.length_squared();
     let t = if length2 > 0.0 { ((point - a).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
     point.distance(a + along * t)
+}
+
+/// Returns the unit normal of the triangle `[a, b, c]` if the triangle is within the distance
+/// `slack` of `point`; otherwise `None`.
+pub fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    if normal.dot(point - a).abs() > slack {
+        return None;
+    }
+    // The point is inside, or beyond an edge by at most the slack.
+    let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
+        let inward = normal.cross(to - from);
+        inward.dot(point - from) >= -slack * inward.length()
+    });
+    inside.then_some(normal)
+}
+
+/// Returns the distance between `point` and the triangle `[a, b, c]`.
+pub fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
+    let (u, v, to) = (b - a, c - a, point - a);
+    let normal = u.cross(v);
+    let size2 = normal.length_squared();
+    let (s, t) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
+    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+        return normal.dot(to).abs() / size2.sqrt();
+    }
+    [[a, b], [b, c], [c, a]]
+        .map(|edge| segment_distance(edge, point))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the rows of a matrix.

@@ -26,7 +26,7 @@ pub use aggregate::{
 };
 pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
 pub use canonical::{
-    Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace, box_distance,
+    Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace, UNBOUNDED, box_distance,
 };
 pub use compiled::{SurfacePoint, TexCoord};
 pub use conical_frustum::{AROUND_TIP, ConicalFrustumForm};

@@ -4,7 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, HalfSpace, Projection, Proxy, ProxyFace, bounds_of_points,
-    segment_distance,
+    normal_of_triangle, triangle_distance,
 };
 use crate::primitive::compiled::{AnalyticPrimitive, SurfacePoint};
 use glam::{DAffine3, DVec3};
@@ -22,6 +22,13 @@ pub struct ParallelogramForm {
 }
 
 impl ParallelogramForm {
+    /// Returns two triangles that form the parallelogram, counter-clockwise as seen from its front.
+    pub fn halves(&self) -> [[DVec3; 3]; 2] {
+        let Self { corner, u, v } = *self;
+        let far = corner + u + v;
+        [[corner, corner + u, far], [corner, far, corner + v]]
+    }
+
     pub(super) fn transformed(self, map: &DAffine3) -> Self {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
@@ -46,30 +53,13 @@ impl CanonicalShape for ParallelogramForm {
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        let Self { corner, u, v } = *self;
-        let (normal, to) = (u.cross(v), point - corner);
-        let size2 = normal.length_squared();
-        let (a, b) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
-        if (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b) {
-            return Some(normal.dot(to).abs() / size2.sqrt());
-        }
-        let corners = [corner, corner + u, corner + u + v, corner + v];
-        (0..4).map(|i| segment_distance([corners[i], corners[(i + 1) % 4]], point)).reduce(f64::min)
+        self.halves().into_iter().map(|corners| triangle_distance(corners, point)).reduce(f64::min)
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
-        let normal = self.u.cross(self.v).normalize();
-        let from_corner = point - self.corner;
-        // Signed distances of the point and of the opposite edge from the line through `edge`.
-        let is_between = |edge: DVec3, other: DVec3| {
-            let across = edge.cross(normal).normalize();
-            let (distance, width) = (across.dot(from_corner), across.dot(other));
-            distance * width.signum() >= -slack && distance.abs() <= width.abs() + slack
-        };
-        let on = normal.dot(from_corner).abs() <= slack
-            && is_between(self.u, self.v)
-            && is_between(self.v, self.u);
-        if on { vec![vec![normal]] } else { Vec::new() }
+        let mut halves = self.halves().into_iter();
+        let normal = halves.find_map(|corners| normal_of_triangle(corners, point, slack));
+        normal.map(|normal| vec![normal]).into_iter().collect()
     }
 
     fn default_mapping(&self) -> Projection {

@@ -15,11 +15,12 @@
 //! primitive that may touch another one. Contacts are found at compilation, so that hits on other
 //! primitives cost no lookup.
 
+use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, distinct};
-use zerkalo_kernel::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
+use zerkalo_kernel::primitive::{Aggregate, Bounds, Form, PrimitiveId, SphereForm, UNBOUNDED};
 use zerkalo_scene::value::{ascending, total_order};
 
 /// *Tie distance*: the largest distance along the normal at which a surface counts as coincident
@@ -129,6 +130,12 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
+    /// Returns the state of rays that pass the surfaces at the hit points of `lanes`.
+    pub fn behind(interaction: &SurfaceInteraction<L>, lanes: L::Mask, layer: L) -> Self {
+        let SurfaceInteraction { primitive, point, geometric, .. } = *interaction;
+        Self { lanes, primitive, point, axis: -geometric, layer }
+    }
+
     /// Returns the state of rays that start at the same points but run in the opposite directions.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
@@ -320,15 +327,14 @@ impl<S: Float> Contacts<S> {
 
 /// Returns the lowest and the highest corner of an object's bounding box, with infinite coordinates
 /// if the object is unbounded. Planes perpendicular to an axis are bounded along that axis.
-fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
-    let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
+fn unbounded_box(form: &Form) -> Bounds {
     form.bounds().unwrap_or_else(|| {
-        let Some(plane) = form.plane() else { return (low, high) };
+        let Some(plane) = form.plane() else { return UNBOUNDED };
         let is_normal = |axis: &&DVec3| plane.normal.dot(**axis).abs() == 1.0;
-        DVec3::AXES.iter().find(is_normal).map_or((low, high), |axis| {
-            let (bounded, point) = (axis.cmpne(DVec3::ZERO), plane.normal * plane.offset);
-            (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
-        })
+        let Some(axis) = DVec3::AXES.iter().find(is_normal) else { return UNBOUNDED };
+        let point = plane.normal * plane.offset;
+        let bounded = |infinite| DVec3::select(axis.cmpne(DVec3::ZERO), point, infinite);
+        (bounded(UNBOUNDED.0), bounded(UNBOUNDED.1))
     })
 }
 
@@ -346,11 +352,9 @@ pub(crate) fn first_primitives(forms: &[Form], primitives: &[PrimitiveId]) -> Ve
 /// comes first, and the pairs are sorted.
 pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
-    let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
-    let slack = 1e-5;
     let padded_box = |form: &Form| {
-        form.bounds().map_or(infinite, |(low, high)| {
-            let margin = slack * low.abs().max(high.abs()).max_element();
+        form.bounds().map_or(UNBOUNDED, |(low, high)| {
+            let margin = 1e-5 * low.abs().max(high.abs()).max_element();
             (low - margin, high + margin)
         })
     };

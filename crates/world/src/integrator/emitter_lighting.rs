@@ -121,12 +121,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     #[inline(never)]
     pub fn emitter_lighting(&mut self, rays: &ReflectedRays<L>) {
         let (world, interaction) = (self.world, self.interaction);
-        let mut glossy = L::mask(false);
-        for (index, lanes) in interaction.bsdfs(rays.lanes.and_not(interaction.covered)) {
-            if !world.bsdfs[index].is_delta() {
-                glossy = glossy | lanes;
-            }
-        }
+        let glossy = self.not_delta(rays.lanes.and_not(interaction.covered));
         if (interaction.direct_mask | glossy).none() {
             return;
         }
@@ -154,6 +149,15 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 source.emitted(vertex.unoccluded(value, light))
             });
         }
+    }
+
+    /// Returns those of `lanes` whose BSDF scatters light in more than single directions.
+    #[inline(always)]
+    pub fn not_delta(&self, lanes: L::Mask) -> L::Mask {
+        let bsdfs = self.interaction.bsdfs(lanes);
+        bsdfs.fold(L::mask(false), |found, (index, lanes)| {
+            if self.world.bsdfs[index].is_delta() { found } else { found | lanes }
+        })
     }
 
     /// Returns the BSDF \[1/sr\] times the cosine of the angle of incidence, weighted for multiple

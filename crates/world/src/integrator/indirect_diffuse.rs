@@ -105,23 +105,13 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         self.normal = Vec3::select(taken, interaction.normal, self.normal);
         self.geometric = Vec3::select(taken, interaction.geometric, self.geometric);
         self.media = MediumStack::select(taken, media, &self.media);
-        self.coincident = match (self.coincident.take(), coincident) {
-            (None, None) => None,
-            (old, new) => {
-                let idle = |state: &CoincidentState<L>| CoincidentState {
-                    lanes: L::mask(false),
-                    ..*state
-                };
-                let (new, old) = match (new, old) {
-                    (Some(new), Some(old)) => (*new, old),
-                    (Some(new), None) => (*new, idle(new)),
-                    (None, Some(old)) => (idle(&old), old),
-                    (None, None) => return lanes,
-                };
-                let lanes = (taken & new.lanes) | old.lanes.and_not(taken);
-                Some(CoincidentState { lanes, ..CoincidentState::select(taken, &new, &old) })
-            }
-        };
+        let idle = |state| CoincidentState { lanes: L::mask(false), ..state };
+        let new = coincident.copied().or(self.coincident.map(idle));
+        let old = self.coincident.or(coincident.copied().map(idle));
+        self.coincident = new.zip(old).map(|(new, old)| {
+            let lanes = (taken & new.lanes) | old.lanes.and_not(taken);
+            CoincidentState { lanes, ..CoincidentState::select(taken, &new, &old) }
+        });
         lanes
     }
 

@@ -50,16 +50,10 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         coincident: L::Mask,
     ) -> Self {
         let (world, interaction) = (vertex.world, vertex.interaction);
-        let mut rough = L::mask(false);
         // If shadows are off, emitters also light points that cannot see them. Reflected rays do
         // not find this light, so the two strategies cannot be combined.
-        if world.lights.has_emitters() && world.shadows {
-            for (index, lanes) in interaction.bsdfs(hit.lanes) {
-                if !world.bsdfs[index].is_delta() {
-                    rough = rough | lanes;
-                }
-            }
-        }
+        let combined = L::mask(world.lights.has_emitters() && world.shadows);
+        let rough = vertex.not_delta(hit.lanes & combined);
         let reflecting = rough.and_not(hit.suppressed | coincident | interaction.covered);
         let transmitting = reflecting & (hit.media.thin | !hit.media.outer);
         Self { hit, query, reflecting, transmitting }

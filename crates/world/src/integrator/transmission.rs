@@ -200,10 +200,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(next.offset.masked(coincident_lanes));
         }
         if contact_lanes.any() {
-            let (primitive, point, axis) =
-                (interaction.primitive, interaction.point, -interaction.geometric);
-            let coincident =
-                CoincidentState { lanes: contact_lanes, primitive, point, axis, layer: L::zero() };
+            let coincident = CoincidentState::behind(interaction, contact_lanes, L::zero());
             let leaves = !interaction.front;
             let first = contacts.first(&world.geometry, &coincident, leaves, &branch.media);
             if first.lanes.any() {
@@ -222,13 +219,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             offset = offset.max(first.offset.masked(first.touching));
         }
         interaction.offset = L::select(coincident_lanes, offset, interaction.offset);
-        let coincident = CoincidentState {
-            lanes: coincident_lanes,
-            primitive: interaction.primitive,
-            point: interaction.point,
-            axis: -interaction.geometric,
-            layer,
-        };
+        let coincident = CoincidentState::behind(interaction, coincident_lanes, layer);
         coincident_lanes.any().then_some(coincident)
     }
 

@@ -42,7 +42,7 @@ fn surface_of_parallelogram(form: &ParallelogramForm) -> EmissiveSurface {
     let size = [u.length(), v.length()];
     let far = corner + u + v;
     if u.dot(v).abs() > 1e-12 * size[0] * size[1] {
-        return EmissiveSurface::Triangles(triangles_of_parallelogram(form));
+        return EmissiveSurface::Triangles(form.halves().to_vec());
     }
     let (right, up) = (u / size[0], v / size[1]);
     EmissiveSurface::Rectangle {
@@ -50,12 +50,6 @@ fn surface_of_parallelogram(form: &ParallelogramForm) -> EmissiveSurface {
         axes: [right, up, right.cross(up)],
         size,
     }
-}
-
-pub(crate) fn triangles_of_parallelogram(form: &ParallelogramForm) -> Vec<[DVec3; 3]> {
-    let ParallelogramForm { corner, u, v } = *form;
-    let far = corner + u + v;
-    vec![[corner, corner + u, far], [corner, far, corner + v]]
 }
 
 /// Returns the faces of a polyhedron as triangles, counter-clockwise as seen from outside.

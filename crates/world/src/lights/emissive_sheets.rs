@@ -12,9 +12,7 @@
 
 use crate::compile::RecenteredGeometry;
 use crate::integrator::coincident_surfaces::touching_pairs;
-use crate::lights::emissive_forms::{
-    triangles_of_mesh, triangles_of_parallelogram, triangles_of_polyhedron,
-};
+use crate::lights::emissive_forms::{triangles_of_mesh, triangles_of_polyhedron};
 use crate::lights::emitters::CONTACT_LIFTS;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
@@ -203,7 +201,7 @@ fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
 /// Returns points inside of the faces of a form; none for forms that are not made of triangles.
 fn points_on(form: &Form) -> Vec<DVec3> {
     let triangles = match form {
-        Form::Parallelogram(form) => triangles_of_parallelogram(form),
+        Form::Parallelogram(form) => form.halves().to_vec(),
         Form::ConvexPolyhedron(form) => triangles_of_polyhedron(form),
         Form::Mesh(mesh) => {
             triangles_of_mesh(mesh, form.triangles().div_ceil(MAX_POINTS).max(1)).collect()

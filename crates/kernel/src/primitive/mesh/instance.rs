@@ -6,7 +6,8 @@ use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
 use crate::primitive::aggregate::primitive_box::PrimitiveBox;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, Projection, Proxy, box_distance, frobenius_norm, rows, segment_distance,
+    Bounds, CanonicalShape, Projection, Proxy, box_distance, frobenius_norm, normal_of_triangle,
+    rows, triangle_distance,
 };
 use crate::primitive::compiled::{Primitive, SurfacePoint, TexCoord};
 use crate::primitive::keep_visible;
@@ -104,35 +105,6 @@ impl CanonicalShape for MeshForm {
     fn triangles(&self) -> usize {
         self.mesh.mesh.triangles.len()
     }
-}
-
-/// Returns the unit normal of the triangle `[a, b, c]` if the triangle is within the distance
-/// `slack` of `point`; otherwise `None`.
-fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
-    let normal = (b - a).cross(c - a).try_normalize()?;
-    if normal.dot(point - a).abs() > slack {
-        return None;
-    }
-    // The point is inside, or beyond an edge by at most the slack.
-    let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
-        let inward = normal.cross(to - from);
-        inward.dot(point - from) >= -slack * inward.length()
-    });
-    inside.then_some(normal)
-}
-
-fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
-    let (u, v, to) = (b - a, c - a, point - a);
-    let normal = u.cross(v);
-    let size2 = normal.length_squared();
-    let (s, t) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
-    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-        return normal.dot(to).abs() / size2.sqrt();
-    }
-    [[a, b], [b, c], [c, a]]
-        .map(|edge| segment_distance(edge, point))
-        .into_iter()
-        .fold(f64::INFINITY, f64::min)
 }
 
 /// Returns the distance between `point` and the closest triangle of the mesh, in scene units.
