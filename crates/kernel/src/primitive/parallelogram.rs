@@ -53,7 +53,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
-        self.halves().into_iter().map(|corners| triangle_distance(corners, point)).reduce(f64::min)
+        let [a, b] = self.halves().map(|corners| triangle_distance(corners, point));
+        Some(a.min(b))
     }
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
