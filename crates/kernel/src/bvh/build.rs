@@ -23,16 +23,9 @@ pub struct Bvh8Node {
     pub child: [u32; BVH_WIDTH],
 }
 
-const EMPTY_NODE: Bvh8Node = Bvh8Node {
-    bounds: [
-        [f32::INFINITY; BVH_WIDTH],
-        [f32::INFINITY; BVH_WIDTH],
-        [f32::INFINITY; BVH_WIDTH],
-        [f32::NEG_INFINITY; BVH_WIDTH],
-        [f32::NEG_INFINITY; BVH_WIDTH],
-        [f32::NEG_INFINITY; BVH_WIDTH],
-    ],
-    child: [LEAF_FLAG; BVH_WIDTH],
+const EMPTY_NODE: Bvh8Node = {
+    let (low, high) = ([f32::INFINITY; BVH_WIDTH], [f32::NEG_INFINITY; BVH_WIDTH]);
+    Bvh8Node { bounds: [low, low, low, high, high, high], child: [LEAF_FLAG; BVH_WIDTH] }
 };
 
 impl Bvh8Node {

@@ -57,15 +57,10 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the largest distance by which rounding displaces the origin of a ray of the frustum.
-    fn origin_error(&self) -> f64 {
-        ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
-    }
-
     /// Returns `ball`, enlarged by the displacement of rays by the lens and by rounding errors.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
-        let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
+        let radius = grown(ball).radius;
         let blur = self.blur(depth - radius, depth + radius);
         BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
     }
@@ -79,7 +74,7 @@ impl Frustum {
         let axis = corners.iter().sum::<DVec3>().normalize();
         let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
         let to = ball.center - *apex;
-        let reach = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center) + ray_error(*apex);
+        let reach = grown(ball).radius + ray_error(*apex);
         if cos > 0.0 {
             let (along, across) = along_and_across(to, axis);
             let sin = (1.0 - cos * cos).sqrt();
@@ -153,7 +148,8 @@ impl BoundingVolume {
         if ball.radius.is_finite() && !frustum.meets(&ball) {
             return None;
         }
-        let room = frustum.origin_error() + ray_error(ball.center);
+        let lens_error = F32_RAY_ERROR * frustum.lens_radius;
+        let room = ray_error(*apex) + lens_error + ray_error(ball.center);
         // Depths along `forward` between which the object lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
@@ -166,8 +162,8 @@ impl BoundingVolume {
             let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
-            let slack = self.ray_error(*apex) + F32_RAY_ERROR * frustum.lens_radius + tilt;
-            let slope_error = (tilt + F32_RAY_ERROR * frustum.lens_radius) / frustum.focus;
+            let slack = self.ray_error(*apex) + lens_error + tilt;
+            let slope_error = (tilt + lens_error) / frustum.focus;
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
                 // The apex may be on either side of the plane.

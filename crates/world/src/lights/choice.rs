@@ -128,8 +128,9 @@ impl<S: Float> LightChoice<S> {
         *sources = others;
         let low = chosen.iter().map(place).reduce(DVec3::min)?;
         let high = chosen.iter().map(place).reduce(DVec3::max)?;
-        sort_by_number(&mut chosen, |source| morton(place(source), low, high) as i64);
-
+        let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
+        let morton = |source: &_| morton_code(((place(source) - low) / extent).to_array());
+        sort_by_number(&mut chosen, |source| morton(source) as i64);
         let group = chosen[0].group;
         assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");
         let strata = chosen.chunks(sets).map(|lights| Stratum::new(lights, sets)).collect();
@@ -198,7 +199,7 @@ impl<S: Float> Stratum<S> {
             light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
         };
         Self {
-            ball: ball(lights.iter().map(place)),
+            ball: BoundingSphere::around(&lights.iter().map(place).collect::<Vec<_>>()),
             positions: [0, 1, 2].map(|axis| table(f64::NAN, &|light| coordinate(light, axis))),
             constant: table(0.0, &constant),
             emission: [0, 1, 2].map(|channel| table(1.0, &|light| emission(light, channel))),
@@ -373,22 +374,6 @@ fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {
 fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
     let first = items.next()?;
     items.all(|item| item == first).then_some(first)
-}
-
-/// Returns a sphere around `points`, centred on their bounding box.
-fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
-    let low = points.clone().reduce(DVec3::min).unwrap_or_default();
-    let high = points.clone().reduce(DVec3::max).unwrap_or_default();
-    let center = 0.5 * (low + high);
-    let radius = points.map(|point| point.distance(center)).fold(0.0, f64::max);
-    // The radius has a margin for rounding errors.
-    BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
-}
-
-/// Returns the position of `point` on a Morton curve through the box.
-fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
-    let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
-    morton_code(((point - low) / extent).to_array())
 }
 
 #[cfg(test)]
