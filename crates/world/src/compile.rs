@@ -4,9 +4,8 @@
 use crate::analysis::inventory::inventory;
 use crate::analysis::radiance_range::SceneDistances;
 use crate::analysis::truncation_bias::truncation_bounds;
-use crate::culling::light_buffer::LightBuffer;
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use crate::culling::tile::{CullingMode, FrustumCuller, LightBounds, TileCandidates};
+use crate::culling::tile::{Culling, CullingMode, FrustumCuller, LightBounds, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::{NestedDielectrics, may_reach};
 use crate::integrator::surface_textures::SurfaceTextures;
@@ -292,56 +291,44 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// What rays are tested against.
-pub(super) struct CompiledCulling<S> {
-    pub mode: CullingMode,
-    /// Candidates for rays that belong to no tile.
-    pub all_candidates: TileCandidates,
-    /// Light buffer of each light without a size; shadow rays to a light without one traverse the
-    /// BVH.
-    pub light_buffers: Vec<Option<LightBuffer<S>>>,
-}
-
-impl<S: Float> CompiledCulling<S> {
-    fn new<L: SimdFloat<Scalar = S>>(
-        scene: &Scene,
-        recentered: &RecenteredGeometry,
-        geometry: &Aggregate<L>,
-        camera: &PerspectiveCamera,
-        lights: &CompiledLights<S>,
-        outside_only: &[bool],
-    ) -> Self {
-        let lights = lights.bounds();
-        let mut all_candidates = TileCandidates::all(geometry, &lights);
-        let mut light_buffers = Vec::new();
-        let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
-        let forms = || geometry.sources.iter().map(form_of);
-        let mode = match scene.trace.acceleration {
-            Acceleration::Auto => {
-                let culler = FrustumCuller::new(forms().collect(), outside_only, lights);
-                all_candidates = culler.candidates(geometry, None);
-                if geometry.has_tree() {
-                    if scene.trace.ray_types >= RayTypes::Shadows {
-                        light_buffers = culler.light_buffers(geometry);
-                    }
-                    let project = |primitive: u32| {
-                        let form = form_of(&geometry.sources[primitive as usize]);
-                        (primitive, ScreenBounds::project(form, camera))
-                    };
-                    let bounds = geometry.in_tree().into_iter().map(project);
-                    let size = scene.film.size.map(|n| n as usize);
-                    CullingMode::ScreenGrid(ScreenGrid::new(size, bounds))
-                } else {
-                    CullingMode::Frusta(culler)
+/// Compiles the method that finds the candidates of rays.
+fn culling<L: SimdFloat>(
+    scene: &Scene,
+    recentered: &RecenteredGeometry,
+    geometry: &Aggregate<L>,
+    camera: &PerspectiveCamera,
+    lights: LightBounds,
+    outside_only: &[bool],
+) -> Culling<L::Scalar> {
+    let mut all_candidates = TileCandidates::all(geometry, &lights);
+    let mut light_buffers = Vec::new();
+    let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
+    let forms = || geometry.sources.iter().map(form_of);
+    let mode = match scene.trace.acceleration {
+        Acceleration::Auto => {
+            let culler = FrustumCuller::new(forms().collect(), outside_only, lights);
+            all_candidates = culler.candidates(geometry, None);
+            if geometry.has_tree() {
+                if scene.trace.ray_types >= RayTypes::Shadows {
+                    light_buffers = culler.light_buffers(geometry);
                 }
+                let project = |primitive: u32| {
+                    let form = form_of(&geometry.sources[primitive as usize]);
+                    (primitive, ScreenBounds::project(form, camera))
+                };
+                let bounds = geometry.in_tree().into_iter().map(project);
+                let size = scene.film.size.map(|n| n as usize);
+                CullingMode::ScreenGrid(ScreenGrid::new(size, bounds))
+            } else {
+                CullingMode::Frusta(culler)
             }
-            Acceleration::ScreenBounds => CullingMode::ScreenBounds(
-                forms().map(|form| ScreenBounds::project(form, camera)).collect(),
-            ),
-            _ => CullingMode::Off,
-        };
-        Self { mode, all_candidates, light_buffers }
-    }
+        }
+        Acceleration::ScreenBounds => CullingMode::ScreenBounds(
+            forms().map(|form| ScreenBounds::project(form, camera)).collect(),
+        ),
+        _ => CullingMode::Off,
+    };
+    Culling { mode, all_candidates, light_buffers }
 }
 
 /// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths are
@@ -424,8 +411,8 @@ impl<L: SimdFloat> World<L> {
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
         let nested = nested_dielectrics.as_ref();
         let outside_only = outside_only(scene, &camera, &recentered.forms, primitives, nested);
-        let culling =
-            CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
+        let light_bounds = lights.bounds();
+        let culling = culling(scene, recentered, &geometry, &camera, light_bounds, &outside_only);
         let smooth = geometry.is_smooth() || textures.is_bumped();
         let colored = geometry.is_colored() || textures.is_colored();
         let has_background = scene.background.color.0 != [0.0; 3];

@@ -31,7 +31,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         (origin, extent): ([usize; 2], [usize; 2]),
         pixels: impl Iterator<Item = (u32, u32)>,
     ) -> Option<TileTracer<'_, L>> {
-        let candidates = self.world.candidates(origin, extent);
+        let World { culling, geometry, camera, .. } = self.world;
+        let candidates = culling.candidates(geometry, camera, origin, extent);
         if candidates.as_ref().is_some_and(|candidates| self.world.is_black(candidates)) {
             return None;
         }

@@ -1,7 +1,7 @@
 //! `World`: a compiled scene, as the integrators read it.
 
-use crate::compile::{CompiledCulling, CompiledLights};
-use crate::culling::tile::TileCandidates;
+use crate::compile::CompiledLights;
+use crate::culling::tile::{Culling, TileCandidates};
 use crate::integrator::indirect_diffuse::DiffuseLimits;
 use crate::integrator::nested_dielectrics::NestedDielectrics;
 use crate::integrator::surface_textures::SurfaceTextures;
@@ -94,7 +94,7 @@ pub struct World<L: SimdFloat> {
     pub(super) fold: bool,
     /// Camera, in coordinates relative to the scene's centre.
     pub camera: PerspectiveCamera,
-    pub(super) culling: CompiledCulling<L::Scalar>,
+    pub(super) culling: Culling<L::Scalar>,
     /// Properties that do not depend on the SIMD type.
     pub info: WorldInfo,
     /// `true` if samples are distributed over the area of their pixel, not at its centre.
@@ -131,17 +131,6 @@ impl<L: SimdFloat> World<L> {
     /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.
     pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
         CameraTracer::new(self, sampling)
-    }
-
-    /// Returns the candidates of the rectangle of the picture with the upper left corner `origin`
-    /// and the size `extent` \[pixels\]; `None` if rays must be tested against all primitives.
-    pub(super) fn candidates(
-        &self,
-        origin: [usize; 2],
-        extent: [usize; 2],
-    ) -> Option<TileCandidates> {
-        let CompiledCulling { mode, all_candidates, .. } = &self.culling;
-        mode.candidates(&self.geometry, all_candidates, &self.camera, (origin, extent))
     }
 
     /// Returns `true` if all samples of a tile with these candidates are black.

@@ -32,7 +32,6 @@ macro_rules! vector_bits {
 
 /// Reverses the bits of each 32-bit lane by shifts and masks.
 #[inline(always)]
-#[allow(dead_code, reason = "used by widths without a byte shuffle")]
 fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     let swap = |x: B, n: u32, m: u32| ((x >> n) & B::splat(m)) | ((x & B::splat(m)) << n);
     let x = swap(x, 1, 0x5555_5555);
@@ -77,20 +76,8 @@ fn reverse8(x: u32x8) -> u32x8 {
     cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
 }
 
-/// Reverses the bits of each of four 32-bit lanes, as [`reverse8`] does for eight.
-#[inline(always)]
-fn reverse4(x: u32x4) -> u32x4 {
-    use wide::i8x16;
-    let nibble = u32x4::splat(0x0f0f_0f0f);
-    let high: u32x4 = cast(i8x16::new(nibbles::<4>()).shuffle(cast(x & nibble)));
-    let low: u32x4 = cast(i8x16::new(nibbles::<0>()).shuffle(cast((x >> 4u32) & nibble)));
-    let bytes = high | low;
-    let order = wide::u8x16::new([3, 2, 1, 0, 7, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12]);
-    cast(i8x16::shuffle(cast(bytes), order))
-}
-
 vector_bits!(u32x8, reverse8);
-vector_bits!(u32x4, reverse4);
+vector_bits!(u32x4, reverse_by_shifts);
 #[cfg(target_feature = "avx512f")]
 vector_bits!(u32x16, reverse_by_shifts);
 

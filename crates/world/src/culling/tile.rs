@@ -2,7 +2,7 @@
 
 use crate::culling::light_buffer::{LightBuffer, Occluder};
 use crate::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use zerkalo_kernel::lanes::SimdFloat;
+use zerkalo_kernel::lanes::{Float, SimdFloat};
 use zerkalo_kernel::primitive::{
     Aggregate, BoundingSphere, BoundingVolume, Form, Frustum, LightTarget, PrimitiveSet,
 };
@@ -61,19 +61,29 @@ pub(crate) enum CullingMode {
     Off,
 }
 
-impl CullingMode {
+/// What rays are tested against.
+pub(crate) struct Culling<S> {
+    pub mode: CullingMode,
+    /// Candidates for rays that belong to no tile.
+    pub all_candidates: TileCandidates,
+    /// Light buffer of each light without a size; shadow rays to a light without one traverse the
+    /// BVH.
+    pub light_buffers: Vec<Option<LightBuffer<S>>>,
+}
+
+impl<S: Float> Culling<S> {
     /// Returns the candidates of a rectangle of the picture \[pixels\] with the upper left corner
-    /// `origin` and the size `extent`. `all` are the candidates of all rays. Returns `None` if rays
-    /// must be tested against all primitives.
-    pub fn candidates<L: SimdFloat>(
+    /// `origin` and the size `extent`. Returns `None` if rays must be tested against all primitives.
+    pub fn candidates<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
-        all: &TileCandidates,
         camera: &PerspectiveCamera,
-        (origin, extent): ([usize; 2], [usize; 2]),
+        origin: [usize; 2],
+        extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        match self {
-            Self::Frusta(culler) => {
+        let with_primary = |primary| TileCandidates { primary, ..self.all_candidates.clone() };
+        match &self.mode {
+            CullingMode::Frusta(culler) => {
                 let [_, _, forward] = camera.frame();
                 let corners = camera.corners(origin, extent);
                 let lens = camera.lens();
@@ -86,16 +96,13 @@ impl CullingMode {
                 };
                 Some(culler.candidates(geometry, Some(&frustum)))
             }
-            Self::ScreenBounds(bounds) => {
-                let primary = geometry
-                    .select(|primitive| bounds[primitive as usize].overlaps(origin, extent));
-                Some(TileCandidates { primary, ..all.clone() })
+            CullingMode::ScreenBounds(bounds) => Some(with_primary(
+                geometry.select(|primitive| bounds[primitive as usize].overlaps(origin, extent)),
+            )),
+            CullingMode::ScreenGrid(grid) => {
+                Some(with_primary(geometry.select_indices(&grid.candidates(origin, extent)?)))
             }
-            Self::ScreenGrid(grid) => {
-                let primary = geometry.select_indices(&grid.candidates(origin, extent)?);
-                Some(TileCandidates { primary, ..all.clone() })
-            }
-            Self::Off => None,
+            CullingMode::Off => None,
         }
     }
 }
