@@ -326,29 +326,27 @@ fn culling<L: SimdFloat>(
         Acceleration::ScreenBounds => CullingMode::ScreenBounds(
             forms().map(|form| ScreenBounds::project(form, camera)).collect(),
         ),
-        _ => CullingMode::Off,
+        Acceleration::None | Acceleration::Obb | Acceleration::Aabb | Acceleration::Bvh => {
+            CullingMode::Off
+        }
     };
     Culling { mode, all_candidates, light_buffers }
 }
 
 /// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths are
-/// inside of a solid only if they start there or are transmitted.
+/// inside of a solid only if they start there or are transmitted. `start` is a sphere around the
+/// origins of camera rays.
 fn outside_only<L: SimdFloat>(
-    scene: &Scene,
-    camera: &PerspectiveCamera,
     forms: &[Form],
     primitives: &[PrimitiveId],
+    start: &BoundingSphere,
     nested_dielectrics: Option<&NestedDielectrics<L>>,
 ) -> Vec<bool> {
-    // All camera rays start on the lens. With a near plane, they start on the plane and thus possibly
-    // inside a primitive.
-    let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
-    let may_contain_start =
-        |form: &Form| scene.camera.near > 0.0 || form.bounding_sphere().overlaps(&lens);
     let is_outside_only = |(primitive, id): (usize, &PrimitiveId)| {
         let form = &forms[id.form];
         let is_entered = nested_dielectrics.is_some_and(|nested| nested.is_entered(primitive));
-        form.is_convex() && form.is_solid() && !is_entered && !may_contain_start(form)
+        let may_contain_start = form.bounding_sphere().overlaps(start);
+        form.is_convex() && form.is_solid() && !is_entered && !may_contain_start
     };
     primitives.iter().enumerate().map(is_outside_only).collect()
 }
@@ -410,7 +408,7 @@ impl<L: SimdFloat> World<L> {
         let nested_dielectrics =
             NestedDielectrics::new(recentered, primitives, &bsdf_of, &materials.bsdfs, &start);
         let nested = nested_dielectrics.as_ref();
-        let outside_only = outside_only(scene, &camera, &recentered.forms, primitives, nested);
+        let outside_only = outside_only(&recentered.forms, primitives, &start, nested);
         let light_bounds = lights.bounds();
         let culling = culling(scene, recentered, &geometry, &camera, light_bounds, &outside_only);
         let smooth = geometry.is_smooth() || textures.is_bumped();

@@ -214,7 +214,8 @@ fn push_sorted<S: Float>(
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,
-    (packet, bounds): (&SlabPacket<L>, Option<&PacketBounds<L::Scalar>>),
+    packet: &SlabPacket<L>,
+    bounds: Option<&PacketBounds<L::Scalar>>,
     mut limit: L,
     stack: &mut [StackEntry<L::Scalar>],
     mut leaf: impl FnMut(usize, L) -> L,

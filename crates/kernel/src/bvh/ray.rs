@@ -56,12 +56,12 @@ impl<L: SimdFloat> Hit<L> {
         Self { t, primitive: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces the hits in `lanes`.
+    /// Replaces the hits in `lanes` by those of `other`.
     #[inline(always)]
-    pub fn take_in(&mut self, lanes: L::Mask, t: L, (primitive, triangle): (L, L)) {
-        self.t = L::select(lanes, t, self.t);
-        self.primitive = L::select(lanes, primitive, self.primitive);
-        self.triangle = L::select(lanes, triangle, self.triangle);
+    pub fn replace(&mut self, lanes: L::Mask, other: &Self) {
+        self.t = L::select(lanes, other.t, self.t);
+        self.primitive = L::select(lanes, other.primitive, self.primitive);
+        self.triangle = L::select(lanes, other.triangle, self.triangle);
     }
 
     /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is positive and
@@ -84,6 +84,6 @@ impl<L: SimdFloat> Hit<L> {
         if tie.any() {
             nearer = nearer | (tie & other.primitive.lt(self.primitive));
         }
-        self.take_in(nearer, other.t, (other.primitive, other.triangle));
+        self.replace(nearer, other);
     }
 }

@@ -47,7 +47,8 @@ struct RayTraversal<S> {
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
-    (packet, limit): (&SlabPacket<L>, L),
+    packet: &SlabPacket<L>,
+    limit: L,
     frames: &mut [StackFrame],
     prefetch_leaf: impl Fn(usize),
     mut leaf: impl FnMut(usize, usize, L::Scalar) -> L::Scalar,

@@ -161,8 +161,10 @@ impl<S: Float> Contacts<S> {
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
-        (transparent, priority_of): (&[bool], &[u32]),
-        (epsilon, input_error): (f64, f64),
+        transparent: &[bool],
+        priority_of: &[u32],
+        epsilon: f64,
+        input_error: f64,
     ) -> Option<Self> {
         let first = first_primitives(forms, primitives);
         let mut transmits = vec![false; forms.len()];

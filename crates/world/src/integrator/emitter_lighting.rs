@@ -142,8 +142,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let occluded = |lit| {
                 let ray = Ray { origin, direction: light.wi };
                 let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
-                let (ray, lanes) = ((&ray, light.distance), lit.and_not(occluded));
-                occluded | world.lights.emitters.covered(index, &world.geometry, ray, lanes)
+                let lanes = lit.and_not(occluded);
+                let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
+                occluded | emitters.covered(index, geometry, &ray, light.distance, lanes)
             };
             self.add_light(source.group, lit, occluded, |vertex, _| {
                 source.emitted(vertex.unoccluded(value, light))

@@ -148,8 +148,9 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let (ray, t_max) = (Ray { origin: side.origin, direction: light.wi }, light.distance);
             let occluded = world.geometry.occluded(&ray, t_max, lit, world.geometry.all());
             emitter.map_or(occluded, |index| {
-                let (ray, lanes) = ((&ray, t_max), lit.and_not(occluded));
-                occluded | world.lights.emitters.covered(index, &world.geometry, ray, lanes)
+                let lanes = lit.and_not(occluded);
+                let (emitters, geometry) = (&world.lights.emitters, &world.geometry);
+                occluded | emitters.covered(index, geometry, &ray, t_max, lanes)
             })
         };
         self.add_light(source.group, lit, occluded, |vertex, _| {

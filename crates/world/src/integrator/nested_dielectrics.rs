@@ -197,8 +197,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let priority_of: Vec<u32> = priority_of.collect();
         let transparent: Vec<bool> =
             bsdf_of.iter().map(|bsdf| transmission_of(*bsdf).is_some()).collect();
-        let rounding = (L::EPSILON, geometry.input_error());
-        let contacts = Contacts::new(forms, primitives, (&transparent, &priority_of), rounding);
+        let input_error = geometry.input_error();
+        let contacts =
+            Contacts::new(forms, primitives, &transparent, &priority_of, L::EPSILON, input_error);
         let solid_around_eye = |(form, index): (usize, &Option<_>)| {
             let may_contain_eye = index.is_some() && may_reach(start, &forms[form]);
             may_contain_eye

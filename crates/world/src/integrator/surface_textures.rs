@@ -184,9 +184,9 @@ pub(crate) fn shading_normal<L: SimdFloat>(
     (front, geometric): (L::Mask, Vec3<L>),
     direction: Vec3<L>,
 ) -> Vec3<L> {
-    let surface = (points.surface.point, geometric);
-    let normal =
-        world.geometry.shading_normal((points.primitive, points.triangle), surface, direction);
+    let ShadingPoints { primitive, triangle, .. } = *points;
+    let at = SurfacePoint { normal: geometric, ..points.surface };
+    let normal = world.geometry.shading_normal(primitive, triangle, &at, direction);
     let Some((mapping, bump)) =
         surface_texture(world, points.primitive).and_then(|texture| texture.bump.as_ref())
     else {

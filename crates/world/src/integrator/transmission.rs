@@ -204,7 +204,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let leaves = !interaction.front;
             let first = contacts.first(&world.geometry, &coincident, leaves, &branch.media);
             if first.lanes.any() {
-                hit.take_in(first.lanes, hit.t, (first.primitive, first.triangle));
+                let CoincidentQuery { primitive, triangle, .. } = first;
+                hit.replace(first.lanes, &Hit { t: hit.t, primitive, triangle });
                 if let Some(distinct) = next_distinct(hit.primitive, lanes) {
                     let ray = &branch.path.ray;
                     *interaction = interact::<_, false>(world, ray, hit, distinct, lanes);
@@ -255,7 +256,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let next = contacts.next(&self.base.world.geometry, &coincident, &branch.media);
         let ray = &mut branch.path.ray;
         ray.origin = Vec3::select(next.lanes, coincident.point, ray.origin);
-        hit.take_in(next.lanes, L::zero(), (next.primitive, next.triangle));
+        let CoincidentQuery { primitive, triangle, .. } = next;
+        hit.replace(next.lanes, &Hit { t: L::zero(), primitive, triangle });
         Some(next)
     }
 

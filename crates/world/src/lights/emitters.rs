@@ -133,12 +133,13 @@ impl<S: Float> Emitters<S> {
         &self,
         index: usize,
         geometry: &Aggregate<L>,
-        (ray, distance): (&Ray<L>, L),
+        ray: &Ray<L>,
+        distance: L,
         lanes: L::Mask,
     ) -> L::Mask {
         match index.checked_sub(self.lights).and_then(|object| self.touching.get(object)) {
             Some(touching) if !touching.is_empty() => {
-                self.covered_by(touching, geometry, (ray, distance), lanes)
+                self.covered_by(touching, geometry, ray, distance, lanes)
             }
             Some(_) | None => L::mask(false),
         }
@@ -149,7 +150,8 @@ impl<S: Float> Emitters<S> {
         &self,
         touching: &[TouchingObject],
         geometry: &Aggregate<L>,
-        (ray, distance): (&Ray<L>, L),
+        ray: &Ray<L>,
+        distance: L,
         lanes: L::Mask,
     ) -> L::Mask {
         let lift = L::splat(self.lift) * L::from_f64(CONTACT_LIFTS);

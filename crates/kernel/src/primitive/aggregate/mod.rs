@@ -414,16 +414,17 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().iter().any(MeshInstance::is_colored)
     }
 
-    /// Returns the shading normal of `primitive` at a hit point. `at` is the hit point, and the
-    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The angles of
+    /// Returns the shading normal of `primitive` at a hit point. `at` has the hit point,
+    /// and the geometric normal on the viewer's side. `direction` is the direction of the rays. The angles of
     /// the result to the geometric normal and to the direction of the viewer are below 90 degrees.
     pub fn shading_normal(
         &self,
-        (primitive, triangle): (u32, L),
-        at: (Vec3<L>, Vec3<L>),
+        primitive: u32,
+        triangle: L,
+        at: &SurfacePoint<L>,
         direction: Vec3<L>,
     ) -> Vec3<L> {
-        self.mesh(primitive).map_or(at.1, |mesh| mesh.shading_normal(triangle, at, direction))
+        self.mesh(primitive).map_or(at.normal, |mesh| mesh.shading_normal(triangle, at, direction))
     }
 
     /// Returns the colour that the mesh file of `primitive` gives to `triangle`. Returns `None` if the

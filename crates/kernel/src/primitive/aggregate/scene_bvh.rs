@@ -71,7 +71,7 @@ impl SceneBvh {
             let bounds = PacketBounds::around(&packet, wanted);
             let leaf = |number: usize, limit| leaf(self.primitives[number] as usize, limit);
             return with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
-                traverse_packet(boxes, (&packet, bounds.as_ref()), limit, stack, leaf)
+                traverse_packet(boxes, &packet, bounds.as_ref(), limit, stack, leaf)
             });
         }
         let numbers = L::from_fn(|lane| L::Scalar::from_f64(lane as f64));
@@ -82,7 +82,7 @@ impl SceneBvh {
             leaf(self.primitives[number] as usize, limit).lane(lane)
         };
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            traverse_rays(boxes, (&packet, limit), stack, |_| (), leaf)
+            traverse_rays(boxes, &packet, limit, stack, |_| (), leaf)
         });
     }
 }

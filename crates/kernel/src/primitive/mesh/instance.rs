@@ -345,19 +345,19 @@ impl<S: Float> MeshInstance<S> {
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
         triangle: L,
-        (point, normal): (Vec3<L>, Vec3<L>),
+        at: &SurfacePoint<L>,
         direction: Vec3<L>,
     ) -> Vec3<L> {
         if !self.smooth {
-            return normal;
+            return at.normal;
         }
-        let weights = self.triangle(triangle).weights(self.point(point));
+        let weights = self.triangle(triangle).weights(self.point(at.point));
         let [a, b, c] = self.vectors(triangle, self.mesh.smooth_normals());
         let smooth = self.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
         // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
-        // replaces it by `normal`.
-        keep_visible(smooth, normal, direction)
+        // replaces it by the geometric normal.
+        keep_visible(smooth, at.normal, direction)
     }
 
     /// See [`Aggregate::color`](crate::primitive::Aggregate::color).

@@ -120,7 +120,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     #[inline(always)]
     fn traverse_as_packet<L: SimdFloat>(
         &self,
-        (ray, packet): (&Ray<L>, &SlabPacket<L>),
+        ray: &Ray<L>,
+        packet: &SlabPacket<L>,
         limit: L,
     ) -> TriangleHit<L> {
         let sheared_ray = ShearedRay::new(ray);
@@ -169,7 +170,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             found.t
         };
         with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
-            traverse_packet(boxes, (packet, bounds.as_ref()), limit, stack, leaf)
+            traverse_packet(boxes, packet, bounds.as_ref(), limit, stack, leaf)
         });
         found
     }
@@ -182,16 +183,17 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         let turn = COHERENCE_LIMIT / (self.mesh.mesh.triangles.len() as f64).sqrt();
         let turn = turn.min(MAX_COHERENT_SPREAD);
         if ray.is_coherent(limit.gt(L::zero()).bits(), turn, turn * size) {
-            return self.traverse_as_packet((ray, &packet), limit);
+            return self.traverse_as_packet(ray, &packet, limit);
         }
-        self.traverse_separately((ray, &packet), limit)
+        self.traverse_separately(ray, &packet, limit)
     }
 
     /// Traverses the mesh's BVH with each ray of the packet separately.
     #[inline(always)]
     fn traverse_separately<L: SimdFloat>(
         &self,
-        (ray, packet): (&Ray<L>, &SlabPacket<L>),
+        ray: &Ray<L>,
+        packet: &SlabPacket<L>,
         limit: L,
     ) -> TriangleHit<L> {
         let rays = ShearedRay::new(ray).each();
@@ -224,7 +226,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         };
         let boxes = &self.mesh.boxes;
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            traverse_rays(boxes, (packet, limit), stack, soon, leaf)
+            traverse_rays(boxes, packet, limit, stack, soon, leaf)
         });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };
@@ -262,8 +264,8 @@ pub fn closest_with<L: SimdFloat>(
 ) -> TriangleHit<L> {
     let (packet, walk) = (slab_packet(ray, mesh), MeshTraversal::<false> { mesh });
     if all {
-        walk.traverse_as_packet((ray, &packet), limit)
+        walk.traverse_as_packet(ray, &packet, limit)
     } else {
-        walk.traverse_separately((ray, &packet), limit)
+        walk.traverse_separately(ray, &packet, limit)
     }
 }
