@@ -13,7 +13,7 @@ use zerkalo_scene::light::{DeltaLight, LightSample};
 /// Returns the density \[1/sr\] of cosine-weighted directions whose angle to the normal has the
 /// cosine `cos`.
 #[inline(always)]
-pub(crate) fn cosine_density<L: SimdFloat>(cos: L) -> L {
+pub(crate) fn cosine_pdf<L: SimdFloat>(cos: L) -> L {
     cos * L::from_f64(FRAC_1_PI)
 }
 
@@ -132,7 +132,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 },
                 #[inline(always)]
                 |vertex, lit| {
-                    let diffuse = cosine_density(interaction.normal.dot(light.wi));
+                    let diffuse = cosine_pdf(interaction.normal.dot(light.wi));
                     let value = vertex.direct_value(light.wi, diffuse, lit);
                     source.emitted(vertex.unoccluded(value, &light))
                 },
@@ -168,7 +168,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 }
             };
             self.add_light(choice.group, lit, occluded, |vertex, lit| {
-                let diffuse = cosine_density(interaction.normal.dot(wi));
+                let diffuse = cosine_pdf(interaction.normal.dot(wi));
                 let value = vertex.direct_value(wi, diffuse, lit);
                 let mut radiance = vertex.path.throughput.component_mul(value);
                 radiance = radiance * lights.irradiance(stratum, inverse);

@@ -10,7 +10,7 @@
 //! Emissive objects may have any shape, because rays find their emission where they hit them. If no
 //! points of a shape can be sampled, only these rays find its emission.
 
-use crate::integrator::direct_lighting::cosine_density;
+use crate::integrator::direct_lighting::cosine_pdf;
 use crate::integrator::environment_lighting::visible_environments;
 use crate::integrator::interaction::SurfaceInteraction;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
@@ -51,9 +51,9 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
             continue;
         }
         let mut radiance = path.throughput * L::splat(light.radiance);
-        if path.lobe_density.lt(L::from_f64(L::MAX)).any() {
-            let density = light.density(origin, t, L::from_id(0));
-            radiance = radiance * power_heuristic(path.lobe_density, density);
+        if path.lobe_pdf.lt(L::from_f64(L::MAX)).any() {
+            let pdf = light.density(origin, t, L::from_id(0));
+            radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
         }
         radiance = attenuated(media, radiance, t);
         out.groups[source.group] += source.emitted(radiance).masked(seen);
@@ -107,10 +107,10 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let Some(source) = self.world.lights.emitters.of_primitive(primitive) else { continue };
             let mut radiance = path.throughput;
             if let Some(light) = &source.light
-                && path.lobe_density.lt(L::from_f64(L::MAX)).any()
+                && path.lobe_pdf.lt(L::from_f64(L::MAX)).any()
             {
-                let density = light.density(path.ray.origin, hit.t, hit.triangle);
-                radiance = radiance * power_heuristic(path.lobe_density, density);
+                let pdf = light.density(path.ray.origin, hit.t, hit.triangle);
+                radiance = radiance * power_heuristic(path.lobe_pdf, pdf);
             }
             self.out.groups[source.group] += source.emitted(radiance).masked(lanes);
         }
@@ -137,7 +137,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let arrives = light.irradiance.x.gt(L::zero());
             let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
             let rays = source.visible.then_some(&glossy);
-            let value = self.reflected(light, arrives, rays, |density| density);
+            let value = self.reflected(light, arrives, rays, |pdf| pdf);
             let lit = value.max_element().gt(L::zero());
             let occluded = |lit| {
                 let ray = Ray { origin, direction: light.wi };
@@ -178,7 +178,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
         let mut value = Vec3::zero();
         if direct.any() {
-            let diffuse = diffuse(cosine_density(cos_light));
+            let diffuse = diffuse(cosine_pdf(cos_light));
             value = self.direct_value(light.wi, diffuse, direct).masked(direct);
         }
         let Some(rays) = rays else { return value };

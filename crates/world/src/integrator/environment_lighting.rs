@@ -9,9 +9,9 @@
 //! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
 //! the start of the ray already includes all environments.
 
-use crate::integrator::direct_lighting::cosine_density;
+use crate::integrator::direct_lighting::cosine_pdf;
 use crate::integrator::emitter_lighting::{ReflectedRays, power_heuristic};
-use crate::integrator::indirect_diffuse::NO_DENSITY;
+use crate::integrator::indirect_diffuse::NO_PDF;
 use crate::integrator::nested_dielectrics::{Media, attenuated};
 use crate::integrator::path::{Path, Radiance};
 use crate::integrator::vertex::Vertex;
@@ -34,13 +34,13 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
-    let lanes = lanes & path.lobe_density.gt(L::from_f64(NO_DENSITY));
+    let lanes = lanes & path.lobe_pdf.gt(L::from_f64(NO_PDF));
     if lanes.none() {
         return;
     }
     for source in world.lights.environments.iter().filter(|source| source.visible) {
-        let (radiance, density) = source.light.radiance(path.ray.direction, lanes);
-        let weight = power_heuristic(path.lobe_density, density);
+        let (radiance, pdf) = source.light.radiance(path.ray.direction, lanes);
+        let weight = power_heuristic(path.lobe_pdf, pdf);
         let radiance = path.throughput.component_mul(radiance) * weight;
         let radiance = attenuated(media, radiance, L::from_f64(L::MAX));
         out.groups[source.group] += source.emitted(radiance).masked(lanes);
@@ -60,9 +60,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
             let light = &source.light;
             let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
             let rays = source.visible.then_some(glossy);
-            let value = self.reflected(light, arrives, rays, |density| {
-                density * power_heuristic(light.density, density)
-            });
+            let value = self
+                .reflected(light, arrives, rays, |pdf| pdf * power_heuristic(light.density, pdf));
             self.add_environment(environment, light.wi, value.component_mul(light.irradiance));
             if is_diffuse.any() {
                 self.add_cosine_sample(index, environment, is_diffuse);
@@ -97,8 +96,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         let cos = local.z;
         let wi = Frame::around(interaction.normal).to_world(local).renormalize();
         let arrives = lanes & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
-        let (radiance, density) = environment.light.radiance(wi, arrives);
-        let weight = power_heuristic(cosine_density(cos), density).masked(arrives);
+        let (radiance, pdf) = environment.light.radiance(wi, arrives);
+        let weight = power_heuristic(cosine_pdf(cos), pdf).masked(arrives);
         let value = interaction.diffuse.component_mul(radiance) * weight;
         self.add_environment(environment, wi, value.masked(arrives));
     }

@@ -25,7 +25,7 @@ use zerkalo_kernel::sampling::warp::cosine_hemisphere;
 /// Density \[1/sr\] that multiple importance sampling assumes for rays of diffuse bounces: so small
 /// that samples of points on emitters get the full weight. Rays of this density do not find
 /// environments.
-pub(crate) const NO_DENSITY: f64 = 1e-30;
+pub(crate) const NO_PDF: f64 = 1e-30;
 
 /// Limits of indirect diffuse light in a scene.
 #[derive(Clone, Copy, Debug)]
@@ -123,7 +123,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         let path = Path {
             ray: Ray { origin: self.origin, direction },
             throughput: Path::bounded(self.throughput * scale),
-            lobe_density: L::from_f64(NO_DENSITY),
+            lobe_pdf: L::from_f64(NO_PDF),
         };
         let lanes = self.lanes
             & direction.dot(self.geometric).gt(L::zero())

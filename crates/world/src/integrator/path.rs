@@ -47,7 +47,7 @@ pub struct Path<L> {
     pub throughput: Vec3<L>,
     /// Density \[1/sr\] with which the ray was sampled; the largest finite number for camera rays,
     /// mirrors and refraction. It is used only in worlds with emitters.
-    pub lobe_density: L,
+    pub lobe_pdf: L,
 }
 
 impl<L: SimdFloat> Path<L> {
@@ -58,7 +58,7 @@ impl<L: SimdFloat> Path<L> {
     /// Creates the paths of the camera rays `ray`, with throughput 1.
     #[inline(always)]
     pub fn new(ray: Ray<L>) -> Self {
-        Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
+        Self { ray, throughput: Vec3::of([1.0; 3]), lobe_pdf: L::from_f64(L::MAX) }
     }
 
     /// Returns `yes` in the lanes of `mask` and `no` elsewhere.
@@ -70,7 +70,7 @@ impl<L: SimdFloat> Path<L> {
                 direction: Vec3::select(mask, yes.ray.direction, no.ray.direction),
             },
             throughput: Vec3::select(mask, yes.throughput, no.throughput),
-            lobe_density: L::select(mask, yes.lobe_density, no.lobe_density),
+            lobe_pdf: L::select(mask, yes.lobe_pdf, no.lobe_pdf),
         }
     }
 

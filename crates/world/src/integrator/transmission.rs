@@ -343,7 +343,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let path = |origin, direction| Path {
             ray: Ray { origin, direction },
             throughput: Vec3::zero(),
-            lobe_density: L::from_f64(L::MAX),
+            lobe_pdf: L::from_f64(L::MAX),
         };
         let straight = hit.media.thin | hit.suppressed;
         let refracted = Vec3::select(straight, incident, interface.refracted);
@@ -376,8 +376,8 @@ impl<'a, L: SimdFloat> Split<'a, L> {
         let sides = [(false, rough.reflecting, reflected), (true, rough.transmitting, transmitted)];
         for (behind, lanes, path) in sides {
             if lanes.any() {
-                let density = rough.eval(vertex, &path.ray.direction, behind).density;
-                path.lobe_density = L::select(lanes, density, path.lobe_density);
+                let pdf = rough.eval(vertex, &path.ray.direction, behind).density;
+                path.lobe_pdf = L::select(lanes, pdf, path.lobe_pdf);
             }
             path.throughput = Path::bounded(path.throughput);
         }
@@ -422,8 +422,8 @@ impl<'a, L: SimdFloat> Split<'a, L> {
             if world.smooth {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
-            let density = eval_lobe(world, interaction, &query.rays, index, direction).density;
-            self.reflected.lobe_density = L::select(lanes, density, self.reflected.lobe_density);
+            let pdf = eval_lobe(world, interaction, &query.rays, index, direction).density;
+            self.reflected.lobe_pdf = L::select(lanes, pdf, self.reflected.lobe_pdf);
         }
         let throughput = throughput.component_mul(sample.weight) * share;
         let ray = &mut self.reflected.ray;

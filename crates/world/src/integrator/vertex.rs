@@ -93,8 +93,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
                 direction = interaction.reflect_into_hemisphere(direction);
             }
             if emitters {
-                let density = eval_lobe(world, interaction, &query, index, direction).density;
-                path.lobe_density = L::select(lanes, density, path.lobe_density);
+                let pdf = eval_lobe(world, interaction, &query, index, direction).density;
+                path.lobe_pdf = L::select(lanes, pdf, path.lobe_pdf);
             }
             path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);
             let throughput = Path::bounded(throughput.component_mul(sample.weight));
