@@ -105,14 +105,7 @@ impl Bvh8 {
         optimize(&mut binary, quality.reinsertion);
         binary.merge_leaves(in_leaf as u32, quality.traversal_cost);
         optimize(&mut binary, quality.second_reinsertion);
-        let mut built = Bvh8Build {
-            bvh: Self { nodes: Vec::new(), depth: 0 },
-            order: Vec::new(),
-            leaves: Vec::new(),
-        };
-        built.collapse(&binary);
-        built.order = binary.order;
-        built
+        Bvh8Build::collapse(binary)
     }
 
     /// Returns the memory of the inner nodes in bytes.
@@ -122,29 +115,27 @@ impl Bvh8 {
 }
 
 impl Bvh8Build {
-    /// Appends the eight-wide nodes and leaves that replace `binary`.
-    fn collapse(&mut self, binary: &BinaryBvh) {
-        let binary_nodes = &binary.nodes;
-        let plan = CollapsePlan::new(binary);
+    /// Replaces `binary` by eight-wide nodes.
+    fn collapse(binary: BinaryBvh) -> Self {
+        let plan = CollapsePlan::new(&binary);
         let mut todo = vec![(0usize, 0usize, 1usize)];
-        let wide_nodes = &mut self.bvh.nodes;
-        wide_nodes.push(EMPTY_NODE);
+        let (mut wide_nodes, mut leaves, mut max_depth) = (vec![EMPTY_NODE], Vec::new(), 0);
         let mut children = Vec::with_capacity(BVH_WIDTH);
         while let Some((binary_index, wide_index, depth)) = todo.pop() {
-            self.bvh.depth = self.bvh.depth.max(depth);
+            max_depth = depth.max(max_depth);
             children.clear();
-            plan.children(binary_nodes, binary_index, &mut children);
+            plan.children(&binary.nodes, binary_index, &mut children);
             let mut new = EMPTY_NODE;
             for (i, child) in children.iter().enumerate() {
-                let n = &binary_nodes[*child];
+                let n = &binary.nodes[*child];
                 let (low, high) = (n.aabb.min.to_array(), n.aabb.max.to_array());
                 for axis in 0..3 {
                     new.bounds[axis][i] = low[axis];
                     new.bounds[axis + 3][i] = high[axis];
                 }
                 if n.is_leaf() {
-                    new.child[i] = LEAF_FLAG | self.leaves.len() as u32;
-                    self.leaves.push((n.first, n.primitives));
+                    new.child[i] = LEAF_FLAG | leaves.len() as u32;
+                    leaves.push((n.first, n.primitives));
                 } else {
                     new.child[i] = wide_nodes.len() as u32;
                     todo.push((*child, wide_nodes.len(), depth + 1));
@@ -153,6 +144,8 @@ impl Bvh8Build {
             }
             wide_nodes[wide_index] = new;
         }
+        let bvh = Bvh8 { nodes: wide_nodes, depth: max_depth };
+        Self { bvh, order: binary.order, leaves }
     }
 }
 

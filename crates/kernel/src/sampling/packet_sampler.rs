@@ -304,16 +304,12 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         let SampleBlock { sampler, index, .. } = self.points;
         let key = hash(self.key + L::SimdU32::splat(hash_scalar(set)));
         let shuffled = owen(index.reverse(), key).reverse();
-        let mut indices = [0; MAX_WIDTH];
-        for (lane, index) in indices.iter_mut().enumerate().take(L::WIDTH) {
-            *index = shuffled.lane(lane);
-        }
         dimensions.map(|d| {
             let seed = hash(key ^ L::SimdU32::splat(sampler.dimension_salt[d] ^ salt));
             match sampler.settings.kind {
                 SamplerKind::Random => L::to_unit(hash(hash(*index ^ seed) + key)),
                 SamplerKind::Sobol => {
-                    let x = L::SimdU32::from_fn(|lane| sobol::point(d, indices[lane]));
+                    let x = L::SimdU32::from_fn(|lane| sobol::point(d, shuffled.lane(lane)));
                     L::to_unit(owen(x, seed).reverse())
                 }
             }

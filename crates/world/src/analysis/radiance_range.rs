@@ -183,8 +183,8 @@ pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// Factors of each object over all its parts; `None` if it reflects no direct light.
     responses: Vec<Option<Response>>,
-    /// Factors of ambient light, one for each material and channel.
-    ambient: Vec<f64>,
+    /// Factors of ambient light.
+    ambient: Response,
     /// Smallest factor, at most 1, of mirrors and glass without direct light.
     faintest: f64,
     /// Largest factor, at least 1, by which all mirrors of a path together multiply light.
@@ -215,7 +215,9 @@ impl<'a> SceneDistances<'a> {
         };
         let responses = (0..forms.len()).map(response_of_form).collect();
         let materials: Vec<&Material> = (0..forms.len()).flat_map(&materials_of).collect();
-        let ambient = materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient)).collect();
+        let ambient = || materials.iter().flat_map(|m| m.color.0.map(|c| c * m.ambient));
+        let most = ambient().fold(0.0, f64::max);
+        let ambient = Response { least: least_of(ambient()).unwrap_or(1.0), most, peak: most };
         let reflects = scene.trace.ray_types == RayTypes::Full && scene.trace.max_depth > 0;
         let passed_on = |m: &Material| {
             let mirrored = m.f0().0.map(|f0| f0 * m.reflection);
@@ -252,9 +254,7 @@ impl<'a> SceneDistances<'a> {
 
     /// Returns the range for ambient light of intensity 1.
     pub fn ambient(&self) -> RadianceRange {
-        let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
-        let most = self.ambient.iter().copied().fold(0.0, f64::max);
-        self.range_of(1.0, Response { least, most, peak: most })
+        self.range_of(1.0, self.ambient)
     }
 
     /// Returns the range for a background of intensity 1.
