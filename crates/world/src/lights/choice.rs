@@ -123,9 +123,8 @@ impl<S: Float> LightChoice<S> {
             is_chosen[candidates[bright]] = false;
         }
         let mut is_chosen = is_chosen.into_iter();
-        let (mut chosen, others): (Vec<_>, Vec<_>) =
-            sources.drain(..).partition(|_| is_chosen.next() == Some(true));
-        *sources = others;
+        let mut chosen: Vec<_> =
+            sources.extract_if(.., |_| is_chosen.next() == Some(true)).collect();
         let low = chosen.iter().map(place).reduce(DVec3::min)?;
         let high = chosen.iter().map(place).reduce(DVec3::max)?;
         let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));

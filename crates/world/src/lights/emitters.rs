@@ -17,7 +17,7 @@ use crate::lights::groups::{GroupedSource, LightGroupSource, LightGroups};
 use crate::world::LightSource;
 use std::collections::{HashMap, HashSet};
 use zerkalo_kernel::bvh::Ray;
-use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
+use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3, distinct};
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId};
 use zerkalo_scene::Scene;
 use zerkalo_scene::light::{Emitter, LightSample};
@@ -159,9 +159,7 @@ impl<S: Float> Emitters<S> {
         for TouchingObject { first_primitive, flat } in touching {
             let limit = L::select(lanes, L::from_f64(L::MAX), L::from_f64(-1.0));
             let hit = geometry.closest_to(*first_primitive, ray, limit);
-            let mut found = lanes & hit.t.lt(limit);
-            while let Some((part, part_lanes)) = next_distinct(hit.primitive, found) {
-                found = found.and_not(part_lanes);
+            for (part, part_lanes) in distinct(hit.primitive, lanes & hit.t.lt(limit)) {
                 let normal = geometry.surface(part, hit.triangle, ray.at(hit.t)).normal;
                 // The cosine is positive where a ray leaves a solid, because normals point
                 // outwards. A flat object covers points on either side.
