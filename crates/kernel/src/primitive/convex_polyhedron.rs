@@ -81,8 +81,7 @@ pub struct ConvexPolyhedron<S> {
 impl<S: Float> ConvexPolyhedron<S> {
     pub fn new(form: &ConvexPolyhedronForm) -> Self {
         let ConvexPolyhedronForm { faces, corners } = form;
-        let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let (low, high) = form.bounds().unwrap_or_default();
         let center = 0.5 * (low + high);
         let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
         let mut out = Self {

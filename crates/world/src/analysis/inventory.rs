@@ -13,7 +13,7 @@ use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String {
     let groups = &world.info.groups.members;
     let (emissive, unsampled) = world.lights.emitters.object_counts();
-    let mut parts = vec![world.geometry.to_string()];
+    let mut parts = vec![world.geometry.description.clone()];
     parts.extend(world.surface_textures.features().into_iter().map(String::from));
     parts.extend(material_features(scene, world));
     let counted = |n: usize, name: &str| match n {

@@ -15,7 +15,6 @@ use crate::primitive::aggregate::scene_bvh::SceneBvh;
 use crate::primitive::compiled::{SurfacePoint, TexCoord};
 use crate::primitive::form::Form;
 use crate::primitive::mesh::instance::MeshInstance;
-use std::fmt;
 use std::ops::Range;
 
 /// Smallest number of primitives with finite bounds for which a BVH is built. For fewer primitives,
@@ -71,7 +70,8 @@ pub struct Aggregate<L: SimdFloat> {
     boxes: Vec<Option<PrimitiveBox<L::Scalar>>>,
     /// Origin of each primitive.
     pub sources: Vec<PrimitiveId>,
-    counts: Vec<String>,
+    /// Number and kinds of the primitives, and how rays find them, such as `2 spheres (list)`.
+    pub description: String,
 }
 
 /// Subset of the primitives of an [`Aggregate`], to which ray queries are restricted.
@@ -111,44 +111,36 @@ impl<L: SimdFloat> Aggregate<L> {
             AccelerationStructure::Boxes { oriented: true } => (false, "boxes of their own"),
             AccelerationStructure::Boxes { oriented: false } => (false, "boxes"),
         };
-        let mut out = Self {
-            batches: Vec::new(),
-            all: PrimitiveSet::default(),
-            bvh: None,
-            in_bvh: Vec::new(),
-            boxes: Vec::new(),
-            sources: Vec::new(),
-            counts: Vec::new(),
-        };
-        let mut bounds = Vec::new();
-        for LabelledBatch { batch, sources, label, infinite } in compile(forms) {
-            let in_bvh = has_bvh && !infinite;
-            let how = match (in_bvh, infinite) {
-                (true, _) => "tree",
-                (false, true) => "list",
-                (false, false) => how_listed,
-            };
-            out.counts.push(format!("{label} ({how})"));
-            let index = out.batches.len();
-            if in_bvh {
-                for (i, source) in sources.iter().enumerate().filter(|(_, s)| s.part == 0) {
+        let (mut batches, mut sources) = (Vec::new(), Vec::new());
+        let (mut all, mut counts) = (PrimitiveSet::default(), Vec::new());
+        let (mut in_bvh, mut bounds) = (Vec::new(), Vec::new());
+        for LabelledBatch { batch, sources: origins, label, infinite } in compile(forms) {
+            let index = batches.len();
+            if has_bvh && !infinite {
+                counts.push(format!("{label} (tree)"));
+                for (i, source) in origins.iter().enumerate().filter(|(_, s)| s.part == 0) {
                     bounds.extend(forms[source.form].bounds());
-                    out.in_bvh.push((index, i));
+                    in_bvh.push((index, i));
                 }
             } else {
-                out.all.ranges.push((index, 0..sources.len()));
+                let how = if infinite { "list" } else { how_listed };
+                counts.push(format!("{label} ({how})"));
+                all.ranges.push((index, 0..origins.len()));
             }
-            let base = out.sources.len() as u32;
-            out.sources.extend(&sources);
-            out.batches.push(BatchRange { batch, base, end: out.sources.len() as u32 });
+            let base = sources.len() as u32;
+            sources.extend(origins);
+            batches.push(BatchRange { batch, base, end: sources.len() as u32 });
         }
-        out.bvh = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
-        out.all.bvh = out.bvh.is_some();
+        let bvh = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
+        all.bvh = bvh.is_some();
+        let mut boxes = Vec::new();
         if let AccelerationStructure::Boxes { oriented } = structure {
             let box_of = |source: &PrimitiveId| PrimitiveBox::new(&*forms[source.form], oriented);
-            out.boxes = out.sources.iter().map(box_of).collect();
+            boxes.extend(sources.iter().map(box_of));
         }
-        out
+        let description =
+            if counts.is_empty() { "no objects".to_string() } else { counts.join(", ") };
+        Self { batches, all, bvh, in_bvh, boxes, sources, description }
     }
 
     /// Returns the set of all primitives in the BVH and of the others that `wanted` accepts.
@@ -445,13 +437,4 @@ impl<L: SimdFloat> Aggregate<L> {
 #[inline(always)]
 fn no_hit<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))
-}
-
-impl<L: SimdFloat> fmt::Display for Aggregate<L> {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        if self.counts.is_empty() {
-            return f.write_str("no objects");
-        }
-        f.write_str(&self.counts.join(", "))
-    }
 }
