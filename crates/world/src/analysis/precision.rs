@@ -90,12 +90,6 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
     !has_gap(forms, narrow, pixel)
 }
 
-/// Returns `true` if the distance between the bounding boxes of two objects is at most `limit`
-/// along every axis.
-fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
-    (a.low - b.high).max(b.low - a.high).max_element() <= limit
-}
-
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
@@ -164,8 +158,9 @@ fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> 
             if pairs > MOST_PAIRS {
                 return false;
             }
-            if are_near(a, b, narrow.end)
-                && a.faces.iter().any(|s| b.faces.iter().any(|t| seen(s, t)))
+            // Largest distance between the bounding boxes along an axis.
+            let distance = (a.low - b.high).max(b.low - a.high).max_element();
+            if distance <= narrow.end && a.faces.iter().any(|s| b.faces.iter().any(|t| seen(s, t)))
             {
                 return true;
             }

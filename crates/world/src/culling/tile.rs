@@ -86,13 +86,12 @@ impl<S: Float> Culling<S> {
             CullingMode::Frusta(culler) => {
                 let [_, _, forward] = camera.frame();
                 let corners = camera.corners(origin, extent);
-                let lens = camera.lens();
                 let frustum = Frustum {
                     apex: camera.eye(),
                     forward,
                     corners,
                     lens_radius: camera.lens_radius(),
-                    focus: lens.map_or(1.0, |lens| lens.focus),
+                    focus: camera.lens().map_or(1.0, |lens| lens.focus),
                 };
                 Some(culler.candidates(geometry, Some(&frustum)))
             }

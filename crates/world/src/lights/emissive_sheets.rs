@@ -123,19 +123,9 @@ impl<'a> Sheet<'a> {
         let Form::Mesh(mesh) = form else { return None };
         let triangles = || triangles_of_mesh(mesh, 1);
         let normal_of = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
-        // A coarse test with one triangle excludes most meshes quickly.
-        let some = triangles().find(|triangle| normal_of(*triangle) != DVec3::ZERO)?;
-        let normal = normal_of(some).normalize();
-        let is_near = |corner: DVec3| {
-            let from_corner = corner - some[0];
-            normal.dot(from_corner).abs() <= 1e-3 * from_corner.length() + lift
-        };
-        if !triangles().flatten().all(is_near) {
-            return None;
-        }
         let larger = |a: DVec3, b: DVec3| if a.length() >= b.length() { a } else { b };
         let normal = triangles().map(normal_of).reduce(larger)?.normalize();
-        let plane = HalfSpace { normal, offset: normal.dot(some[0]) };
+        let plane = HalfSpace { normal, offset: normal.dot(triangles().next()?[0]) };
         let is_on = |corner: DVec3| plane.height(corner).abs() <= lift;
         let has_front = triangles().all(|triangle| normal_of(triangle).dot(normal) >= 0.0);
         let is_flat = triangles().flatten().all(is_on);
