@@ -14,8 +14,8 @@ pub const MAX_BLOCK_PIXELS: usize = 256;
 /// last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    /// Column and row of each pixel.
-    pixels: [(u32, u32); MAX_BLOCK_PIXELS],
+    x: [u32; MAX_BLOCK_PIXELS],
+    y: [u32; MAX_BLOCK_PIXELS],
     /// See [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
     /// Vectors from the eye to the pixels' upper left corners on the plane at unit distance: all x,
@@ -33,23 +33,28 @@ impl<S: Float> PixelBlock<S> {
     ) -> Self {
         let mut out = Self {
             count: 0,
-            pixels: [(0, 0); MAX_BLOCK_PIXELS],
+            x: [0; MAX_BLOCK_PIXELS],
+            y: [0; MAX_BLOCK_PIXELS],
             keys: [0; MAX_BLOCK_PIXELS],
             corner_directions: [[S::default(); MAX_BLOCK_PIXELS]; 3],
         };
-        for (slot, pixel) in out.pixels.iter_mut().zip(pixels.by_ref()) {
-            *slot = pixel;
+        for ((x, y), pixel) in out.x.iter_mut().zip(&mut out.y).zip(pixels.by_ref()) {
+            (*x, *y) = pixel;
             out.count += 1;
         }
         debug_assert!(pixels.next().is_none(), "more than {MAX_BLOCK_PIXELS} pixels");
         let Some(last) = out.count.checked_sub(1) else { return out };
         let padded = out.count.next_multiple_of(L::WIDTH);
-        let last_pixel = out.pixels[last];
-        out.pixels[last..padded].fill(last_pixel);
+        let (x, y) = (out.x[last], out.y[last]);
+        out.x[last..padded].fill(x);
+        out.y[last..padded].fill(y);
+        let pixels = || out.x[..padded].iter().copied().zip(out.y[..padded].iter().copied());
+        for (key, pixel) in out.keys.iter_mut().zip(pixels()) {
+            *key = sampler.key(pixel, replicate);
+        }
         let [x, y, z] = &mut out.corner_directions;
-        for (i, pixel) in out.pixels[..padded].iter().enumerate() {
-            out.keys[i] = sampler.key(*pixel, replicate);
-            [x[i], y[i], z[i]] = camera.pixel_corner_direction(*pixel);
+        for (((x, y), z), pixel) in x.iter_mut().zip(y).zip(z).zip(pixels()) {
+            [*x, *y, *z] = camera.pixel_corner_direction(pixel);
         }
         out
     }
@@ -61,7 +66,7 @@ impl<S: Float> PixelBlock<S> {
 
     /// Returns the column and the row of pixel `i`.
     pub fn pixel(&self, i: usize) -> (u32, u32) {
-        self.pixels[i]
+        (self.x[i], self.y[i])
     }
 
     /// Returns the key of pixel `i` and the vector to its corner, the same in all lanes.
