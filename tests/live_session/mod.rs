@@ -295,7 +295,7 @@ fn snapshot_picture_features_and_generation_match() {
             assert_eq!(session.set_scene(Arc::new(wall(number))), number);
         }
         std::thread::sleep(Duration::from_micros(number * 97 % 4000));
-        for snapshot in [a.take(), b.take()].into_iter().flatten() {
+        for snapshot in [&a, &b].into_iter().filter_map(|s| s.snapshots.try_recv().ok()) {
             let (number, Some(picture)) = (snapshot.report.generation, snapshot.picture) else {
                 continue;
             };

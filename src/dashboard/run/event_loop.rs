@@ -51,7 +51,7 @@ impl Dashboard {
     /// the program, and `None` if the user quits.
     pub fn event_loop(&mut self) -> io::Result<Option<u8>> {
         let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
-        let wakeup = self.effects.session.wakeup.clone();
+        let snapshots = self.effects.session.snapshots.clone();
         let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();
@@ -65,9 +65,9 @@ impl Dashboard {
         while !self.quit {
             let wait = self.draw();
             // A snapshot is taken only when the terminal can receive another frame.
-            let (wakeup, wants_snapshot) = match self.wants_snapshot() {
+            let (snapshots, wants_snapshot) = match self.wants_snapshot() {
                 None => (&silence, None),
-                Some(Duration::ZERO) => (&wakeup, None),
+                Some(Duration::ZERO) => (&snapshots, None),
                 wait => (&silence, wait),
             };
             let timer = wait.into_iter().chain(wants_snapshot).min().map_or(never(), after);
@@ -77,8 +77,8 @@ impl Dashboard {
                     // The terminal is gone.
                     Err(_) => return Ok(Some(HUNG_UP)),
                 },
-                recv(wakeup) -> notified => match notified {
-                    Ok(()) => self.take_snapshot(),
+                recv(snapshots) -> snapshot => match snapshot {
+                    Ok(snapshot) => self.take_snapshot(snapshot),
                     // The renderer's panic has been reported already.
                     Err(_) => return Err(io::Error::other("the renderer has ended")),
                 },
@@ -188,18 +188,16 @@ impl Dashboard {
         awaited
     }
 
-    fn take_snapshot(&mut self) {
-        if let Some(snapshot) = self.effects.session.take() {
-            let failed = matches!(snapshot.report.state, State::Failed(_));
-            let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
-            if snapshot.picture.is_some() || failed {
-                let old = self.model.snapshot.as_deref().and_then(raster);
-                let is_new_scene = self.shown != snapshot.report.generation;
-                self.image_epoch += u64::from(is_new_scene || old != raster(&snapshot));
-                self.shown = snapshot.report.generation;
-            }
-            self.dispatch(Message::Snapshot(Box::new(snapshot)));
+    fn take_snapshot(&mut self, snapshot: Snapshot) {
+        let failed = matches!(snapshot.report.state, State::Failed(_));
+        let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
+        if snapshot.picture.is_some() || failed {
+            let old = self.model.snapshot.as_deref().and_then(raster);
+            let is_new_scene = self.shown != snapshot.report.generation;
+            self.image_epoch += u64::from(is_new_scene || old != raster(&snapshot));
+            self.shown = snapshot.report.generation;
         }
+        self.dispatch(Message::Snapshot(Box::new(snapshot)));
     }
 
     /// Returns the time until a frame with a new picture may be sent. Returns `None` while the last

@@ -10,7 +10,7 @@ use crate::session::snapshot::{Frame, Snapshot, View, tile_estimates};
 use crate::session::throughput::Throughput;
 use crate::wave::Wave;
 use crate::{Options, RenderState};
-use crossbeam_channel::Sender;
+use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -33,7 +33,9 @@ const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 pub(super) struct WorkContext {
     pub pool: rayon::ThreadPool,
     pub shared: Arc<Shared>,
-    pub notify: Sender<()>,
+    /// Channel of one snapshot, both ends.
+    pub publisher: Sender<Snapshot>,
+    pub published: Receiver<Snapshot>,
     pub view: View,
     pub generation: u64,
 }
@@ -42,14 +44,14 @@ impl WorkContext {
     /// Returns `true` if a snapshot should be published now. A picture takes time. It is published
     /// only if the client has taken the previous one, or at the end of the render (`is_final`).
     fn snapshot_wanted(&self, is_final: bool) -> bool {
-        is_final || self.view == View::default() || self.shared.slot.is_empty()
+        is_final || self.view == View::default() || self.published.is_empty()
     }
 
-    /// Publishes a snapshot and wakes the client.
+    /// Publishes a snapshot, which replaces one that the client has not taken.
     pub fn put(&self, snapshot: Snapshot) {
-        self.shared.slot.put(snapshot);
-        // A full channel means that a wake-up is pending.
-        let _ = self.notify.try_send(());
+        let _ = self.published.try_recv();
+        // Only this thread sends, so that the channel is empty.
+        let _ = self.publisher.try_send(snapshot);
     }
 }
 

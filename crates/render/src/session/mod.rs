@@ -35,13 +35,12 @@ use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use picture::Picture;
 pub use report::{QUALITIES, Report, State};
-use snapshot::Slot;
 pub use snapshot::{Snapshot, TileMaps, View};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 pub use watch::WatchReport;
 use watch::Watcher;
 use worker::Worker;
@@ -71,7 +70,6 @@ struct Shared {
     cancel_wave: AtomicBool,
     /// Cancels the first pass over the picture, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
-    slot: Slot,
     /// Number of scenes compiled so far.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
@@ -83,8 +81,8 @@ struct Shared {
 pub struct Session {
     commands: Sender<Command>,
     shared: Arc<Shared>,
-    /// Channel that receives a message for each new snapshot.
-    pub wakeup: Receiver<()>,
+    /// Channel of the latest snapshot that has not been taken yet.
+    pub snapshots: Receiver<Snapshot>,
     generations: u64,
     /// Rendering thread, whose end the handle awaits. `None` for a thread that watches: it may be
     /// reading from a slow disk.
@@ -120,16 +118,20 @@ impl Session {
     ) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
-        // The channel holds one wake-up; a full channel means that one is pending.
-        let (notify, wakeup) = bounded(1);
+        let (publisher, snapshots) = bounded(1);
         let shared = Arc::new(Shared::default());
-        let view = View::default();
-        let context =
-            WorkContext { pool, shared: Arc::clone(&shared), notify, view, generation: 0 };
+        let context = WorkContext {
+            pool,
+            shared: Arc::clone(&shared),
+            publisher,
+            published: snapshots.clone(),
+            view: View::default(),
+            generation: 0,
+        };
         let thread = std::thread::Builder::new().name("session".into());
         let thread = thread.spawn(run(inbox, context));
         let thread = thread.map_err(|error| threads::error_of(threads, error))?;
-        Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
+        Ok(Self { commands, shared, snapshots, generations: 0, thread: Some(thread) })
     }
 
     /// Renders `scene` from now on, with the present samples if they are valid for it (see
@@ -218,24 +220,11 @@ impl Session {
     /// Waits at most `limit` for a snapshot that has not been taken yet. Panics if the rendering
     /// thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
-        let deadline = Instant::now() + limit;
-        loop {
-            match self.wakeup.recv_deadline(deadline) {
-                // A second snapshot may replace the first one between its message and `take`. The
-                // message of the second then finds no snapshot.
-                Ok(()) => match self.take() {
-                    Some(snapshot) => return Some(snapshot),
-                    None => continue,
-                },
-                Err(RecvTimeoutError::Timeout) => return None,
-                Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
-            }
+        match self.snapshots.recv_timeout(limit) {
+            Ok(snapshot) => Some(snapshot),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
         }
-    }
-
-    /// Takes the latest snapshot. Returns `None` if it has been taken already.
-    pub fn take(&self) -> Option<Snapshot> {
-        self.shared.slot.take()
     }
 
     /// Sends a command with a new generation, cancels the first pass, and returns the generation.

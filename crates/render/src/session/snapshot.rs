@@ -8,8 +8,8 @@ use crate::first_hit_buffer::FirstHitBuffer;
 use crate::relighting::Relighting;
 use crate::session::report::Report;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 use zerkalo_scene::Scene;
 
 /// Contents that a client requests of snapshots.
@@ -141,29 +141,5 @@ impl Frame {
             tiles,
             probe,
         }
-    }
-}
-
-/// Slot that holds the latest snapshot until it is taken or replaced.
-#[derive(Debug, Default)]
-pub(super) struct Slot(Mutex<Option<Snapshot>>);
-
-impl Slot {
-    pub fn put(&self, snapshot: Snapshot) {
-        *self.lock() = Some(snapshot);
-    }
-
-    pub fn take(&self) -> Option<Snapshot> {
-        self.lock().take()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.lock().is_none()
-    }
-
-    /// A lock that was poisoned by a panic is still usable, because the slot always holds a
-    /// complete snapshot or none.
-    fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

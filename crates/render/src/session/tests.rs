@@ -103,16 +103,18 @@ fn newest_scene_is_never_lost() {
     }
 }
 
-/// Checks that a wait ignores old wake-up messages. Such a message belongs to a snapshot that the
-/// test has already taken without waiting.
+/// Checks that a wait returns no snapshot of an earlier scene, whose last one the test has taken
+/// without waiting.
 #[test]
-fn wait_ignores_messages_of_snapshots_already_taken() {
+fn wait_returns_snapshots_of_the_newest_scene() {
     let mut session = session(Stop { spp: Some(8), ..Stop::default() });
     for _ in 0..8 {
         session.set_scene(scene(64));
         let end = Instant::now() + PATIENCE;
         loop {
-            if let Some(State::Finished(_)) = session.take().map(|s| s.report.state) {
+            if let Some(State::Finished(_)) =
+                session.snapshots.try_recv().ok().map(|s| s.report.state)
+            {
                 break;
             }
             assert!(Instant::now() < end, "the render ends");
