@@ -77,7 +77,7 @@ fn figures(size: [u32; 2]) {
         };
         [
             timed(&|| drop(black_box(Thumbnail::of_film(film, RASTER[0], RASTER[1])))),
-            timed(&|| drop(black_box(LinearImage::of_film(film, &rendering.mix)))),
+            timed(&|| drop(black_box(LinearImage::of_film(film, &rendering.weights)))),
         ]
     });
     let [thumbnail, linear] = costs.unwrap();

@@ -75,7 +75,7 @@ fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u6
 }
 
 fn noise(state: &RenderState) -> Noise {
-    state.film.noise(&state.mix, &Display::default()).expect("an estimate of every tile")
+    state.film.noise(&state.weights, &Display::default()).expect("an estimate of every tile")
 }
 
 #[test]

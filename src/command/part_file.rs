@@ -62,7 +62,7 @@ pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Re
         sampler: settings.sampler,
         adaptive: true,
     };
-    let report = Report::of_film(&state.film, &state.mix, &settings.display);
+    let report = Report::of_film(&state.film, &state.weights, &settings.display);
     let mut header = film_header(state, &report, &provenance);
     part.record(&mut header);
     output.write(&state.film, &header).map(|()| report)

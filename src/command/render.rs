@@ -209,7 +209,7 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
-    if session.with(move |state, _| state.mix != weights) == Some(true) {
+    if session.with(move |state, _| state.weights != weights) == Some(true) {
         warn(
             "note: the lights of the scene differ from those of the checkpoint; its samples are kept",
         );

@@ -61,7 +61,7 @@ pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<
         let noiseless = estimate == Some(0.0);
         if changed || done || timed_out {
             last_estimate = estimate.unwrap_or(last_estimate);
-            let errors = reference.errors(&render.state.film, &render.state.mix);
+            let errors = reference.errors(&render.state.film, &render.state.weights);
             if points.last().is_none_or(|last| last.samples < render.schedule.samples) {
                 points.push(Point {
                     step,

@@ -127,7 +127,8 @@ impl<'a> Course<'a> {
             let use_estimate = !variant.experiment.is_unbiased;
             let end = End { levels, seconds: longest, use_estimate };
             let Followed { points, render } = follow(variant, reference, end)?;
-            let bias = use_estimate.then(|| reference.bias(&render.state.film, &render.state.mix));
+            let bias =
+                use_estimate.then(|| reference.bias(&render.state.film, &render.state.weights));
             let result = Measured {
                 experiment: variant.experiment,
                 name: variant.name.clone(),
@@ -231,7 +232,7 @@ fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<
     }
     let (state, display) = (&render.state, &other.options.display);
     Ok(RenderedReference {
-        reference: Reference::of_film(&state.film, &state.mix, display),
+        reference: Reference::of_film(&state.film, &state.weights, display),
         spp: render.schedule.spp().mean,
         seconds: render.seconds,
     })

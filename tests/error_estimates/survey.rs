@@ -40,7 +40,8 @@ impl Reference {
             return Self { levels: levels(&gray), own: 0.0 };
         }
         let rendering = rendered(&sample.scene, 987_654, Precision::Auto, count);
-        let own = rendering.film.noise(&rendering.mix, &Display::default()).unwrap().rmse_levels;
+        let own =
+            rendering.film.noise(&rendering.weights, &Display::default()).unwrap().rmse_levels;
         Self { levels: levels(&picture(&rendering, Replicates::Both)), own }
     }
 

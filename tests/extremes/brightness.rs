@@ -148,7 +148,7 @@ fn amplifying_mirrors_give_finite_white() {
             let pixels = picture(&rendering, Replicates::Both);
             assert!(pixels.iter().all(|p| p[0] > 1.0 && p[0].is_finite()), "{name}: {pixels:?}");
             // Saturated samples leave the noise estimate finite.
-            let noise = rendering.film.noise(&rendering.mix, &Display::default()).unwrap();
+            let noise = rendering.film.noise(&rendering.weights, &Display::default()).unwrap();
             assert!(
                 noise.rmse_levels.is_finite() && noise.rmse_linear.is_finite(),
                 "{name}: {noise:?}"

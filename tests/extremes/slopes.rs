@@ -27,7 +27,7 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
             let settings = SampleSettings { seed: u64::from(n) + seed, kind };
             let mut rendering = begin_with(scene, settings, Precision::Auto);
             uniform(&mut rendering, 0, n / 2, &pool);
-            sum += reference.errors(&rendering.film, &rendering.mix).rmse_linear.powi(2);
+            sum += reference.errors(&rendering.film, &rendering.weights).rmse_linear.powi(2);
         }
         points.push((f64::from(n), (sum / SEEDS as f64).sqrt()));
         n *= 2;
@@ -46,7 +46,7 @@ fn slopes(name: &str, scene: &Scene) -> [Slope; 2] {
     let settings = sobol(77);
     let mut best = begin_with(scene, settings, Precision::Auto);
     uniform(&mut best, 0, REFERENCE * LAST / 2, &pool(2));
-    let reference = Reference::of_film(&best.film, &best.mix, &Display::default());
+    let reference = Reference::of_film(&best.film, &best.weights, &Display::default());
     println!("{name}: the RMSE of the reference is {:.1e}", reference.noise_linear());
     [SamplerKind::Sobol, SamplerKind::Random].map(|kind| slope(scene, kind, &reference))
 }

@@ -16,7 +16,7 @@ fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
     let mut observe = |_: &_| Ok(());
     let how = settings(false, 0, stop);
     let mut render = RegionRender::new(&scene, &options, how, rows, 2)?;
-    let mix = begin(&scene, SEED, Precision::Auto).mix;
+    let mix = begin(&scene, SEED, Precision::Auto).weights;
     let mut films = 0;
     for y in 0..SIZE[1] as usize {
         let film = render.film_with_row(y, &mut observe).map_err(|e| e.to_string())?;

@@ -181,7 +181,7 @@ pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]>
     let mut row = Vec::new();
     let mut all = Vec::new();
     for y in 0..rendering.film.height() {
-        rendering.film.row(y, replicates, &rendering.mix, &mut row);
+        rendering.film.row(y, replicates, &rendering.weights, &mut row);
         all.extend_from_slice(&row);
     }
     all

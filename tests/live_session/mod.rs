@@ -100,12 +100,12 @@ fn relit_picture_equals_fresh_render() {
         let end = finish(&mut session, &relit());
         assert!(end.report.generation > first);
         assert!(bytes(&session) == film, "after {wait_us:?}");
-        assert_eq!(end.mix, expected.mix);
+        assert_eq!(end.weights, expected.weights);
         assert_eq!(end.report.noise, expected.report.noise, "after {wait_us:?}");
         assert_eq!(end.report.spp, expected.report.spp);
         assert_eq!(end.report.samples, expected.report.samples);
-        let pixel = session.with(|r, _| r.film.pixel(50, 40, &r.mix));
-        assert_eq!(pixel, fresh.with(|r, _| r.film.pixel(50, 40, &r.mix)));
+        let pixel = session.with(|r, _| r.film.pixel(50, 40, &r.weights));
+        assert_eq!(pixel, fresh.with(|r, _| r.film.pixel(50, 40, &r.weights)));
     }
 }
 
@@ -123,8 +123,8 @@ fn light_changes_keep_samples() {
         s.report.generation == generation && s.report.noise.is_some()
     });
     // The old snapshot, mixed by the client with the new light weights, equals the new snapshot.
-    assert_eq!(after.mix, mix);
-    assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.mix));
+    assert_eq!(after.weights, mix);
+    assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.weights));
     assert_eq!(after.first_hits, before.first_hits);
     // Edits without effect on the picture: a light's name, an unused material, and a cap of rays
     // per pixel that is not reached.
@@ -163,7 +163,7 @@ fn noisy_light_change_resumes_finished_session() {
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
     assert!(report.noise.unwrap().rmse_levels <= 0.15);
     // The reported estimate equals the one that the current film gives if it is computed anew.
-    let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
+    let film = session.with(|r, _| r.film.noise(&r.weights, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
     // With the original lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
@@ -180,7 +180,7 @@ fn switched_off_light_keeps_group_until_restart() {
     dark.lights[0].on = false;
     let off = finish(&mut session, &dark);
     assert_eq!((off.report.samples, groups(&session)), (before.samples, Some(4)));
-    assert_eq!(off.mix.weights[2], [0.0; 3]);
+    assert_eq!(off.weights.weights[2], [0.0; 3]);
     // The new film has no group for the light that is off.
     let generation = session.restart();
     resting(&session, generation);
@@ -216,14 +216,14 @@ fn stop_display_and_threads_change_keeps_samples() {
 
     let display = Display { exposure_ev: 3.0, tone: Tone::Neutral };
     session.set_display(display);
-    let expected = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
+    let expected = session.with(move |r, _| r.film.noise(&r.weights, &display)).unwrap();
     let judged = wait(&session, |s| s.report.noise == expected);
     assert_eq!(judged.report.samples, more.samples);
     // The new display transform also applies to scenes that are set later.
     let mut moved = scene();
     moved.camera.eye[0] = 0.1;
     let moved = finish(&mut session, &moved).report;
-    let noise = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
+    let noise = session.with(move |r, _| r.film.noise(&r.weights, &display)).unwrap();
     assert_eq!(moved.noise, noise);
 }
 
@@ -248,12 +248,12 @@ fn submitted_tasks_always_run_without_waiting() {
     let end = resting(&session, generation);
     let (keep, kept) = channel();
     session.submit(move |picture| {
-        let kept =
-            picture.map(|p| (LinearImage::of_film(p.film, p.mix), p.film.pixel(50, 40, p.mix)));
+        let kept = picture
+            .map(|p| (LinearImage::of_film(p.film, p.weights), p.film.pixel(50, 40, p.weights)));
         keep.send(kept).unwrap();
     });
     let (kept, pixel) = kept.recv_timeout(PATIENCE).unwrap().unwrap();
-    for (a, b) in end.picture.unwrap().mixed(&end.mix).iter().zip(kept.resampled(20, 14)) {
+    for (a, b) in end.picture.unwrap().mixed(&end.weights).iter().zip(kept.resampled(20, 14)) {
         (0..3).for_each(|c| assert!((a[c] - b[c]).abs() < 1e-5, "{a:?} {b:?}"));
     }
     let probe = end.probe.unwrap();
@@ -299,7 +299,7 @@ fn snapshot_picture_features_and_generation_match() {
             let (number, Some(picture)) = (snapshot.report.generation, snapshot.picture) else {
                 continue;
             };
-            let red = picture.mixed(&snapshot.mix)[0][0];
+            let red = picture.mixed(&snapshot.weights)[0][0];
             assert!((red - 0.01 * (number % 50 + 1) as f32).abs() < 1e-5, "{number}: {red}");
             // On a busy machine the first snapshot of a scene may have a picture but no first hits
             // yet.

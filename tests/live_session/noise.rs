@@ -10,12 +10,13 @@ fn levels(session: &Session) -> (Vec<[f64; 3]>, f64) {
         let mut all = Vec::new();
         let mut row = Vec::new();
         for y in 0..r.film.height() {
-            r.film.row(y, Replicates::Both, &r.mix, &mut row);
+            r.film.row(y, Replicates::Both, &r.weights, &mut row);
             all.extend(row.iter().map(|x| Display::default().levels(*x)));
         }
         all
     };
-    let noise = |r: &RenderState| r.film.noise(&r.mix, &Display::default()).unwrap().rmse_levels;
+    let noise =
+        |r: &RenderState| r.film.noise(&r.weights, &Display::default()).unwrap().rmse_levels;
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 

@@ -81,7 +81,7 @@ fn shot(scene: &Scene, seed: u64, adaptive: bool, stop: Stop, max_rays: u64) -> 
             }
         }
     };
-    let noise = rendering.film.noise(&rendering.mix, &Display::default());
+    let noise = rendering.film.noise(&rendering.weights, &Display::default());
     Shot {
         picture: picture(&rendering, Replicates::Both),
         counts: counts(&rendering),

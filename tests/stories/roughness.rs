@@ -15,7 +15,7 @@ fn picture(scene: &Scene) -> RenderState {
 /// Returns one value for each pixel: `true` if the pixel differs in any bit between `a` and `b`.
 fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     let [width, height] = SIZE.map(|n| n as usize);
-    let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.mix);
+    let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.weights);
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 

@@ -203,7 +203,8 @@ impl Checkpoint {
             let what = "it is of another scene, which differs in more than its lights";
             return Err(self.error(what, foreign));
         }
-        let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
+        let is_relit =
+            state.weights != self.header.weights || state.display() != self.header.display;
         let seconds = seconds_of(&self.header);
         let encoded = self.header.chunks.get(&SCHEDULE).map_or(&[][..], Vec::as_slice);
         let counts: Vec<_> = (0..self.film.tile_count()).map(|i| self.film.counts(i)).collect();

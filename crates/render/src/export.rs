@@ -39,7 +39,7 @@ pub fn film_header(
 ) -> FilmFileHeader {
     FilmFileHeader {
         film: state.film.header().clone(),
-        weights: state.mix.clone(),
+        weights: state.weights.clone(),
         group_names: state.group_names(),
         display: state.display(),
         metadata: metadata(state, report, provenance),

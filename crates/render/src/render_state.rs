@@ -27,7 +27,7 @@ pub struct RenderState {
     pub world: AnyWorld,
     pub film: Film,
     /// Weight of each light group in the current picture.
-    pub mix: LightWeights,
+    pub weights: LightWeights,
     scene: Arc<Scene>,
     /// Light groups of the film, with the scene for which its samples were traced.
     pub lighting: Arc<Relighting>,
@@ -64,7 +64,7 @@ impl RenderState {
         let size = [self.film.width() as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header().clone() };
         let film = self.film.reuse_for(header);
-        let film = film.map_err(|_| memory_budget::refused(size, self.mix.weights.len()))?;
+        let film = film.map_err(|_| memory_budget::refused(size, self.weights.weights.len()))?;
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
 
@@ -96,8 +96,8 @@ impl RenderState {
             seed: options.sampling.seed,
             precision: world.info().precision.to_string(),
         };
-        let mix = LightWeights { weights: world.info().groups.mix(&scene) };
-        let estimator = Estimator::new(&header.scales, &mix, &options.display);
+        let weights = LightWeights { weights: world.info().groups.mix(&scene) };
+        let estimator = Estimator::new(&header.scales, &weights, &options.display);
         let film = match previous {
             Some(previous) => previous.film.reuse_for(header),
             None => Film::try_new(header),
@@ -109,7 +109,7 @@ impl RenderState {
         Ok(Self {
             world,
             film,
-            mix,
+            weights,
             scene,
             lighting: Arc::new(lighting),
             sampling: options.sampling,
@@ -121,10 +121,10 @@ impl RenderState {
     /// Shows the samples as a picture of `scene` from now on and returns `true`, if they are valid
     /// for it. Otherwise changes nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
-        let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
+        let Some(weights) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
         };
-        self.mix = mix;
+        self.weights = weights;
         self.scene = Arc::clone(scene);
         self.rebuild_estimator();
         true
@@ -155,7 +155,7 @@ impl RenderState {
     }
 
     fn rebuild_estimator(&mut self) {
-        self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
+        self.estimator = Estimator::new(self.film.scales(), &self.weights, &self.display);
     }
 
     pub fn schedule(&self, settings: Settings) -> Schedule {

@@ -156,7 +156,7 @@ impl EffectRunner {
         let results = self.results.clone();
         self.session.submit(move |picture| {
             if let Some(picture) = picture {
-                let pinned = Arc::new(LinearImage::of_film(picture.film, picture.mix));
+                let pinned = Arc::new(LinearImage::of_film(picture.film, picture.weights));
                 let _ = results.send(Message::Pinned(pinned, picture.report.spp.mean));
             }
         });

@@ -159,7 +159,7 @@ fn round_up(value: f64) -> f64 {
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
-    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.mix));
+    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
     Some((mixed, [picture.cols, picture.rows]))
 }
 

@@ -92,9 +92,9 @@ pub struct Estimator {
 
 impl Estimator {
     /// Creates an estimator for the tiles of a film with `scales`.
-    pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
+    pub fn new(scales: &[f64], weights: &LightWeights, display: &Display) -> Self {
         Self {
-            per_unit: mix.radiance_per_step(scales),
+            per_unit: weights.radiance_per_step(scales),
             exposure: display.exposure_factor(),
             tone: display.tone,
             curve: SrgbTable::shared(),

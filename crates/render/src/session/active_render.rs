@@ -142,12 +142,12 @@ impl ActiveRender {
     /// Shows the samples as a picture of `scene` from now on and returns `true`, if they are valid
     /// for it.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
-        let weights = self.state.mix.clone();
+        let weights = self.state.weights.clone();
         if !self.state.try_reuse(scene) {
             return false;
         }
         self.schedule.set_rays_per_pixel(scene.film.rays_per_pixel);
-        if self.state.mix != weights {
+        if self.state.weights != weights {
             self.invalidate_estimates();
         }
         true
@@ -261,7 +261,7 @@ impl ActiveRender {
     fn frame(&self, context: &WorkContext) -> Frame {
         Frame {
             view: context.view,
-            mix: self.state.mix.clone(),
+            weights: self.state.weights.clone(),
             display: self.state.display(),
             lighting: Some(Arc::clone(&self.state.lighting)),
             first_hits: self.first_hits.clone(),

@@ -13,7 +13,7 @@ pub struct Picture<'a> {
     /// Film with the samples so far.
     pub film: &'a Film,
     /// Weight of each light group in the picture.
-    pub mix: &'a LightWeights,
+    pub weights: &'a LightWeights,
     /// Report on the film.
     pub report: &'a Report,
     pub(super) source: Source<'a>,

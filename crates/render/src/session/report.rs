@@ -62,10 +62,10 @@ pub struct Report {
 }
 
 impl Report {
-    /// Creates the report of a film that no session renders, with its error under `mix` and
+    /// Creates the report of a film that no session renders, with its error under `weights` and
     /// `display`.
-    pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
-        Self { noise: film.noise(mix, display), ..Self::of_samples(film) }
+    pub fn of_film(film: &Film, weights: &LightWeights, display: &Display) -> Self {
+        Self { noise: film.noise(weights, display), ..Self::of_samples(film) }
     }
 
     /// Creates the report of a film without its error.

@@ -30,7 +30,7 @@ pub struct Snapshot {
     /// applies light weights.
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene of the report.
-    pub mix: LightWeights,
+    pub weights: LightWeights,
     /// Light groups of the film, for [`Snapshot::mix_for`].
     pub lighting: Option<Arc<Relighting>>,
     /// First hits of the requested size. `None` before the first complete picture if they would
@@ -96,7 +96,7 @@ pub(super) fn tile_estimates(
 /// Inputs of a snapshot besides the film.
 pub(super) struct Frame {
     pub view: View,
-    pub mix: LightWeights,
+    pub weights: LightWeights,
     pub display: Display,
     pub lighting: Option<Arc<Relighting>>,
     pub first_hits: Option<Arc<FirstHitBuffer>>,
@@ -131,11 +131,11 @@ impl Frame {
         let probe = self
             .view
             .probe
-            .and_then(|pixel| PixelProbe::of_film(film, pixel, &self.mix, &self.display));
+            .and_then(|pixel| PixelProbe::of_film(film, pixel, &self.weights, &self.display));
         Snapshot {
             report,
             picture,
-            mix: self.mix.clone(),
+            weights: self.weights.clone(),
             lighting: self.lighting.clone(),
             first_hits: self.first_hits.clone(),
             tiles,

@@ -110,7 +110,7 @@ impl Watcher {
     fn picture(&self) -> Option<Picture<'_>> {
         let ((_, film), Shown { header, report, .. }) =
             self.films.sum.as_ref().zip(self.shown.as_ref())?;
-        Some(Picture { film, mix: &header.weights, report, source: Source::Files(header) })
+        Some(Picture { film, weights: &header.weights, report, source: Source::Files(header) })
     }
 
     /// Estimates the noise of the picture that the sum of all films shows.
@@ -140,7 +140,7 @@ impl Watcher {
         let Shown { header, report, tiles } = shown;
         let frame = Frame {
             view: self.context.view,
-            mix: header.weights.clone(),
+            weights: header.weights.clone(),
             display: header.display,
             lighting: None,
             first_hits: None,

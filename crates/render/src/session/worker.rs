@@ -170,7 +170,7 @@ impl Worker {
         for task in tasks {
             task(film.as_ref().map(|(work, report)| Picture {
                 film: &work.state.film,
-                mix: &work.state.mix,
+                weights: &work.state.weights,
                 report,
                 source: Source::Render(work, &self.context.pool),
             }));

@@ -68,7 +68,7 @@ pub fn snapshot(report: Report) -> Snapshot {
     Snapshot {
         report,
         picture: None,
-        mix: LightWeights { weights: Vec::new() },
+        weights: LightWeights { weights: Vec::new() },
         lighting: None,
         first_hits: None,
         tiles: Arc::new(TileMaps {
