@@ -38,15 +38,15 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reporter.mute();
-    // A continued render keeps its seed and sampler.
-    let sampling = match &checkpoint {
-        Some(checkpoint) => checkpoint.sampling(),
-        None => SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
-    };
-    let precision = match &checkpoint {
-        Some(checkpoint) if checkpoint.header.film.precision == "double" => Precision::Double,
-        Some(_) => Precision::Single,
-        None => args.precision.precision,
+    // A continued render keeps its seed, sampler and precision.
+    let (sampling, precision) = match &checkpoint {
+        Some(checkpoint) => {
+            (checkpoint.sampling(), Precision::of_name(&checkpoint.header.film.precision))
+        }
+        None => {
+            let sampling = SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol };
+            (sampling, args.precision.precision)
+        }
     };
     let setup = Setup {
         file,

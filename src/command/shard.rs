@@ -152,17 +152,14 @@ fn start(
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
     }
-    if let Some(fault) = scene.faults().first() {
-        return Err(Failure::Failed(format!("{}: {fault}", args.scene.display())));
-    }
-    let precision =
-        if settings.precision == "double" { Precision::Double } else { Precision::Single };
+    let precision = Precision::of_name(&settings.precision);
     let options = Options {
         world: world::Options { precision, ..world::Options::default() },
         sampling: SampleSettings { seed: settings.seed, kind: settings.sampler },
         display: settings.display,
     };
-    let mut state = RenderState::new(&scene, &options, None);
+    let mut state = RenderState::checked(&Arc::new(scene), &options, None)
+        .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;
     if let Some((film, saved_rays)) = saved {
         if film.header() != state.film.header() {

@@ -19,6 +19,13 @@ pub enum Precision {
     Auto,
 }
 
+impl Precision {
+    /// Returns the precision that [`AnyWorld::precision`] calls `name`.
+    pub fn of_name(name: &str) -> Self {
+        if name == "double" { Self::Double } else { Self::Single }
+    }
+}
+
 /// Options of scene compilation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {

@@ -4,7 +4,6 @@ use crate::film::file::FilmFileHeader;
 use crate::image_file::bands::Bands;
 use crate::image_file::image_data::{Depth, WriteSeek};
 use crate::image_file::{exr_writer, png_writer};
-use std::ffi::OsStr;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
@@ -33,27 +32,18 @@ impl ImageOutput {
     /// Creates an output for `path`, whose extension chooses the format. Accesses no file.
     pub fn from_path(path: impl Into<PathBuf>) -> Result<Self, WriteError> {
         let path = path.into();
-        let extension = path.extension().map(OsStr::to_string_lossy);
-        let known = extension
-            .as_ref()
-            .and_then(|e| FORMATS.iter().position(|f| e.eq_ignore_ascii_case(f.extension)));
-        match known {
-            Some(format) => Ok(Self { path, format, existing: Existing::Replace }),
-            None => {
-                let known: Vec<_> = FORMATS.iter().map(|f| format!(".{}", f.extension)).collect();
-                Err(WriteError {
-                    kind: ErrorKind::InvalidFilename,
-                    what: match extension {
-                        Some(e) => format!("no picture format has the extension .{e}"),
-                        None => {
-                            "its name has no extension that names the picture format".to_string()
-                        }
-                    },
-                    remedy: format!("known extensions: {}", known.join(", ")),
-                    path,
-                })
-            }
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let is_known = |format: &Format| extension.eq_ignore_ascii_case(format.extension);
+        if let Some(format) = FORMATS.iter().position(is_known) {
+            return Ok(Self { path, format, existing: Existing::Replace });
         }
+        let what = match &*extension {
+            "" => "its name has no extension that names the picture format".to_string(),
+            extension => format!("no picture format has the extension .{extension}"),
+        };
+        let known = FORMATS.iter().map(|format| format!(".{}", format.extension));
+        let remedy = format!("known extensions: {}", known.collect::<Vec<_>>().join(", "));
+        Err(WriteError::new(&path, ErrorKind::InvalidFilename, what, &remedy))
     }
 
     /// Returns an output that never replaces an existing file, neither when the write begins nor

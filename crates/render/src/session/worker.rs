@@ -1,7 +1,7 @@
 //! Worker of a session that renders: receives commands and chooses the next piece of work.
 
 use crate::film::Display;
-use crate::schedule::{Settings, Step, Stop};
+use crate::schedule::{Settings, Step};
 use crate::session::active_render::{ActiveRender, WorkContext};
 use crate::session::picture::{Picture, Source};
 use crate::session::report::{Report, State};
@@ -106,13 +106,14 @@ impl Worker {
             }
             Command::Pause(paused) => self.paused = paused,
             Command::View(view) => self.context.view = view,
-            Command::Stop(stop) => self.set_stop(stop),
+            Command::Stop(stop) => {
+                self.settings.stop = stop;
+                self.work().into_iter().for_each(|work| work.schedule.set_stop(stop));
+            }
             Command::Display(display) => self.set_display(display),
             Command::Pool(pool) => {
                 self.context.pool = pool;
-                if let Ok(Some(work)) = &mut self.work {
-                    work.reset_throughput();
-                }
+                self.work().into_iter().for_each(ActiveRender::reset_throughput);
             }
             Command::Task(task) => self.tasks.push(task),
             Command::Quit => return ControlFlow::Break(()),
@@ -120,16 +121,13 @@ impl Worker {
         ControlFlow::Continue(())
     }
 
-    fn set_stop(&mut self, stop: Stop) {
-        self.settings.stop = stop;
-        if let Ok(Some(work)) = &mut self.work {
-            work.schedule.set_stop(stop);
-        }
+    fn work(&mut self) -> Option<&mut ActiveRender> {
+        self.work.as_mut().ok().and_then(Option::as_mut)
     }
 
     fn set_display(&mut self, display: Display) {
         self.options.display = display;
-        if let Ok(Some(work)) = &mut self.work
+        if let Some(work) = self.work()
             && work.state.display() != display
         {
             work.state.set_display(display);
@@ -148,8 +146,8 @@ impl Worker {
                 return;
             }
         }
-        if let Ok(Some(work)) = &mut self.work
-            && !restart
+        if !restart
+            && let Ok(Some(work)) = &mut self.work
             && work.try_reuse(scene)
         {
             return;

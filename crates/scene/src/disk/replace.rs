@@ -36,7 +36,8 @@ impl fmt::Display for WriteError {
 impl std::error::Error for WriteError {}
 
 impl WriteError {
-    fn new(path: &Path, kind: ErrorKind, what: impl Into<String>, remedy: &str) -> Self {
+    /// Creates an error; the arguments become the fields of these names.
+    pub fn new(path: &Path, kind: ErrorKind, what: impl Into<String>, remedy: &str) -> Self {
         Self { path: path.to_path_buf(), kind, what: what.into(), remedy: remedy.to_string() }
     }
 }
