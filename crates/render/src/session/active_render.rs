@@ -7,8 +7,7 @@ use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
 use crate::session::report::{QUALITIES, Report, State};
 use crate::session::snapshot::{Frame, Snapshot, View, tile_estimates};
-use crate::session::throughput::Throughput;
-use crate::wave::Wave;
+use crate::wave::{Wave, WaveReport};
 use crate::{Options, RenderState};
 use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
@@ -19,6 +18,8 @@ use zerkalo_scene::Scene;
 /// Target durations in seconds of a piece of a wave: while the client requests a picture or a
 /// pixel, and while it requests neither.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
+/// Time constant in seconds of the mean speed of tracing.
+const SPEED_SECONDS: f64 = 1.0;
 /// Target duration in seconds of a job. A running job cannot be cancelled.
 const JOB_SECONDS: f64 = 0.005;
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
@@ -68,7 +69,9 @@ pub(super) struct ActiveRender {
     pub first_picture_after: Option<Duration>,
     /// `true` if light weights or display transform have changed since the errors were estimated.
     pub estimates_stale: bool,
-    throughput: Throughput,
+    /// Samples per second of about the latest second of tracing. `None` before the first
+    /// measurement.
+    speed: Option<f64>,
     inventory: Arc<str>,
     downsample: Option<IncrementalDownsample>,
     first_hits: Option<Arc<FirstHitBuffer>>,
@@ -85,7 +88,7 @@ impl ActiveRender {
             traced_for: Duration::ZERO,
             first_picture_after: None,
             estimates_stale: false,
-            throughput: Throughput::default(),
+            speed: None,
             inventory: Arc::from(&*state.world.info().inventory),
             downsample: None,
             first_hits: None,
@@ -159,8 +162,23 @@ impl ActiveRender {
         self.estimates_stale = true;
     }
 
-    pub fn reset_throughput(&mut self) {
-        self.throughput = Throughput::default();
+    /// Forgets the speed of tracing, after a change of the threads.
+    pub fn reset_speed(&mut self) {
+        self.speed = None;
+    }
+
+    /// Records the report of a wave that took the time `traced_for`.
+    fn complete(&mut self, wave: &Wave, report: &WaveReport, traced_for: Duration) {
+        let before = self.schedule.samples;
+        self.schedule.complete(wave, report);
+        self.traced_for += traced_for;
+        let (samples, seconds) = (self.schedule.samples - before, traced_for.as_secs_f64());
+        // All jobs of a cancelled wave may be missing.
+        if samples > 0 {
+            let speed = samples as f64 / seconds.max(1e-9);
+            let weight = 1.0 - (-seconds / SPEED_SECONDS).exp();
+            self.speed = Some(self.speed.map_or(speed, |mean| mean + weight * (speed - mean)));
+        }
     }
 
     /// Estimates the errors of all tiles again. If `cancel_wave` becomes `true` before the end,
@@ -182,9 +200,7 @@ impl ActiveRender {
             let wave = self.piece(wave, context);
             let start = Instant::now();
             let report = self.state.trace_wave(&wave, &context.pool, &flags.cancel_wave);
-            self.traced_for += start.elapsed();
-            self.schedule.complete(&wave, &report);
-            self.throughput.record(self.seconds(), self.schedule.samples);
+            self.complete(&wave, &report, start.elapsed());
             return;
         }
         self.update_first_hits(context, FIRST_HITS_SECONDS);
@@ -205,36 +221,30 @@ impl ActiveRender {
             &flags.cancel_first_pass,
             &mut publish,
         );
-        self.traced_for += start.elapsed();
+        let traced_for = start.elapsed();
         match report {
             Some(report) => {
-                self.schedule.complete(&wave, &report);
-                self.throughput.record(self.seconds(), self.schedule.samples);
+                self.complete(&wave, &report, traced_for);
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
             // Either a newer command is waiting, or the client raised the flag for this scene only
             // after the worker had lowered it.
-            None => self.state.film.restart(),
+            None => {
+                self.traced_for += traced_for;
+                self.state.film.restart();
+            }
         }
     }
 
     /// Cuts `wave` to a piece of about [`PIECE_SECONDS`], with jobs of about [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
-        let Some(speed) = self.speed() else { return wave };
+        let Some(speed) = self.speed else { return wave };
         let samples_per_thread_second = speed / context.pool.current_num_threads() as f64;
         let longest = (JOB_SECONDS * samples_per_thread_second / TILE_PIXELS) as u32
             / SAMPLE_ALIGNMENT
             * SAMPLE_ALIGNMENT;
         wave.cut((speed * seconds) as u64, longest.max(SAMPLE_ALIGNMENT))
-    }
-
-    /// Returns the samples per second of the latest second, or else since the start. Returns `None`
-    /// before the first measurement.
-    fn speed(&self) -> Option<f64> {
-        let seconds = self.seconds();
-        let mean = || (seconds > 0.0).then(|| self.schedule.samples as f64 / seconds);
-        self.throughput.samples_per_second().or_else(mean)
     }
 
     /// Traces the first-hit buffer that the client has requested, unless it exists already, or
@@ -304,7 +314,7 @@ impl ActiveRender {
             bad_samples: self.state.film.bad_samples().count,
             saturated_samples: self.state.film.saturated_samples(),
             saturated_pixels: self.state.film.saturated_pixels(),
-            recent_samples_per_second: self.speed().unwrap_or(0.0),
+            recent_samples_per_second: self.speed.unwrap_or(0.0),
             threads: context.pool.current_num_threads(),
             lanes: self.state.world.info().lanes,
             inventory: Arc::clone(&self.inventory),

@@ -21,7 +21,6 @@ mod report;
 mod snapshot;
 #[cfg(test)]
 mod tests;
-mod throughput;
 mod watch;
 mod worker;
 

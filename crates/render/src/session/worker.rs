@@ -113,7 +113,7 @@ impl Worker {
             Command::Display(display) => self.set_display(display),
             Command::Pool(pool) => {
                 self.context.pool = pool;
-                self.work().into_iter().for_each(ActiveRender::reset_throughput);
+                self.work().into_iter().for_each(ActiveRender::reset_speed);
             }
             Command::Task(task) => self.tasks.push(task),
             Command::Quit => return ControlFlow::Break(()),
