@@ -13,7 +13,6 @@ use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, Sto
 use crate::session::{Report, State};
 use crate::{Options, RenderState, threads};
 use std::io;
-use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -34,8 +33,7 @@ pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions.
 pub struct RegionRender {
-    /// Compiled scene, with the film of the current region. `None` after a failed exchange of the
-    /// film.
+    /// Compiled scene, with the film of the current region. `None` after a failed region.
     state: Option<RenderState>,
     settings: Settings,
     pool: rayon::ThreadPool,
@@ -120,7 +118,7 @@ impl RegionRender {
         let height = self.state().scene().film.size[1];
         let rows = self.finished_rows..height.min(self.finished_rows + self.rows);
         let state = self.state.take().expect("a region after a failed one is not rendered");
-        let state = state.into_band(rows.clone()).map_err(io::Error::other)?;
+        let mut state = state.into_band(rows.clone()).map_err(io::Error::other)?;
         let left = |seconds: f64| {
             let share = rows.len() as f64 / f64::from(height - rows.start);
             (seconds - self.report.seconds).max(0.0) * share
@@ -128,7 +126,6 @@ impl RegionRender {
         let stop = self.settings.stop;
         let stop = Stop { seconds: stop.seconds.map(left), ..stop };
         let mut schedule = state.schedule(Settings { stop, ..self.settings });
-        let state = self.state.insert(state);
         let mut seconds = 0.0;
         let reason = loop {
             let wave = match schedule.next(seconds) {
@@ -146,61 +143,57 @@ impl RegionRender {
             let report = state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             seconds += start.elapsed().as_secs_f64();
             schedule.complete(&wave, &report);
-            observer(&progress(&self.report, &schedule, seconds, &rows, height))?;
+            observer(&self.report_with(&state, &schedule, seconds, schedule.progress(seconds)))?;
         };
+        self.report = self.report_with(&state, &schedule, seconds, Some(1.0));
         self.estimates.extend(schedule.tile_estimates());
+        self.state = Some(state);
         self.finished_rows = rows.end;
-        let (spp, film) = (schedule.spp(), &state.film);
-        let report = &mut self.report;
-        report.samples += schedule.samples;
-        report.rays += schedule.rays;
-        report.seconds += seconds;
-        report.bad_samples += film.bad_samples().count;
-        report.saturated_samples += film.saturated_samples();
-        report.saturated_pixels += film.saturated_pixels();
-        let pixels = film.width() as u64 * u64::from(rows.end);
-        report.spp = Spp {
-            min: spp.min.min(report.spp.min),
-            mean: report.samples as f64 / pixels as f64,
-            max: spp.max.max(report.spp.max),
-        };
-        report.progress = Some(f64::from(rows.end) / f64::from(height));
         if self.stopped_by != StoppedBy::Time {
             self.stopped_by = reason;
         }
         if rows.end == height {
-            report.noise = Noise::of_tiles(self.estimates.iter().copied());
-            report.state = State::Finished(self.stopped_by);
+            self.report.noise = Noise::of_tiles(self.estimates.iter().copied());
+            self.report.state = State::Finished(self.stopped_by);
         }
         Ok(())
     }
-}
 
-/// Returns the report on a picture of `height` rows. `finished` is that on the regions above the
-/// current one, which has the rows `rows` and has been rendered for `seconds` seconds.
-fn progress(
-    finished: &Report,
-    schedule: &Schedule,
-    seconds: f64,
-    rows: &Range<u32>,
-    height: u32,
-) -> Report {
-    let share = schedule.progress(seconds);
-    let done =
-        (f64::from(rows.start) + share.unwrap_or(0.0) * rows.len() as f64) / f64::from(height);
-    let seconds = finished.seconds + seconds;
-    let left = seconds * (1.0 - done) / done;
-    let samples = finished.samples + schedule.samples;
-    Report {
-        state: State::Tracing,
-        spp: schedule.spp(),
-        samples,
-        rays: finished.rays + schedule.rays,
-        seconds,
-        noise: schedule.noise,
-        eta_seconds: share.filter(|_| done > 0.0).map(|_| (left, left)),
-        progress: Some(done),
-        ..finished.clone()
+    /// Returns the report on the picture with the region of `state`, of which `share` is done after
+    /// `seconds` seconds.
+    fn report_with(
+        &self,
+        state: &RenderState,
+        schedule: &Schedule,
+        seconds: f64,
+        share: Option<f64>,
+    ) -> Report {
+        let (finished, film) = (&self.report, &state.film);
+        let [width, height] = state.scene().film.size;
+        let (first, rows) = (f64::from(self.finished_rows), film.height() as f64);
+        let done = (first + share.unwrap_or(0.0) * rows) / f64::from(height);
+        let seconds = finished.seconds + seconds;
+        let left = seconds * (1.0 - done) / done;
+        let samples = finished.samples + schedule.samples;
+        let spp = schedule.spp();
+        Report {
+            state: State::Tracing,
+            spp: Spp {
+                min: spp.min.min(finished.spp.min),
+                mean: samples as f64 / ((first + rows) * f64::from(width)),
+                max: spp.max.max(finished.spp.max),
+            },
+            samples,
+            rays: finished.rays + schedule.rays,
+            seconds,
+            noise: schedule.noise,
+            eta_seconds: share.filter(|_| done > 0.0).map(|_| (left, left)),
+            progress: Some(done),
+            bad_samples: finished.bad_samples + film.bad_samples().count,
+            saturated_samples: finished.saturated_samples + film.saturated_samples(),
+            saturated_pixels: finished.saturated_pixels + film.saturated_pixels(),
+            ..finished.clone()
+        }
     }
 }
 
