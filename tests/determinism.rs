@@ -179,9 +179,10 @@ fn reused_film_equals_a_new_film() {
     let mut other = scene.clone();
     other.camera.eye[0] += 0.5;
     let options = render_options(sobol(SEED));
-    let mut rendering = RenderState::new(&other, &options, None);
+    let mut rendering = RenderState::new(&Arc::new(other.clone()), &options, None).unwrap();
     uniform(&mut rendering, 0, 8, &pool(2));
-    let mut rendering = RenderState::new(scene, &options, Some(rendering));
+    let mut rendering =
+        RenderState::new(&Arc::new(scene.clone()), &options, Some(rendering)).unwrap();
     uniform(&mut rendering, 0, 8, &pool(2));
     assert!(rendering.film.bytes() == film_of_samples(scene, Precision::Auto, 8).bytes());
 }

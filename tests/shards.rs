@@ -16,6 +16,10 @@ fn scene(name: &str, size: Option<[u32; 2]>) -> Scene {
     scene
 }
 
+fn rendering(scene: &Scene, seed: u64) -> RenderState {
+    RenderState::new(&Arc::new(scene.clone()), &options(seed), None).unwrap()
+}
+
 fn options(seed: u64) -> Options {
     render_options(sobol(seed))
 }
@@ -52,7 +56,7 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
 }
 
 fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
-    let state = RenderState::new(scene, &options(plan.settings.seed), None);
+    let state = rendering(scene, plan.settings.seed);
     let mut render = ShardRender::new(state, &plan.ranges(number), 0, THREADS).unwrap();
     while render.step() {}
     assert_eq!(render.progress(), 1.0);
@@ -63,7 +67,7 @@ fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
 /// Returns the sum of the films of the pilot and of all shards. Also returns the number of rays of
 /// each shard.
 fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u64>) {
-    let mut state = RenderState::new(scene, &options(plan.settings.seed), None);
+    let mut state = rendering(scene, plan.settings.seed);
     state.film.add(&pilot.state.film).unwrap();
     let mut rays = Vec::new();
     for number in 1..=plan.settings.shards {
@@ -87,7 +91,7 @@ fn interrupted_shard_equals_uninterrupted() {
     let (whole, whole_rays) = shard(&scene, &plan, 2);
     let (mut film, mut rays, mut starts) = (Film::new(whole.film.header().clone()), 0, 0);
     loop {
-        let mut state = RenderState::new(&scene, &options(0), None);
+        let mut state = rendering(&scene, 0);
         state.film.add(&film).unwrap();
         let mut render = ShardRender::new(state, &ranges, rays, THREADS).unwrap();
         if !render.step() {
@@ -101,7 +105,7 @@ fn interrupted_shard_equals_uninterrupted() {
     assert!(film.bytes() == whole.film.bytes());
     assert_eq!(rays, whole_rays);
     // A film of another shard is refused.
-    let mut state = RenderState::new(&scene, &options(0), None);
+    let mut state = rendering(&scene, 0);
     state.film.add(&film).unwrap();
     assert!(ShardRender::new(state, &plan.ranges(0), rays, THREADS).is_err());
 }

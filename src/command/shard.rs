@@ -158,7 +158,7 @@ fn start(
         sampling: SampleSettings { seed: settings.seed, kind: settings.sampler },
         display: settings.display,
     };
-    let mut state = RenderState::checked(&Arc::new(scene), &options, None)
+    let mut state = RenderState::new(&Arc::new(scene), &options, None)
         .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;
     if let Some((film, saved_rays)) = saved {

@@ -48,7 +48,7 @@ pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let mut options = render_options(sampling);
     options.world.precision = precision;
-    RenderState::new(scene, &options, None)
+    RenderState::new(&Arc::new(scene.clone()), &options, None).unwrap()
 }
 
 pub fn new_session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session {

@@ -191,7 +191,7 @@ impl Checkpoint {
             let what = "the meshes or images of the scene have other contents now";
             return Err(self.error(what, foreign));
         }
-        let mut state = RenderState::checked(&compiled, options, None)
+        let mut state = RenderState::new(&compiled, options, None)
             .map_err(|fault| self.error(fault, "correct the scene"))?;
         let (ours, theirs) = (state.film.header(), &self.header.film);
         if ours.precision != theirs.precision {

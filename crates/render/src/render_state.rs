@@ -37,17 +37,9 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which must be valid, and creates an empty film, in the memory of the film
-    /// of `previous`. Panics if there is not enough memory.
-    pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
-        let rows = 0..scene.film.size[1];
-        Self::compile(Arc::new(scene.clone()), options, previous, rows)
-            .expect("memory for the film")
-    }
-
-    /// Compiles `scene` as [`RenderState::new`] does, after validation. Returns the first
-    /// validation error, or an error if there is not enough memory.
-    pub fn checked(
+    /// Compiles `scene` and creates an empty film, in the memory of the film of `previous`. Returns
+    /// the first validation error, or an error if there is not enough memory.
+    pub fn new(
         scene: &Arc<Scene>,
         options: &Options,
         previous: Option<Self>,

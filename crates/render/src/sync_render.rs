@@ -29,8 +29,8 @@ impl SyncRender {
         threads: usize,
     ) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
-        let state = RenderState::checked(&Arc::new(scene.clone()), options, None)
-            .map_err(io::Error::other)?;
+        let state =
+            RenderState::new(&Arc::new(scene.clone()), options, None).map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = state.schedule(settings);
         Ok(Self { state, schedule, pool, seconds: 0.0 })

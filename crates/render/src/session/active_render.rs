@@ -108,7 +108,7 @@ impl ActiveRender {
         let started = Instant::now();
         let (previous, measured) =
             previous.map(|previous| (previous.state, previous.first_hit_ray_seconds)).unzip();
-        let state = RenderState::checked(scene, options, previous)?;
+        let state = RenderState::new(scene, options, previous)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = state.schedule(settings);
         let first_hit_ray_seconds = measured.unwrap_or(FIRST_HIT_RAY_SECONDS);
