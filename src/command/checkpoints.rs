@@ -2,45 +2,28 @@
 
 use crate::command::{Failure, warn};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
-use zerkalo_render::EncodedCheckpoint;
 use zerkalo_render::export::Provenance;
 use zerkalo_render::film::file::is_film_file;
 use zerkalo_render::session::Session;
 use zerkalo_scene::disk::{Existing, WriteError, check_writable};
 
-/// Writer of checkpoints in a thread of its own. Rendering pauses only while a checkpoint is
-/// encoded.
+/// Writer of checkpoints at intervals. Rendering pauses only while a checkpoint is encoded.
 pub struct CheckpointWriter {
     path: PathBuf,
     interval: Duration,
     provenance: Provenance,
     due: Instant,
-    /// `true` while a checkpoint is encoded or written.
-    busy: bool,
-    encoded: Sender<Option<EncodedCheckpoint>>,
-    results: Receiver<Result<(), WriteError>>,
-    thread: JoinHandle<()>,
+    /// Channel of the result of a checkpoint that is encoded or written.
+    written: Option<Receiver<Result<(), WriteError>>>,
 }
 
 impl CheckpointWriter {
-    /// Starts the thread. The first checkpoint is due after `interval`.
+    /// Creates a writer to the file at `path`. The first checkpoint is due after `interval`.
     pub fn new(path: &Path, interval: Duration, provenance: Provenance) -> Self {
-        let (encoded, inbox) = channel::<Option<EncodedCheckpoint>>();
-        let (outbox, results) = channel();
-        let target = path.to_path_buf();
-        let thread = std::thread::spawn(move || {
-            for checkpoint in inbox {
-                let written = checkpoint.map_or(Ok(()), |it| it.write(&target, Existing::Replace));
-                // After an error of the render, the channel is closed.
-                let _ = outbox.send(written);
-            }
-        });
         let due = Instant::now() + interval;
-        let path = path.to_path_buf();
-        Self { path, interval, provenance, due, busy: false, encoded, results, thread }
+        Self { path: path.to_path_buf(), interval, provenance, due, written: None }
     }
 
     /// Checks that a render may write checkpoints to `path`, or continue the checkpoint `resume`.
@@ -64,36 +47,36 @@ impl CheckpointWriter {
 
     /// Requests a checkpoint if one is due. Does not block.
     pub fn poll(&mut self, session: &Session) {
-        if let Ok(written) = self.results.try_recv() {
-            self.busy = false;
+        if let Some(Ok(written)) = self.written.as_ref().map(Receiver::try_recv) {
+            self.written = None;
             self.due = Instant::now() + self.interval;
             // The next checkpoint may succeed.
             written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
         }
-        if !self.busy && Instant::now() >= self.due {
-            self.busy = true;
-            self.request(session);
+        if self.written.is_none() && Instant::now() >= self.due {
+            self.written = Some(self.request(session));
         }
     }
 
-    fn request(&self, session: &Session) {
-        let encoded = self.encoded.clone();
+    /// Requests a checkpoint, which is written in a thread of its own.
+    fn request(&self, session: &Session) -> Receiver<Result<(), WriteError>> {
+        let (sender, written) = channel();
+        let path = self.path.clone();
         session.checkpoint(self.provenance.clone(), move |checkpoint| {
-            // The thread runs until all senders are dropped, unless it panics.
-            let _ = encoded.send(checkpoint);
+            std::thread::spawn(move || {
+                let written = checkpoint.map_or(Ok(()), |it| it.write(&path, Existing::Replace));
+                // After an error of the render, the channel is closed.
+                let _ = sender.send(written);
+            });
         });
+        written
     }
 
     /// Writes the last checkpoint and returns its path.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
-        self.request(session);
-        // The task must have run and dropped its sender, or the writing thread would not end.
-        session.with(|_, _| ());
-        let Self { path, encoded, results, thread, .. } = self;
-        drop(encoded);
-        if let Err(panic) = thread.join() {
-            std::panic::resume_unwind(panic);
-        }
-        results.into_iter().last().unwrap_or(Ok(())).map(|()| path)
+        // An earlier checkpoint must not replace the last one.
+        self.written.as_ref().map(Receiver::recv);
+        let written = self.request(session).recv().unwrap_or(Ok(()));
+        written.map(|()| self.path)
     }
 }
