@@ -5,14 +5,14 @@ use crate::command::args::WatchArgs;
 use crate::command::edit::{conclude, terminal_environment};
 use crate::dashboard::run::watch as watch_films;
 use std::io;
-use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::plan::FilmFiles;
 
 pub fn run(args: &WatchArgs) -> Result<(), Failure> {
     let environment = terminal_environment().map_err(|reason| {
         let remedy = "`zerkalo merge --partial FILE.zk.. -o PICTURE.png` writes a picture of parts";
         Failure::Usage(format!("{reason}; {remedy}"))
     })?;
-    let films = WatchedFilms::open(&args.files)?;
+    let films = FilmFiles::open(&args.files)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let ended = watch_films(films, threads, args.terminal.setup(environment))?;
     conclude(&ended, io::stdout().lock())

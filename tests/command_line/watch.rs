@@ -5,26 +5,26 @@ use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
 use crate::harness::*;
 use std::time::SystemTime;
-use zerkalo_render::plan::{WatchedFilms, WatchedShards, WatchedState};
+use zerkalo_render::plan::{FilmFiles, WatchedShards, WatchedState};
 
-fn open(desk: &Desk, names: &[&str]) -> Result<WatchedFilms, String> {
+fn open(desk: &Desk, names: &[&str]) -> Result<FilmFiles, String> {
     let paths: Vec<PathBuf> = names.iter().map(|name| desk.path(name)).collect();
-    WatchedFilms::open(&paths)
+    FilmFiles::open(&paths)
 }
 
 fn film(desk: &Desk, name: &str) -> Film {
     FilmReader::open(&desk.path(name)).and_then(FilmReader::read).unwrap().1
 }
 
-fn sum(films: &WatchedFilms) -> &Film {
+fn sum(films: &FilmFiles) -> &Film {
     &films.sum.as_ref().unwrap().1
 }
 
-fn rows(films: &WatchedFilms) -> Vec<WatchedShards> {
+fn rows(films: &FilmFiles) -> Vec<WatchedShards> {
     films.shards(SystemTime::now())
 }
 
-fn states(films: &WatchedFilms) -> Vec<(String, WatchedState)> {
+fn states(films: &FilmFiles) -> Vec<(String, WatchedState)> {
     rows(films).into_iter().map(|row| (row.shards, row.state)).collect()
 }
 
@@ -34,7 +34,7 @@ fn replace(desk: &Desk, name: &str, bytes: &[u8]) {
     fs::rename(desk.path("new"), desk.path(name)).unwrap();
 }
 
-fn refusal(films: &WatchedFilms) -> String {
+fn refusal(films: &FilmFiles) -> String {
     let refused = |row: &WatchedShards| match &row.state {
         WatchedState::Refused(reason) => Some(reason.clone()),
         _ => None,
@@ -103,7 +103,7 @@ fn unfinished_shards_are_running_and_then_late() {
     let mut films = open(&desk, &["job.plan"]).unwrap();
     replace(&desk, "job-1.zk", &pieces.concat());
     assert!(films.poll());
-    let at = |films: &WatchedFilms, later: u64| {
+    let at = |films: &FilmFiles, later: u64| {
         let now = SystemTime::now() + Duration::from_secs(later);
         films.shards(now).into_iter().find(|row| row.shards == "1").unwrap()
     };

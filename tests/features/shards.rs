@@ -5,7 +5,7 @@ use crate::harness::*;
 use std::time::SystemTime;
 use zerkalo_render::film::file::{encode_end, encode_tiles, tile_chunks, write_film_file};
 use zerkalo_render::film::testing::header;
-use zerkalo_render::plan::{Part, PartShard, PlannedTile, ShardRender, WatchedFilms, WatchedState};
+use zerkalo_render::plan::{FilmFiles, Part, PartShard, PlannedTile, ShardRender, WatchedState};
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
@@ -119,7 +119,7 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     };
     fs::write(folder.join("job.plan"), plan.text()).map_err(|e| e.to_string())?;
     (0..4).for_each(|number| drop(fs::remove_file(path(number))));
-    let mut films = WatchedFilms::open(&[folder.join("job.plan")])?;
+    let mut films = FilmFiles::open(&[folder.join("job.plan")])?;
     ensure(films.sum.is_none(), || "a film without files".to_string())?;
     let mut sum = Film::new(one.header().clone());
     for (number, film) in (0..).zip(&parts) {
@@ -162,7 +162,7 @@ fn e2_watching() {
     // replace them.
     watched_parts_add_to(&one, &shipped("mirror-room.toml"), folder.path()).unwrap();
     // The samples of a film file that is removed no longer count.
-    let mut films = WatchedFilms::open(&[folder.path().join("job.plan")]).unwrap();
+    let mut films = FilmFiles::open(&[folder.path().join("job.plan")]).unwrap();
     fs::remove_file(folder.path().join("job-2.zk")).unwrap();
     assert!(
         films.poll() && films.sum.as_ref().unwrap().1.bytes() != one.bytes(),

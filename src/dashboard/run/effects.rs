@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::Options;
 use zerkalo_render::film::{Display, LinearImage};
-use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::Session;
 use zerkalo_scene::{Scene, SceneFile};
@@ -75,7 +75,7 @@ impl EffectRunner {
 
     /// Starts the thread that reads `films`, which other processes write.
     pub fn watching(
-        films: WatchedFilms,
+        films: FilmFiles,
         threads: usize,
         results: Sender<Message>,
     ) -> io::Result<Self> {

@@ -23,7 +23,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zerkalo_render::plan::WatchedFilms;
+use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::{SceneErrors, SceneFile};
@@ -103,7 +103,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 }
 
 /// Shows `films`, which other processes write, as [`run`] shows a scene. No thread traces rays.
-pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
+pub fn watch(films: FilmFiles, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default());
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;

@@ -3,7 +3,7 @@
 use crate::film::Film;
 use crate::film::file::FilmFileHeader;
 use crate::plan::part::{Part, PartShard, ranges};
-use crate::plan::{BASE, Plan, WatchedFilms};
+use crate::plan::{BASE, FilmFiles, Plan};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ impl Merged {
     /// no shards of a plan, if the files belong to different plans, if two files hold the same
     /// shard, or, without `partial`, if shards are missing or unfinished.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
-        let mut films = WatchedFilms::of_parts(paths)?;
+        let mut films = FilmFiles::of_parts(paths)?;
         let part = films.part().ok_or("no parts are named")?;
         if !partial {
             check_complete(&films, &part)?;
@@ -49,7 +49,7 @@ pub(super) fn without_plan(path: &Path) -> String {
     )
 }
 
-fn check_complete(films: &WatchedFilms, part: &Part) -> Result<(), String> {
+fn check_complete(films: &FilmFiles, part: &Part) -> Result<(), String> {
     let mut faults = Vec::new();
     for (path, part) in films.parts() {
         for shard in part.shards.iter().filter(|shard| !shard.complete) {

@@ -11,18 +11,18 @@
 
 mod division;
 mod file;
+mod film_files;
 mod merge;
 mod part;
 mod shard_render;
 #[cfg(test)]
 mod testing;
-mod watched;
 
 pub use file::is_plan_file;
+pub use film_files::{FilmFiles, WatchedShards, WatchedState};
 pub use merge::Merged;
 pub use part::{Part, PartShard};
 pub use shard_render::ShardRender;
-pub use watched::{WatchedFilms, WatchedShards, WatchedState};
 
 use crate::film::{Display, Estimator, Film, TILE};
 pub use crate::schedule::PlannedTile;

@@ -26,7 +26,7 @@ mod worker;
 
 use crate::export::Provenance;
 use crate::film::Display;
-use crate::plan::WatchedFilms;
+use crate::plan::FilmFiles;
 pub use crate::plan::{WatchedShards, WatchedState};
 use crate::schedule::{Settings, Stop};
 use crate::{Checkpoint, EncodedCheckpoint, Options, RenderState, threads};
@@ -100,7 +100,7 @@ impl Session {
     /// Starts a thread that shows the sum of `films`. It calls `on_report` each time it has
     /// checked their files. Returns an error for the user if a thread cannot be started.
     pub fn watch(
-        films: WatchedFilms,
+        films: FilmFiles,
         threads: usize,
         on_report: impl Fn(WatchReport) + Send + 'static,
     ) -> io::Result<Self> {

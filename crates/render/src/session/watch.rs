@@ -4,7 +4,7 @@
 use crate::export::update_metadata;
 use crate::film::file::FilmFileHeader;
 use crate::film::{Display, Estimator, IncrementalDownsample, Noise, TileNoise};
-use crate::plan::{WatchedFilms, WatchedShards};
+use crate::plan::{FilmFiles, WatchedShards};
 use crate::session::Command;
 use crate::session::active_render::WorkContext;
 use crate::session::picture::{Picture, Source};
@@ -24,11 +24,11 @@ const REST: u32 = 2;
 /// file; before the first film they are those of the plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchReport {
-    /// Rows of [`WatchedFilms::shards`].
+    /// Rows of [`FilmFiles::shards`].
     pub shards: Vec<WatchedShards>,
-    /// Value of [`WatchedFilms::complete_shards`].
+    /// Value of [`FilmFiles::complete_shards`].
     pub complete: Option<[usize; 2]>,
-    /// Value of [`WatchedFilms::progress`].
+    /// Value of [`FilmFiles::progress`].
     pub progress: Option<f64>,
     /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
     /// plan.
@@ -42,7 +42,7 @@ pub struct WatchReport {
 }
 
 pub(super) struct Watcher {
-    films: WatchedFilms,
+    films: FilmFiles,
     context: WorkContext,
     /// Display transform that the client has set in place of the one in the film files.
     display: Option<Display>,
@@ -59,7 +59,7 @@ struct Shown {
 }
 
 impl Watcher {
-    pub fn new(films: WatchedFilms, context: WorkContext) -> Self {
+    pub fn new(films: FilmFiles, context: WorkContext) -> Self {
         Self { films, context, display: None, shown: None, downsample: None }
     }
 
@@ -151,7 +151,7 @@ impl Watcher {
 }
 
 impl WatchReport {
-    fn new(films: &WatchedFilms) -> Self {
+    fn new(films: &FilmFiles) -> Self {
         let settings = films.plan.as_ref().map(|plan| &plan.settings);
         let (size, display, source) = match (&films.sum, settings) {
             (Some((header, _)), _) => {

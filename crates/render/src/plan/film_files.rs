@@ -1,5 +1,5 @@
-//! Watched films: film files that other processes write, and their sum. After a change all films
-//! are added again, which takes the memory of one film.
+//! Film files that other processes write, and the sum of their films, for merging and watching. After
+//! a change all films are added again, which takes the memory of one film.
 
 use crate::checkpoint::seconds_of;
 use crate::film::Film;
@@ -22,8 +22,8 @@ const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
 #[derive(Debug, Default)]
-pub struct WatchedFilms {
-    files: Vec<WatchedFile>,
+pub struct FilmFiles {
+    files: Vec<FilmFile>,
     /// Plan file that the user named; it is joined like a film that holds no shard.
     named: Option<(PathBuf, Part)>,
     /// Plan that all files share. `None` before the first file, and for a checkpoint without a
@@ -36,7 +36,7 @@ pub struct WatchedFilms {
 
 /// Film file that another process may replace at any time.
 #[derive(Debug)]
-struct WatchedFile {
+struct FilmFile {
     path: PathBuf,
     /// Shard that a named plan expects in this file.
     shard: Option<u32>,
@@ -87,7 +87,7 @@ pub struct WatchedShards {
     pub age: Option<Duration>,
 }
 
-impl WatchedFilms {
+impl FilmFiles {
     /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
     /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Fails if a plan file cannot
     /// be used, or if the films of two files cannot be added.
@@ -97,7 +97,7 @@ impl WatchedFilms {
             if is_plan_file(path) {
                 films.name_plan(path)?;
             } else {
-                films.files.push(WatchedFile::new(path.clone(), None));
+                films.files.push(FilmFile::new(path.clone(), None));
             }
         }
         let changed = films.read_changed();
@@ -117,7 +117,7 @@ impl WatchedFilms {
             if let Contents::Checkpoint(_) = contents {
                 return Err(without_plan(path));
             }
-            films.files.push(WatchedFile { contents, ..WatchedFile::new(path.clone(), None) });
+            films.files.push(FilmFile { contents, ..FilmFile::new(path.clone(), None) });
         }
         films.try_join().map(|()| films)
     }
@@ -129,7 +129,7 @@ impl WatchedFilms {
         let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         self.files.extend((first..=plan.settings.shards).map(|shard| {
-            WatchedFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
+            FilmFile::new(path.with_file_name(format!("{stem}-{shard}.zk")), Some(shard))
         }));
         let part = Part { plan: Arc::new(plan), shards: Vec::new(), rays: 0 };
         match self.named.replace((path.to_path_buf(), part)) {
@@ -158,7 +158,7 @@ impl WatchedFilms {
     /// Returns the seconds of rendering that a checkpoint states, or the time from the earliest to
     /// the latest modification of a part.
     pub fn seconds(&self) -> f64 {
-        if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
+        if let [FilmFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;
         }
         let times = || self.files.iter().filter_map(|file| Some(file.stamp?.modified));
@@ -241,7 +241,7 @@ impl WatchedFilms {
                 };
                 let contents = contents.unwrap_or_else(Contents::Refused);
                 let path = std::mem::take(&mut file.path);
-                *file = WatchedFile { stamp, contents, ..WatchedFile::new(path, file.shard) };
+                *file = FilmFile { stamp, contents, ..FilmFile::new(path, file.shard) };
                 changed.push(i);
             }
         }
@@ -357,7 +357,7 @@ impl Contents {
     }
 }
 
-impl WatchedFile {
+impl FilmFile {
     fn new(path: PathBuf, shard: Option<u32>) -> Self {
         let contents = Contents::Missing;
         Self { path, shard, stamp: None, contents, samples: 0, total: None }
