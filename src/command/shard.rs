@@ -61,8 +61,8 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
     let signals = handle_signals()?;
-    let mut render =
-        start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
+    let saved = saved.map(|(film, rays, _)| (film, rays));
+    let mut render = start(args, &document, &part, saved)?;
     let signal = trace(&mut render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
     let report = write(&render, &mut part, &output, !unfinished)?;
@@ -138,14 +138,14 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     Ok(film.ok().map(|(_, film)| (film, found.rays, shard.complete)))
 }
 
-/// Creates the render of the shards `numbers`, which continues `saved`.
+/// Creates the render of the shards of `part`, which continues `saved`.
 fn start(
     args: &RenderArgs,
     document: &Document,
-    plan: &Plan,
-    numbers: &[u32],
+    part: &Part,
     saved: Option<(Film, u64)>,
 ) -> Result<ShardRender, Failure> {
+    let plan = &part.plan;
     let settings = &plan.settings;
     let mut scene = document.scene().clone();
     scene.film.size = settings.size;
@@ -170,8 +170,8 @@ fn start(
         }
         (state.film, rays) = (film, saved_rays);
     }
-    let ranges = match numbers {
-        [one] => plan.ranges(*one),
+    let ranges = match part.shards[..] {
+        [one] => plan.ranges(one.number),
         _ => plan.tiles.iter().map(|tile| 0..tile.end).collect(),
     };
     let threads = args.compute.threads();

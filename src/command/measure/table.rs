@@ -53,6 +53,36 @@ const UNSTEADY: f64 = 0.1;
 impl fmt::Display for MeasureReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
+        self.conditions(f)?;
+        let Some(default) = m.measured.first() else { return Ok(()) };
+        self.times(f, default)?;
+        let mut last = &DEFAULT;
+        for measured in &m.measured[1..] {
+            if measured.experiment != last {
+                last = measured.experiment;
+                self.heading(f, last)?;
+                self.row(f, &default.name, default)?;
+            }
+            self.row(f, &measured.name, measured)?;
+        }
+        for experiment in &m.idle {
+            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title)?;
+        }
+        if m.measured.iter().any(|m| m.bias.is_some()) {
+            writeln!(
+                f,
+                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
+                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl MeasureReport<'_> {
+    /// Writes machine, reference and steadiness of the measurement.
+    fn conditions(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let m = self.measurement;
         let [width, height] = m.size;
         writeln!(
             f,
@@ -90,32 +120,9 @@ impl fmt::Display for MeasureReport<'_> {
                 percent(steadiness.spread)
             )?;
         }
-        let Some(default) = m.measured.first() else { return Ok(()) };
-        self.times(f, default)?;
-        let mut last = &DEFAULT;
-        for measured in &m.measured[1..] {
-            if measured.experiment != last {
-                last = measured.experiment;
-                self.heading(f, last)?;
-                self.row(f, &default.name, default)?;
-            }
-            self.row(f, &measured.name, measured)?;
-        }
-        for experiment in &m.idle {
-            writeln!(f, "\n{}: nothing to compare in this scene", experiment.title)?;
-        }
-        if m.measured.iter().any(|m| m.bias.is_some()) {
-            writeln!(
-                f,
-                "\nbias: RMSE that remains at any number of samples, in 8-bit levels; z: difference of the mean \
-                 brightness\nfrom the reference's, in standard errors (significant beyond 4)"
-            )?;
-        }
         Ok(())
     }
-}
 
-impl MeasureReport<'_> {
     fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
         let m = self.measurement;
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
