@@ -52,7 +52,8 @@ pub fn measure(
     reference: Option<Reference>,
     report: &mut dyn FnMut(Progress) -> bool,
 ) -> io::Result<Measurement> {
-    let mut course = Course::new(scene, plan, report);
+    let (variants, started) = (plan.variants(scene), Instant::now());
+    let mut course = Course { plan, variants, started, report, keep_going: true };
     let default = course.variants[0].clone();
     course.announce("reference", 0);
     let mut warm_up = default.start()?;
@@ -93,16 +94,7 @@ struct Course<'a> {
     keep_going: bool,
 }
 
-impl<'a> Course<'a> {
-    fn new(
-        scene: &Arc<Scene>,
-        plan: &'a Plan,
-        report: &'a mut dyn FnMut(Progress) -> bool,
-    ) -> Self {
-        let (variants, started) = (plan.variants(scene), Instant::now());
-        Self { plan, variants, started, report, keep_going: true }
-    }
-
+impl Course<'_> {
     fn announce(&mut self, step: &str, done: usize) {
         let total = 1 + self.variants.len() * self.plan.repetitions.max(1);
         self.keep_going &= (self.report)(Progress { step, done: done.min(total), total });
