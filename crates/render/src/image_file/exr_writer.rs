@@ -10,10 +10,9 @@
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Replicates, Sums};
-use crate::image_file::bands::Bands;
 use crate::image_file::exr_header::Ordered;
-use crate::image_file::image_data::{Depth, WriteSeek, replace_start};
 use crate::image_file::metadata::padded;
+use crate::image_file::output::{Bands, Depth, WriteSeek, replace_start};
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;

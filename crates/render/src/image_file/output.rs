@@ -1,12 +1,41 @@
 //! Output of picture files in the format of their extension.
 
+use crate::film::Film;
 use crate::film::file::FilmFileHeader;
-use crate::image_file::bands::Bands;
-use crate::image_file::image_data::{Depth, WriteSeek};
 use crate::image_file::{exr_writer, png_writer};
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zerkalo_scene::disk::{Existing, Replacement, WriteError, replace_file};
+
+/// Number of bits per channel of a PNG file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Depth {
+    /// 8 bits per channel: 256 levels.
+    #[default]
+    Eight,
+    /// 16 bits per channel: 65 536 levels.
+    Sixteen,
+}
+
+/// Source of a picture's rows: one film, or a film for each of several bands of rows, which are
+/// rendered one after another while the file is written.
+pub trait Bands {
+    /// Returns the film that holds row `y`. Encoders request all rows, in increasing order.
+    fn film_with_row(&mut self, y: usize) -> io::Result<&Film>;
+
+    /// Returns the metadata after the last row; `None` if they are those of the header.
+    ///
+    /// A value such as the noise may differ from that of the header if it has at most 128 bytes.
+    fn final_metadata(&self) -> Option<Vec<(String, String)>> {
+        None
+    }
+}
+
+impl Bands for &Film {
+    fn film_with_row(&mut self, _: usize) -> io::Result<&Film> {
+        Ok(self)
+    }
+}
 
 /// Picture file format with its encoder.
 struct Format {
@@ -81,10 +110,31 @@ impl ImageOutput {
     }
 }
 
+/// Output that an encoder can write to and seek in.
+pub(super) trait WriteSeek: Write + Seek {}
+impl<T: Write + Seek> WriteSeek for T {}
+
+/// Replaces `before`, the first bytes of a file, by `after`, then seeks to its end.
+///
+/// # Errors
+/// Fails if `before` and `after` have different lengths, or if the output cannot be written.
+pub(super) fn replace_start(
+    sink: &mut dyn WriteSeek,
+    before: &[u8],
+    after: &[u8],
+) -> io::Result<()> {
+    if before.len() != after.len() {
+        return Err(io::Error::other("metadata of another length"));
+    }
+    sink.seek(SeekFrom::Start(0))?;
+    sink.write_all(after)?;
+    sink.seek(SeekFrom::End(0))?;
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Film;
     use crate::film::testing::{fill, film, header};
     use crate::image_file::FileMetadata;
     use std::fs;

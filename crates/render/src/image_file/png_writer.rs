@@ -2,9 +2,8 @@
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Film, Replicates, quantised_16};
-use crate::image_file::bands::Bands;
-use crate::image_file::image_data::{Depth, WriteSeek, replace_start};
 use crate::image_file::metadata::padded;
+use crate::image_file::output::{Bands, Depth, WriteSeek, replace_start};
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent, Writer,
