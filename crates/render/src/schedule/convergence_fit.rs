@@ -57,8 +57,8 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Returns the slope p of the fit RMSE ~ rays^-p, through the first and the last point. Returns `None` before there are two
-    /// points.
+    /// Returns the slope p of the fit RMSE ~ rays^-p, through the first and the last point. Returns
+    /// `None` before there are two points.
     pub fn fitted_slope(&self) -> Option<f64> {
         let (r0, n0) = *self.points.first()?;
         let (r1, n1) = *self.points.last()?;

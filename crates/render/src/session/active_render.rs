@@ -69,7 +69,7 @@ pub(super) struct ActiveRender {
     pub first_picture_after: Option<Duration>,
     /// `true` if light weights or display transform have changed since the errors were estimated.
     pub estimates_stale: bool,
-    /// Samples per second of about the latest second of tracing. `None` before the first
+    /// Mean samples per second of about the latest second of tracing. `None` before the first
     /// measurement.
     speed: Option<f64>,
     inventory: Arc<str>,

@@ -30,7 +30,7 @@ pub fn is_film_file(path: &Path) -> bool {
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
-    /// Everything before the tiles.
+    /// Contents before the tiles.
     pub header: FilmFileHeader,
     /// First chunk after the header.
     next: Chunk,
