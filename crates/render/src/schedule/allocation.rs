@@ -186,13 +186,6 @@ impl<'a> Allocation<'a> {
         let gain = fall * pixels / self.rays(tile, samples.max(1));
         (samples > 0).then_some(Candidate { gain, count, tile })
     }
-
-    fn into_jobs(self) -> Vec<Job> {
-        let jobs = self.counts.iter().zip(&self.schedule.tiles).zip(0..);
-        jobs.map(|((n, t), tile)| Job { tile, first: t.done, count: n - t.done })
-            .filter(|job| job.count > 0)
-            .collect()
-    }
 }
 
 impl Schedule {
@@ -237,7 +230,7 @@ impl Schedule {
             allocation.allocate(tile, samples);
             heap.extend(allocation.candidate(tile, &expected[tile]));
         }
-        allocation.into_jobs()
+        self.jobs_to(allocation.counts.into_iter())
     }
 
     /// Returns the expected error of each tile. `pooled` are the slopes of tiles that are not

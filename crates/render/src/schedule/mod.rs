@@ -307,8 +307,7 @@ impl Schedule {
         if self.estimate {
             self.estimated_at = after;
         }
-        let samples = |t: &Tile| after.min(self.cap(t)).saturating_sub(t.done);
-        self.jobs(samples)
+        self.jobs_to(self.tiles.iter().map(|t| after.min(self.cap(t))))
     }
 
     /// Returns the growth of a pixel's `done` samples per replicate in the next uniform round,
@@ -325,10 +324,15 @@ impl Schedule {
         if self.settings.stop.seconds.is_some() { half_way.min(eighth) } else { half_way }
     }
 
-    fn jobs(&self, count: impl Fn(&Tile) -> u32) -> Vec<Job> {
-        let tiles = self.tiles.iter().zip(0..);
+    /// Returns jobs that raise the tiles to `counts` samples per pixel and replicate, in row order.
+    fn jobs_to(&self, counts: impl Iterator<Item = u32>) -> Vec<Job> {
+        let tiles = self.tiles.iter().zip(counts).zip(0..);
         tiles
-            .map(|(t, tile)| Job { tile, first: t.done, count: count(t) })
+            .map(|((t, count), tile)| Job {
+                tile,
+                first: t.done,
+                count: count.saturating_sub(t.done),
+            })
             .filter(|job| job.count > 0)
             .collect()
     }
