@@ -2,10 +2,6 @@
 
 use zerkalo_render::film::{Display, Film, LightWeights, Replicates};
 
-/// Number that keeps the relative error of dark pixels bounded: relMSE = mean((x - r)^2 / (r^2 +
-/// 0.01)), with x a value in the picture and r in the reference.
-const RELATIVE_FLOOR: f64 = 0.01;
-
 /// Reference picture, with an estimate of its own error.
 pub struct Reference {
     /// Pixels in linear radiance, `[row][column]`.
@@ -23,7 +19,6 @@ pub struct Reference {
 struct Squares {
     linear: f64,
     levels: f64,
-    relative: f64,
     mean: f64,
 }
 
@@ -34,8 +29,6 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative mean squared error, see `RELATIVE_FLOOR`.
-    pub rel_mse: f64,
     /// Relative uncertainty of `rmse_levels`, 0..=1: its standard deviation over references as
     /// noisy as this one.
     pub spread: f64,
@@ -75,7 +68,6 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
             let half = 0.5 * (a[c] - b[c]);
             half_sum += half;
             squares.linear += half * half;
-            squares.relative += half * half / (mean[c] * mean[c] + RELATIVE_FLOOR);
             squares.levels +=
                 0.5 * ((level_a[c] - level[c]).powi(2) + (level_b[c] - level[c]).powi(2));
         }
@@ -85,7 +77,6 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
     Squares {
         linear: squares.linear / values,
         levels: squares.levels / values,
-        relative: squares.relative / values,
         mean: squares.mean / (values * values),
     }
 }
@@ -148,11 +139,7 @@ impl Reference {
             let level = self.display.levels(*x);
             let difference = std::array::from_fn(|c| level[c] - self.levels[i][c]);
             sum.levels += dot(&difference, &difference);
-            for c in 0..3 {
-                let square = (x[c] - r[c]).powi(2);
-                sum.linear += square;
-                sum.relative += square / (r[c] * r[c] + RELATIVE_FLOOR);
-            }
+            sum.linear += (0..3).map(|c| (x[c] - r[c]).powi(2)).sum::<f64>();
             crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
         }
         let values = (3 * self.pixels.len()) as f64;
@@ -164,7 +151,6 @@ impl Reference {
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
             rmse_levels: levels.sqrt(),
-            rel_mse: remaining(sum.relative, self.own.relative),
             spread: if spread < levels { spread / levels } else { f64::from(spread > 0.0) },
         }
     }

@@ -188,14 +188,6 @@ impl Measured {
             self.points[from..].iter().map(|p| (p.samples as f64, p.errors.rmse_linear)).collect();
         Slope::fit(&points)
     }
-
-    /// Returns 1 / (linear MSE x seconds) at the end of the error curve. Returns `None` if this is
-    /// infinite.
-    pub fn efficiency(&self) -> Option<f64> {
-        let last = self.points.last()?;
-        let cost = last.errors.rmse_linear.powi(2) * median(&last.seconds);
-        (cost > 0.0).then(|| 1.0 / cost)
-    }
 }
 
 impl Measurement {
@@ -241,12 +233,7 @@ mod tests {
             spp: *spp,
             seconds: vec![*spp * 1e-3, *spp * 3e-3, *spp * 2e-3],
             estimated_levels: Some(2.0 * levels),
-            errors: Errors {
-                rmse_linear: levels / 255.0,
-                rmse_levels: *levels,
-                rel_mse: 0.0,
-                spread: 0.0,
-            },
+            errors: Errors { rmse_linear: levels / 255.0, rmse_levels: *levels, spread: 0.0 },
         };
         Measured {
             experiment: &DEFAULT,

@@ -246,7 +246,7 @@ mod tests {
             spp: *seconds,
             seconds: vec![*seconds; 3],
             estimated_levels: Some(*levels),
-            errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, rel_mse: 0.0, spread: 0.0 },
+            errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, spread: 0.0 },
         };
         Measured {
             experiment: &DEFAULT,

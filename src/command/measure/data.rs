@@ -16,7 +16,6 @@ struct Point {
     rmse_levels: f64,
     rmse_levels_spread: f64,
     rmse_linear: f64,
-    rel_mse: f64,
 }
 
 /// First columns of a line of CSV, before the fields of [`Point`].
@@ -37,7 +36,6 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
         rmse_levels: p.errors.rmse_levels,
         rmse_levels_spread: p.errors.spread,
         rmse_linear: p.errors.rmse_linear,
-        rel_mse: p.errors.rel_mse,
     })
 }
 
@@ -52,8 +50,6 @@ fn variation(measured: &Measured, targets: &[f64]) -> Value {
         "samples_per_second_spread": speed.map(|s| s.spread),
         "slope": slope.map(|s| s.value),
         "slope_standard_error": slope.map(|s| s.standard_error),
-        // 1 / (MSE of the linear picture x seconds).
-        "efficiency": measured.efficiency(),
         // Null without noise: the z-score is infinite, which JSON cannot represent.
         "bias_z": measured.bias.map(|b| b.z),
         "bias_levels": measured.bias.map(|b| b.levels),
