@@ -141,7 +141,7 @@ fn camera_stories() -> Vec<Story> {
         }),
     ];
     for n in 1..=9 {
-        stories.push(story(&format!("go to viewpoint {n}"), &n.to_string(), move |_, d| {
+        stories.push(story("go to viewpoint 1 to 9", &n.to_string(), move |_, d| {
             eye(d)[0] == f64::from(n)
         }));
     }

@@ -92,9 +92,13 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Single, |_, _| camera.clone());
     }
 
-    pub(super) fn recall_view(&mut self, number: u8) {
-        let index = usize::from(number).saturating_sub(1);
-        match self.scene().cameras.keys().nth(index).cloned() {
+    /// Goes to the stored camera of the digit that was typed, from 1 on.
+    pub(super) fn recall_view(&mut self) {
+        let Some(number) = self.typed.and_then(|c| c.to_digit(10)) else {
+            self.say("Keys 1 to 9 go to viewpoints · n stores one");
+            return;
+        };
+        match self.scene().cameras.keys().nth((number as usize).saturating_sub(1)).cloned() {
             Some(name) => {
                 let edit = recall_view(self.scene(), &name);
                 if self.commit(edit, Coalesce::Single) {

@@ -4,7 +4,7 @@ use crate::dashboard::noise_targets::{ABOUT, LOOKS, cost};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut};
 use crate::dashboard::view::fields::{self, typed};
-use crate::dashboard::view::painter::{ListRow, Painter, Row, VisibleLine};
+use crate::dashboard::view::painter::{ListRow, Painter, VisibleLine};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::{Model, Overlay, Pick, Prompt, Question};
 use ratatui::layout::Position;
@@ -13,20 +13,25 @@ use zerkalo_render::session::QUALITIES;
 
 /// Draws the open overlay. Returns the position of the text cursor.
 pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
-    let theme = painter.theme;
-    let mut overlay = OverlayPainter { place: model.overlay_layout()?, theme, painter };
-    match model.overlay.as_ref()? {
-        Overlay::NoiseTargets(at) => overlay.noise_targets(model, at.index),
-        Overlay::Pick(pick) => return overlay.pick(pick),
-        Overlay::Form(form) => {
-            overlay.frame(&form.title);
-            let OverlayLayout { list, help, .. } = overlay.place;
-            return fields::draw(model, (list, help), true, overlay.painter);
-        }
-        Overlay::Prompt(prompt) => return overlay.prompt(prompt),
+    let (overlay, place) = (model.overlay.as_ref()?, model.overlay_layout()?);
+    let title = match overlay {
+        Overlay::NoiseTargets(_) => "noise targets in 8-bit levels",
+        Overlay::Pick(pick) => &pick.title,
+        Overlay::Form(form) => &form.title,
+        Overlay::Prompt(prompt) => &prompt.title,
+        Overlay::Question(_) => "",
         // `View::draw` draws it on the whole screen.
+        Overlay::ViewerImage(_) => return None,
+    };
+    painter.overlay(place.frame, title);
+    let mut on = OverlayPainter { place, theme: painter.theme, painter };
+    match overlay {
+        Overlay::NoiseTargets(at) => on.noise_targets(model, at.index),
+        Overlay::Pick(pick) => return on.pick(pick),
+        Overlay::Form(_) => return fields::draw(model, (place.list, place.help), true, on.painter),
+        Overlay::Prompt(prompt) => return on.prompt(prompt),
+        Overlay::Question(question) => on.question(question),
         Overlay::ViewerImage(_) => {}
-        Overlay::Question(question) => overlay.question(question),
     }
     None
 }
@@ -38,18 +43,6 @@ struct OverlayPainter<'a, 'b> {
 }
 
 impl OverlayPainter<'_, '_> {
-    fn frame(&mut self, title: &str) {
-        self.painter.overlay(self.place.frame, title);
-    }
-
-    fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = VisibleLine> + use<> {
-        self.painter.window(self.place.list, scroll, len, self.theme.border(true))
-    }
-
-    fn row(&mut self, row: u16) -> Row<'_> {
-        self.painter.row(self.place.list, row)
-    }
-
     fn say(&mut self, text: &str, style: Style) {
         self.painter.paragraphs(self.place.help, &[(text.to_string(), style)]);
     }
@@ -62,7 +55,6 @@ impl OverlayPainter<'_, '_> {
     }
 
     fn noise_targets(&mut self, model: &Model, cursor: usize) {
-        self.frame("noise targets in 8-bit levels");
         let good = self.theme.good();
         let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
         for (row, (i, noise_levels)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
@@ -78,16 +70,17 @@ impl OverlayPainter<'_, '_> {
     }
 
     fn pick(&mut self, pick: &Pick) -> Option<Position> {
-        self.frame(&pick.title);
         let mut input = self.painter.row(self.place.input, 0);
         input.put(" : ", self.theme.accent());
         let cursor = typed(&pick.editor, &mut input);
         if pick.found.is_empty() {
             let style = self.theme.dim();
-            self.row(0).skip(3).put("no match", style);
+            self.painter.row(self.place.list, 0).skip(3).put("no match", style);
         }
         let names = pick.entries.iter().map(|entry| columns(&entry.name)).max().unwrap_or(0);
-        for VisibleLine { row, index } in self.window(pick.at.scroll, pick.found.len()) {
+        let (list, border) = (self.place.list, self.theme.border(true));
+        let window = self.painter.window(list, pick.at.scroll, pick.found.len(), border);
+        for VisibleLine { row, index } in window {
             let entry = &pick.entries[pick.found[index]];
             let ListRow { mut to, name, note, key } = self.choice(row, index == pick.at.index);
             // A long list of keys must not shorten the name.
@@ -103,7 +96,6 @@ impl OverlayPainter<'_, '_> {
     }
 
     fn prompt(&mut self, prompt: &Prompt) -> Option<Position> {
-        self.frame(&prompt.title);
         match &prompt.editor.problem {
             Some(problem) => self.say(problem, self.theme.bad()),
             None => self.say(&prompt.help, self.theme.dim()),
@@ -112,7 +104,6 @@ impl OverlayPainter<'_, '_> {
     }
 
     fn question(&mut self, question: &Question) {
-        self.frame("");
         self.say(&question.text, self.theme.text());
         for (row, (i, (letter, words, _))) in (0..).zip(question.answers.iter().enumerate()) {
             let ListRow { mut to, name, key, .. } = self.choice(row, i == question.at.index);
