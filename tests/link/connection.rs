@@ -123,7 +123,7 @@ impl Connection {
                     self.in_transit.push_back((self.free_at + self.one_way, bytes));
                 }
             }
-            if self.diff.pending().visible {
+            if self.diff.pending.visible {
                 self.waited[0] += STEP;
                 self.waited[1] += if self.free_at >= self.now { STEP } else { Duration::ZERO };
             }

@@ -64,7 +64,7 @@ fn converge(scene: &Scene) -> Figures {
         let start = connection.now;
         loop {
             connection.pass(&work.target(), Duration::from_millis(200));
-            let is_pending = connection.diff.pending().visible || connection.diff.pending().text;
+            let is_pending = connection.diff.pending.visible || connection.diff.pending.text;
             if !is_pending {
                 break;
             }

@@ -152,7 +152,7 @@ impl Dashboard {
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
             let Ok(event) = self.terminal_io.input.recv_timeout(left) else { break };
             self.enqueue(event, &mut Vec::new());
-            if !self.frames.flow.is_waiting() {
+            if self.frames.flow.awaits().is_none() {
                 break;
             }
         }

@@ -161,7 +161,7 @@ impl FramePipeline {
     /// next event. `changed` is `true` if the model has changed since the last frame, and `answers`
     /// if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
-        let pending = self.diff.pending();
+        let pending = self.diff.pending;
         let text = changed || pending.text || !self.removal.is_empty();
         let may = || self.flow.allowance(now, false).is_some_and(|budget| budget.picture);
         if let Some(upload) = &self.upload
@@ -223,7 +223,7 @@ impl FramePipeline {
             upload.seen |= frame.picture;
         }
         if bytes.len() == empty && self.clipboard.is_empty() && self.removal.is_empty() {
-            let pending = self.diff.pending();
+            let pending = self.diff.pending;
             let follows =
                 |upload: &ImageUpload| upload.is_unfinished() && upload.follows(pending.visible);
             if !pending.text && self.upload.as_ref().is_some_and(follows) {

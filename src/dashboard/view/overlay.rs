@@ -24,13 +24,15 @@ pub fn draw(model: &Model, painter: &mut Painter) -> Option<Position> {
         Overlay::ViewerImage(_) => return None,
     };
     painter.overlay(place.frame, title);
-    let mut on = OverlayPainter { place, theme: painter.theme, painter };
+    let mut painter = OverlayPainter { place, theme: painter.theme, painter };
     match overlay {
-        Overlay::NoiseTargets(at) => on.noise_targets(model, at.index),
-        Overlay::Pick(pick) => return on.pick(pick),
-        Overlay::Form(_) => return fields::draw(model, (place.list, place.help), true, on.painter),
-        Overlay::Prompt(prompt) => return on.prompt(prompt),
-        Overlay::Question(question) => on.question(question),
+        Overlay::NoiseTargets(at) => painter.noise_targets(model, at.index),
+        Overlay::Pick(pick) => return painter.pick(pick),
+        Overlay::Form(_) => {
+            return fields::draw(model, (place.list, place.help), true, painter.painter);
+        }
+        Overlay::Prompt(prompt) => return painter.prompt(prompt),
+        Overlay::Question(question) => painter.question(question),
         Overlay::ViewerImage(_) => {}
     }
     None

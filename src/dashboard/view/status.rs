@@ -91,23 +91,12 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(6, vec![plain(rate(link.rate))]));
     }
     if !watching {
-        parts.extend(machine(report, theme));
+        let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
+        let plural = if report.threads == 1 { "" } else { "s" };
+        parts.push(part(7, vec![dim(precision)]));
+        parts.push(part(5, vec![dim(&format!("{} thread{plural}", report.threads))]));
     }
     parts
-}
-
-/// Returns the precision and the threads of the render.
-fn machine(report: &Report, theme: &Theme) -> [Part; 2] {
-    let dim = |text: &str| (text.to_string(), theme.dim());
-    let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
-    let threads = match report.threads {
-        1 => "1 thread".to_string(),
-        n => format!("{n} threads"),
-    };
-    [
-        Part { expendable: 7, text: vec![dim(precision)] },
-        Part { expendable: 5, text: vec![dim(&threads)] },
-    ]
 }
 
 /// Formats a rate, such as `118 KB/s`. More digits would change too often to read.

@@ -79,15 +79,11 @@ pub struct FrameDiff {
     version: u64,
     /// Time of the last change of `version`.
     version_at: Duration,
-    pending: Pending,
+    /// Differences that remain after the last frame.
+    pub pending: Pending,
 }
 
 impl FrameDiff {
-    /// Returns the differences that remain after the last frame.
-    pub fn pending(&self) -> Pending {
-        self.pending
-    }
-
     /// Records that other output has moved the cursor.
     pub fn moved(&mut self) {
         self.encoder.moved();

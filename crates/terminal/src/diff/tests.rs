@@ -93,7 +93,7 @@ impl Fixture {
         for i in 0..100 {
             self.frame(100_000 + i, within(20_000));
         }
-        assert_eq!((self.exact(), self.diff.pending()), (240, Pending::default()));
+        assert_eq!((self.exact(), self.diff.pending), (240, Pending::default()));
     }
 
     fn is_exact(&self, x: u16, y: u16) -> bool {
@@ -120,7 +120,7 @@ fn unlimited_frame_sends_all_cells() {
     assert!(frame.picture && bytes.starts_with(b"\x1b[m\x1b[2J"));
     assert_eq!(fixture.exact(), 240);
     assert!(fixture.parser.screen().contents().contains("words"));
-    assert_eq!(fixture.diff.pending(), Pending::default());
+    assert_eq!(fixture.diff.pending, Pending::default());
     assert_eq!(fixture.frame(1, EVERYTHING).1, b"");
     // If one cell changes, only this cell is sent.
     fixture.cells[(5, 5)].set_bg(Color::Rgb(1, 2, 3));
@@ -140,9 +140,9 @@ fn text_precedes_picture_within_the_budget() {
     assert!(frame.picture);
     let text = fixture.parser.screen().contents();
     assert_eq!(text.matches("a line of text of some length").count(), 3);
-    assert!(fixture.diff.pending().visible && !fixture.diff.pending().text);
+    assert!(fixture.diff.pending.visible && !fixture.diff.pending.text);
     let mut frames = 1;
-    while fixture.diff.pending().visible {
+    while fixture.diff.pending.visible {
         assert!(fixture.frame(100 * frames, within(400)).1.len() <= 400);
         frames += 1;
         assert!(frames < 100);
@@ -160,7 +160,7 @@ fn text_only_budget_sends_no_picture() {
     let (frame, _) = fixture.frame(0, text_only);
     assert_eq!((frame, fixture.exact()), (Frame::default(), 0));
     assert!(fixture.parser.screen().contents().contains("words"));
-    assert!(fixture.diff.pending().visible);
+    assert!(fixture.diff.pending.visible);
     assert_eq!(fixture.frame(1, text_only).1, b"");
     // Text that does not fit into the budget is sent row by row.
     let long: String = ('a'..='z').chain('0'..='9').collect();
@@ -170,7 +170,7 @@ fn text_only_budget_sends_no_picture() {
         let (_, bytes) = fixture.frame(2, narrow);
         assert!(bytes.len() <= 120, "{}", bytes.len());
         assert_eq!(fixture.parser.screen().contents().matches(&long).count(), rows);
-        assert_eq!(fixture.diff.pending().text, rows < 3);
+        assert_eq!(fixture.diff.pending.text, rows < 3);
     }
 }
 
@@ -207,7 +207,7 @@ fn invisible_differences_wait_for_idle_time() {
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 101]);
     fixture.samples = 2.0;
     assert_eq!(fixture.frame(100, within(20_000)).1, b"");
-    let Pending { visible, hidden, .. } = fixture.diff.pending();
+    let Pending { visible, hidden, .. } = fixture.diff.pending;
     assert_eq!((visible, hidden), (false, Some(ms(100) + IDLE)));
     // After `IDLE` without a change of the picture, invisible differences are sent in slices of at
     // most half of the byte budget.
@@ -217,7 +217,7 @@ fn invisible_differences_wait_for_idle_time() {
     // refinement.
     fixture.settled = true;
     assert_eq!(fixture.frame(2300, FrameBudget { refinement: 0, ..within(4000) }).1, b"");
-    while fixture.diff.pending().hidden.is_some() {
+    while fixture.diff.pending.hidden.is_some() {
         assert!(fixture.frame(2400, within(4000)).0.flushed > 0);
     }
     assert_eq!(fixture.exact(), 240);
@@ -233,7 +233,7 @@ fn cells_are_compared_after_enough_new_samples() {
     fixture.samples = 17.0;
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 150]);
     assert_eq!(fixture.frame(50, within(20_000)).1, b"");
-    assert!(!fixture.diff.pending().visible);
+    assert!(!fixture.diff.pending.visible);
     fixture.samples = 20.0;
     fixture.frame(100, within(20_000));
     assert_eq!(fixture.exact(), 240);
@@ -260,7 +260,7 @@ fn new_picture_appears_as_mosaic_first() {
         let wanted = 255 - 8 * (at.x - PICTURE.x) as i32;
         assert!((i32::from(r) - wanted).abs() < 90, "{at}: {r} for {wanted}");
     }
-    assert!(fixture.diff.pending().visible);
+    assert!(fixture.diff.pending.visible);
     fixture.finish();
 }
 

@@ -427,15 +427,11 @@ impl FlowControl {
         }
     }
 
-    /// Returns the longest time to wait for outstanding replies at the end of the program.
+    /// Returns the longest time to wait for outstanding replies at the end of the program; `None` if
+    /// there are none.
     pub fn awaits(&self) -> Option<Duration> {
         let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
         is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
-    }
-
-    /// Returns `true` if acknowledgements are outstanding.
-    pub fn is_waiting(&self) -> bool {
-        !self.in_flight.is_empty()
     }
 
     /// Returns the largest number of bytes of the next frame.
