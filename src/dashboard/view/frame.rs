@@ -1,6 +1,6 @@
 //! Border of the picture's panel, with file name, mode and settings of the display.
 
-use crate::dashboard::text::{columns, cut, number};
+use crate::dashboard::text::{cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
@@ -17,20 +17,15 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
     let focused = is_active(model, Focus::Picture);
     painter.panel(area, "", focused);
-    let chips = chips(model);
-    let chip_columns: usize = chips.iter().map(|(text, _)| columns(text) + 3).sum();
     let mut row = painter.edge(area, 0);
-    if chip_columns + 12 <= row.left() {
-        for (text, loud) in chips.iter().rev() {
-            let style = if *loud { theme.warn() } else { theme.dim() };
-            row.put_right(&format!(" {text} "), 0, style);
-            row.put_right("─", 0, theme.border(focused));
-        }
+    for (text, loud) in chips(model).iter().rev() {
+        let style = if *loud { theme.warn() } else { theme.dim() };
+        // The name has at least 12 columns.
+        row.put_right(&format!(" {text} "), 13, style);
+        row.put_right("─", 12, theme.border(focused));
     }
-    let name = match focused {
-        true => theme.accent().add_modifier(Modifier::BOLD),
-        false => theme.text().add_modifier(Modifier::BOLD),
-    };
+    let name = if focused { theme.accent() } else { theme.text() };
+    let name = name.add_modifier(Modifier::BOLD);
     let unsaved = if model.is_unsaved() { 2 } else { 0 };
     let room = row.left().saturating_sub(2 + unsaved);
     row.put(" ", name).put(&cut(&model.file.name, room), name);
@@ -39,11 +34,7 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
     row.put(" ", name);
     if let Some(mode) = mode(model) {
-        painter
-            .edge(area, bottom)
-            .put(" ", theme.accent())
-            .put(&mode, theme.accent())
-            .put(" ", theme.accent());
+        painter.edge(area, bottom).put(&format!(" {mode} "), theme.accent());
     }
     if let Some(legend) = legend {
         legend.draw(painter.edge(area, bottom));

@@ -5,7 +5,6 @@ use crate::dashboard::view::false_color::{Scale, difference, magnitude};
 use crate::dashboard::view::painter::Row;
 use crate::dashboard::view::picture::paint;
 use ratatui::layout::Rect;
-use ratatui::style::Style;
 use zerkalo_terminal::cells::{Raster, picture_cells};
 
 const BAR: usize = 12;
@@ -37,27 +36,18 @@ impl Legend {
         }
     }
 
-    fn columns(&self) -> usize {
-        columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
-    }
-
     /// Draws the legend at the right end of the row, without the unit if there is no room for it.
     pub fn draw(&self, mut line: Row) {
         let theme = line.theme;
-        let words = columns(&self.unit) + 1;
-        let (width, with_words) = match line.left() {
-            left if left >= self.columns() => (self.columns(), true),
-            left if left >= self.columns() - words => (self.columns() - words, false),
-            _ => return,
-        };
-        line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
-        line.put(" ", theme.text());
-        let bar = Rect { x: line.x, y: line.y, width: BAR as u16, height: 1 };
-        line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
-        if with_words {
-            line.put(" ", Style::new()).put(&self.unit, theme.dim());
+        let needed = columns(&self.low) + columns(&self.high) + BAR + 4;
+        line.put_right(&format!("{} ", self.unit), needed, theme.dim());
+        if line.left() < needed {
+            return;
         }
-        line.put(" ", Style::new());
+        line.put_right(&format!(" {} ", self.high), 0, theme.text());
+        line.put_right(&" ".repeat(BAR), 0, theme.text());
+        let bar = Rect { x: line.end, y: line.y, width: BAR as u16, height: 1 };
+        line.put_right(&format!(" {} ", self.low), 0, theme.text());
         paint(&picture_cells(&self.bar, theme.colors, false), bar, line.buffer);
     }
 }

@@ -120,7 +120,8 @@ pub struct Row<'a> {
     pub theme: Theme,
     /// Column of the next text.
     pub x: u16,
-    end: u16,
+    /// First column to the right of the room that is left.
+    pub end: u16,
     pub y: u16,
 }
 

@@ -34,12 +34,10 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         return;
     }
     // The box is farthest from the mark.
-    let left = area.x + 2;
-    let right = area.x + area.width - WIDTH - 2;
-    let x_box = if column < area.x + area.width / 2 { right } else { left };
-    let top = area.y + 1;
-    let bottom = area.y + area.height - height - 1;
-    let y_box = if row < area.y + area.height / 2 { bottom } else { top };
+    let in_left = column < area.x + area.width / 2;
+    let in_upper = row < area.y + area.height / 2;
+    let x_box = if in_left { area.right() - WIDTH - 2 } else { area.x + 2 };
+    let y_box = if in_upper { area.bottom() - height - 1 } else { area.y + 1 };
     let frame = Rect { x: x_box, y: y_box, width: WIDTH, height };
     painter.overlay(frame, &format!("pixel {x}, {y}"));
     let inner = frame.inner(BORDER);
