@@ -72,12 +72,6 @@ pub struct Ended {
     pub kept: Result<Option<PathBuf>, String>,
 }
 
-impl Ended {
-    fn new(signalled: Option<u8>, kept: Result<Option<PathBuf>, String>) -> Self {
-        Self { signalled, exported: Vec::new(), kept }
-    }
-}
-
 /// Runs a dashboard until the user quits, a terminating signal arrives or the terminal is lost.
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
@@ -132,7 +126,7 @@ fn run_on_terminal(
     let capabilities = query_capabilities(&screen.tty(), &mut input, environment, &ending);
     let Ok((terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
     else {
-        return Ok(Ended::new(Some(HUNG_UP), Ok(None)));
+        return Ok(Ended { signalled: Some(HUNG_UP), exported: Vec::new(), kept: Ok(None) });
     };
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
@@ -182,7 +176,7 @@ fn end(
     // The remaining writes may take a while.
     drop(screen);
     let kept = dashboard.effects.finish(deadline);
-    let mut ended = Ended::new(result?, kept);
+    let mut ended = Ended { signalled: result?, exported: Vec::new(), kept };
     for message in dashboard.done.try_iter() {
         if let Message::Exported(result) = message {
             ended.exported.push(result);

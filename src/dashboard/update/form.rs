@@ -7,13 +7,13 @@ use zerkalo_scene::edit::{self, Edit, EditError};
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
-        self.open_pick("add an object".to_string(), edit::object_kinds(), 0, |c, kind| {
+        self.open_pick("add an object", edit::object_kinds(), 0, |c, kind| {
             c.open_form(kind, edit::add_object(c.scene(), kind, None));
         });
     }
 
     pub(super) fn pick_light(&mut self) {
-        self.open_pick("add a light".to_string(), edit::light_kinds(), 0, |c, kind| {
+        self.open_pick("add a light", edit::light_kinds(), 0, |c, kind| {
             c.open_form(&format!("{kind} light"), edit::add_light(c.scene(), kind));
         });
     }

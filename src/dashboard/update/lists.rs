@@ -1,7 +1,7 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
 use crate::dashboard::panel_lines::{outline, outline_position};
-use crate::dashboard::update::commands::COMMANDS;
+use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::dashboard::{
     Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
     UpdateContext,
@@ -108,40 +108,38 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn pick_command(&mut self) {
-        let entries = COMMANDS.iter().filter(|command| command.is_listed(self.model));
-        let entries = entries.map(|command| PickEntry {
+        let entry = |command: &Command| PickEntry {
             name: command.label.to_string(),
             note: command.chapter.to_string(),
             keys: match self.model.watch {
                 Some(_) => command.watch_keys(str::to_string),
                 None => command.all_keys(str::to_string),
             },
+        };
+        let listed = COMMANDS.iter().filter(|command| command.is_listed(self.model));
+        let entries: Vec<_> = listed.map(entry).collect();
+        self.open_pick("actions and keys", entries, 0, |c, label| {
+            if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
+                c.run(command);
+            }
         });
-        self.open_pick(
-            "actions and keys".to_string(),
-            entries.collect::<Vec<_>>(),
-            0,
-            |c, label| {
-                if let Some(command) = COMMANDS.iter().find(|command| command.label == label) {
-                    c.run(command);
-                }
-            },
-        );
     }
 
     /// Opens a list with the cursor on the entry with index `index`. The name of the picked entry is
     /// passed to `take`.
     pub(super) fn open_pick(
         &mut self,
-        title: String,
+        title: impl Into<String>,
         entries: Vec<impl Into<PickEntry>>,
         index: usize,
         take: fn(&mut UpdateContext<'_>, &str),
     ) {
         let entries: Vec<_> = entries.into_iter().map(Into::into).collect();
-        let (editor, found) = (Editor::default(), (0..entries.len()).collect());
+        let (title, editor) = (title.into(), Editor::default());
+        let found = (0..entries.len()).collect();
         let at = ListCursor { index, scroll: 0 };
         self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
+        self.move_cursor(0);
     }
 
     /// Updates the open list to the entries that match the search text, best match first.
