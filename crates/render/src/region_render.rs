@@ -59,7 +59,7 @@ impl RegionRender {
         threads: usize,
     ) -> Result<Self, String> {
         let start = Instant::now();
-        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
+        let pool = threads::pool(threads).map_err(|error| error.to_string())?;
         let rows_at_once = 0..rows.min(scene.film.size[1]);
         let state = RenderState::compile(Arc::clone(scene), options, None, rows_at_once)?;
         let report = Report {

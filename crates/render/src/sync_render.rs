@@ -28,7 +28,7 @@ impl SyncRender {
         settings: Settings,
         threads: usize,
     ) -> io::Result<Self> {
-        let pool = threads::pool(threads, 0)?;
+        let pool = threads::pool(threads)?;
         let state =
             RenderState::new(&Arc::new(scene.clone()), options, None).map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };

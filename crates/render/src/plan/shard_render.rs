@@ -46,7 +46,7 @@ impl ShardRender {
         rays: u64,
         threads: usize,
     ) -> Result<Self, String> {
-        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
+        let pool = threads::pool(threads).map_err(|error| error.to_string())?;
         let mut remaining = VecDeque::new();
         let mut samples = [0; 2];
         for (tile, range) in ranges.iter().enumerate() {

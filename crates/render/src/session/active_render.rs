@@ -162,11 +162,6 @@ impl ActiveRender {
         self.estimates_stale = true;
     }
 
-    /// Forgets the speed of tracing, after a change of the threads.
-    pub fn reset_speed(&mut self) {
-        self.speed = None;
-    }
-
     /// Records the report of a wave that took the time `traced_for`.
     fn complete(&mut self, wave: &Wave, report: &WaveReport, traced_for: Duration) {
         let before = self.schedule.samples;

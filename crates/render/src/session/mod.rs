@@ -57,7 +57,6 @@ enum Command {
     View(View),
     Stop(Stop),
     Display(Display),
-    Pool(rayon::ThreadPool),
     Task(Task),
     Quit,
 }
@@ -115,7 +114,7 @@ impl Session {
         threads: usize,
         run: impl FnOnce(Receiver<Command>, WorkContext) -> F,
     ) -> io::Result<Self> {
-        let pool = threads::pool(threads, 0)?;
+        let pool = threads::pool(threads)?;
         let (commands, inbox) = unbounded();
         let (publisher, snapshots) = bounded(1);
         let shared = Arc::new(Shared::default());
@@ -173,13 +172,6 @@ impl Session {
     /// Sets the display transform of the picture whose noise is estimated.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
-    }
-
-    /// Sets the number of tracing threads (0: one per processor) and their niceness, 0 to 19 (on
-    /// Linux). If a thread cannot be started, returns the error, and the old threads are kept.
-    pub fn set_threads(&self, threads: usize, niceness: i32) -> io::Result<()> {
-        self.send(Command::Pool(threads::pool(threads, niceness)?));
-        Ok(())
     }
 
     pub fn set_paused(&self, paused: bool) {

@@ -84,8 +84,7 @@ impl Watcher {
                     | Command::Resume(..)
                     | Command::Restart(_)
                     | Command::Pause(_)
-                    | Command::Stop(_)
-                    | Command::Pool(_),
+                    | Command::Stop(_),
                 ) => {}
                 Err(RecvTimeoutError::Timeout) => {
                     let start = Instant::now();

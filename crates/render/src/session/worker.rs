@@ -111,10 +111,6 @@ impl Worker {
                 self.work().into_iter().for_each(|work| work.schedule.set_stop(stop));
             }
             Command::Display(display) => self.set_display(display),
-            Command::Pool(pool) => {
-                self.context.pool = pool;
-                self.work().into_iter().for_each(ActiveRender::reset_speed);
-            }
             Command::Task(task) => self.tasks.push(task),
             Command::Quit => return ControlFlow::Break(()),
         }
