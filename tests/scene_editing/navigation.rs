@@ -130,7 +130,7 @@ fn look_roll_and_zoom() {
     let tilt = rolled.frame()[1].dot(start.frame()[0]);
     assert!((tilt - 1.0).abs() < 1e-5, "up is to the right of where it was: {tilt}");
     assert_eq!(start.zoom(1.0), start);
-    let narrow = start.zoom(0.5).view_angle.key_degrees().1;
+    let narrow = start.zoom(0.5).view_angle.degrees();
     let expected = 2.0 * (20f64.to_radians().tan() * 0.5).atan().to_degrees();
     assert!((narrow - expected).abs() < 0.01, "{narrow} {expected}");
     let narrowest = (0..99).fold(start.clone(), |camera, _| camera.zoom(0.5));

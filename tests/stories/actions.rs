@@ -107,12 +107,8 @@ fn camera_stories() -> Vec<Story> {
         story("look down", "w Down", |a, d| eye(a) == eye(d) && target(d)[1] < 1.0),
         story("roll left", "Alt-Left", |_, d| d.scene().camera.up[0] != 0.0),
         story("roll right", "Alt-Right Alt-Left", |a, d| a.camera == d.scene().camera),
-        story("narrower view angle", "Alt-Up", |_, d| {
-            d.scene().camera.view_angle.key_degrees().1 < 40.0
-        }),
-        story("wider view angle", "Alt-Down", |_, d| {
-            d.scene().camera.view_angle.key_degrees().1 > 40.0
-        }),
+        story("narrower view angle", "Alt-Up", |_, d| d.scene().camera.view_angle.degrees() < 40.0),
+        story("wider view angle", "Alt-Down", |_, d| d.scene().camera.view_angle.degrees() > 40.0),
         story("fly the camera", "w", |_, d| d.model.mode == Mode::Fly),
         story("fly forward", "w w", |_, d| eye(d)[2] < 5.0 && target(d)[2] < 0.0),
         story("fly back", "w s", |_, d| eye(d)[2] > 5.0),

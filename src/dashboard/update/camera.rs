@@ -71,8 +71,8 @@ impl UpdateContext<'_> {
     /// Widens the view by `steps` steps of about 5 %; negative steps narrow it.
     pub(super) fn view_angle(&mut self, steps: i32) {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
-        let (key, degrees) = self.scene().camera.view_angle.key_degrees();
-        self.say(format!("{key} view angle {degrees}°"));
+        let angle = self.scene().camera.view_angle;
+        self.say(format!("{} view angle {}°", angle.key(), angle.degrees()));
     }
 
     /// Moves the camera so that the selection, or else the whole scene, fills the picture.

@@ -60,7 +60,7 @@ impl Camera {
             ViewAngle::Vertical(_) => HALF_FILM_HEIGHT,
             ViewAngle::Horizontal(_) => HALF_FILM_WIDTH,
         };
-        half / (0.5 * self.view_angle.key_degrees().1).to_radians().tan()
+        half / (0.5 * self.view_angle.degrees()).to_radians().tan()
     }
 
     /// Returns the distance of the plane in focus from the eye along the view direction, greater

@@ -50,12 +50,10 @@ one_of! {
 pub const FIELDS: &[Field] = Camera::FIELDS;
 
 impl ViewAngle {
-    /// Returns the key in scene files, and the angle in degrees.
-    pub fn key_degrees(&self) -> (&'static str, f64) {
-        match *self {
-            Self::Vertical(degrees) => ("vertical", degrees),
-            Self::Horizontal(degrees) => ("horizontal", degrees),
-        }
+    /// Returns the angle in degrees.
+    pub fn degrees(&self) -> f64 {
+        let (Self::Vertical(degrees) | Self::Horizontal(degrees)) = *self;
+        degrees
     }
 }
 

@@ -28,7 +28,7 @@ impl Camera {
     /// Returns half the width and half the height of the picture, on the picture plane at unit
     /// distance. `aspect` is width divided by height.
     pub fn half_size(&self, aspect: f64) -> [f64; 2] {
-        let (_, degrees) = self.view_angle.key_degrees();
+        let degrees = self.view_angle.degrees();
         let half = (0.5 * degrees).to_radians().tan();
         match self.view_angle {
             ViewAngle::Vertical(_) => [half * aspect, half],

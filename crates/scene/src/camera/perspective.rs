@@ -47,7 +47,7 @@ impl PerspectiveCamera {
         let [u, v, w] = camera.frame();
         let (width, height) = (f64::from(width), f64::from(height));
         // Half the width and half the height of the picture plane at unit distance from the eye.
-        let half = (0.5 * camera.view_angle.key_degrees().1).to_radians().tan();
+        let half = (0.5 * camera.view_angle.degrees()).to_radians().tan();
         let (half_width, half_height) = match camera.view_angle {
             ViewAngle::Vertical(_) => (half * width / height, half),
             ViewAngle::Horizontal(_) => (half, half * height / width),

@@ -369,9 +369,10 @@ mod tests {
         assert!(angle < 1e-5 && camera(&back).direction.is_none(), "{angle}");
         let wide = set(&scene, &Target::Camera, "view_angle", "horizontal").unwrap().scene;
         let expected = 2.0 * (20f64.to_radians().tan() * 4.0 / 3.0).atan().to_degrees();
-        let (key, degrees) = wide.camera.view_angle.key_degrees();
-        assert!(key == "horizontal" && (degrees - expected).abs() < 1e-3, "{degrees}");
+        let angle = wide.camera.view_angle;
+        let degrees = angle.degrees();
+        assert!(angle.key() == "horizontal" && (degrees - expected).abs() < 1e-3, "{degrees}");
         let back = set(&wide, &Target::Camera, "view_angle", "v").unwrap().scene;
-        assert!((back.camera.view_angle.key_degrees().1 - 40.0).abs() < 1e-3);
+        assert!((back.camera.view_angle.degrees() - 40.0).abs() < 1e-3);
     }
 }

@@ -157,28 +157,28 @@ impl Light {
     }
 
     pub fn faults(&self) -> Vec<ValidationError> {
-        let unused_key = if self.falloff == Falloff::InverseSquare && self.apex().is_none() {
-            Some(ValidationError::new(
-                "falloff",
-                "falloff is \"inverse-square\", but only a point or spot light has a falloff",
-                "falloff \"none\", or a point or spot light",
-            ))
-        } else if self.unit == LightUnit::Power && self.surface().is_none() {
-            Some(ValidationError::new(
-                "unit",
-                "unit is \"power\", but only a sphere, rectangle or disk has one",
-                "unit \"radiance\", or a light with a size",
-            ))
-        } else if !self.visible && !self.has_radiance() {
-            Some(ValidationError::new(
-                "visible",
-                "visible is false, but no light of this kind is visible",
-                "visible = true, or a light with a size or an environment",
-            ))
-        } else {
-            None
+        let unused = |key, is_given: bool, found, expected| {
+            (is_given && !self.has_key(key)).then(|| ValidationError::new(key, found, expected))
         };
-        self.validator().and(unused_key).errors()
+        let falloff = unused(
+            "falloff",
+            self.falloff != Falloff::None,
+            "falloff is \"inverse-square\", but only a point or spot light has a falloff",
+            "falloff \"none\", or a point or spot light",
+        );
+        let unit = unused(
+            "unit",
+            self.unit != LightUnit::Radiance,
+            "unit is \"power\", but only a sphere, rectangle or disk has one",
+            "unit \"radiance\", or a light with a size",
+        );
+        let visible = unused(
+            "visible",
+            !self.visible,
+            "visible is false, but no light of this kind is visible",
+            "visible = true, or a light with a size or an environment",
+        );
+        self.validator().and(falloff).and(unit).and(visible).errors()
     }
 }
 
