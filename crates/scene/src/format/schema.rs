@@ -129,7 +129,7 @@ impl SchemaReader<'_> {
     fn place(&self) -> String {
         match self.inner() {
             inner if inner.is_empty() => inner,
-            inner => format!(" in {}", truncated(&inner)),
+            inner => format!(" in {inner}"),
         }
     }
 
