@@ -6,10 +6,7 @@ use crate::asset::image::Image;
 use crate::asset::mesh;
 use crate::asset::radiance_map::RadianceMap;
 use crate::process_memory::missing_memory;
-use crate::value::sort_by_number;
-use std::collections::HashMap;
 use std::fmt;
-use std::hash::Hash;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
@@ -59,7 +56,7 @@ impl fmt::Display for LoadProgress {
 }
 
 /// Cache key of one version of a file.
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq, Eq)]
 struct Key {
     path: PathBuf,
     modified: Option<SystemTime>,
@@ -69,57 +66,38 @@ struct Key {
 /// Content of a file or the error of reading it. Empty until the file has been read.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// Cache of files of one type. The map has the number of the last use of each entry.
-struct Cache<T> {
-    files: HashMap<Key, (CacheEntry<T>, u64)>,
-    last_used: u64,
-}
+/// Files of one type, the most recently used first.
+struct Cache<T>(Vec<(Key, CacheEntry<T>)>);
 
 impl<T> Default for Cache<T> {
     fn default() -> Self {
-        Self { files: HashMap::new(), last_used: 0 }
+        Self(Vec::new())
     }
 }
 
 impl<T> Cache<T> {
     /// Returns the entry for `key`, a new one if necessary. Removes other versions of the file.
-    fn entry(&mut self, key: &Key) -> CacheEntry<T> {
-        self.last_used += 1;
-        self.files.retain(|k, _| k.path != key.path || k == key);
-        let (entry, last_used) = self.files.entry(key.clone()).or_default();
-        *last_used = self.last_used;
-        entry.clone()
+    fn entry(&mut self, key: Key) -> CacheEntry<T> {
+        let known = self.0.iter().find(|(k, _)| *k == key).map(|(_, entry)| entry.clone());
+        self.0.retain(|(k, _)| k.path != key.path);
+        let entry = known.unwrap_or_default();
+        self.0.insert(0, (key, entry.clone()));
+        entry
     }
 
     /// Evicts unused files, the least recently used first, down to [`UNUSED_BYTES`].
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
-        let unused: Vec<(u64, usize, Key)> = self
-            .files
-            .iter()
-            .filter_map(|(key, (entry, last_used))| {
-                let bytes = match entry.get()? {
-                    Ok(file) if Arc::strong_count(file) == 1 => bytes_of(file),
-                    Ok(_) => return None,
-                    Err(_) => 0,
-                };
-                Some((*last_used, bytes, key.clone()))
-            })
-            .collect();
-        for key in beyond_limit(unused) {
-            self.files.remove(&key);
-        }
+        let mut sum = 0usize;
+        self.0.retain(|(_, entry)| {
+            let bytes = match entry.get() {
+                Some(Ok(file)) if Arc::strong_count(file) == 1 => bytes_of(file),
+                Some(Err(_)) => 0,
+                Some(Ok(_)) | None => return true,
+            };
+            sum = sum.saturating_add(bytes);
+            sum <= UNUSED_BYTES
+        });
     }
-}
-
-/// Returns the keys to evict. `unused` has number of the last use, memory in bytes and key.
-fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
-    sort_by_number(&mut unused, |(last_used, ..)| -(*last_used as i64));
-    let mut sum = 0usize;
-    let exceeds = |(_, bytes, key): (u64, usize, Key)| {
-        sum = sum.saturating_add(bytes);
-        (sum > UNUSED_BYTES).then_some(key)
-    };
-    unused.into_iter().filter_map(exceeds).collect()
 }
 
 /// Cache of all asset files that scenes name, shared by scenes and threads. A file is read again
@@ -215,7 +193,7 @@ fn load<T>(
         modified: metadata.modified().ok(),
         bytes: metadata.len(),
     };
-    let entry = locked(cache).entry(&key);
+    let entry = locked(cache).entry(key.clone());
     let file = entry.get_or_init(|| read(&key).map(Arc::new)).clone();
     locked(cache).evict(bytes_of);
     file
@@ -257,7 +235,7 @@ mod tests {
         std::fs::write(&path, format!("{TRIANGLE}f 3 2 1\n")).unwrap();
         assert_eq!(assets.mesh(&path).unwrap().mesh.triangles.len(), 2);
         assert_eq!(reads.load(Ordering::SeqCst), 2);
-        assert_eq!(locked(&assets.meshes).files.len(), 1);
+        assert_eq!(locked(&assets.meshes).0.len(), 1);
     }
 
     #[test]
@@ -280,7 +258,7 @@ mod tests {
         let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
         let put = |cache: &mut Cache<usize>, name| {
             let file = Arc::new(UNUSED_BYTES / 2);
-            cache.entry(&key(name)).set(Ok(file.clone())).unwrap();
+            cache.entry(key(name)).set(Ok(file.clone())).unwrap();
             file
         };
         let held = put(&mut cache, "held");
@@ -288,11 +266,12 @@ mod tests {
             drop(put(&mut cache, name));
         }
         cache.evict(|bytes| *bytes);
-        let known = |cache: &Cache<usize>, name| cache.files.contains_key(&key(name));
+        let known =
+            |cache: &Cache<usize>, name| cache.0.iter().any(|(known, _)| *known == key(name));
         assert!(known(&cache, "held") && !known(&cache, "a"));
         assert!(known(&cache, "b") && known(&cache, "c"));
         drop(held);
-        cache.entry(&key("b"));
+        cache.entry(key("b"));
         cache.evict(|bytes| *bytes);
         assert!(!known(&cache, "held") && known(&cache, "b") && known(&cache, "c"));
     }
