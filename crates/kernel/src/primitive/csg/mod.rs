@@ -137,6 +137,7 @@ impl<S: Float> Compound<S> {
 
     /// Replaces `hit` in the lanes of `wanted` whose ray hits the compound nearer than `hit`. The ids
     /// of its parts begin with `first_id`.
+    #[inline(never)]
     fn intersect<L: SimdFloat<Scalar = S>>(
         &self,
         first_id: u32,
@@ -183,14 +184,14 @@ impl<S: Float> Compound<S> {
 }
 
 impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
-    #[inline(never)]
+    #[inline(always)]
     fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         if self.part == 0 {
             self.compound.intersect(id, ray, L::mask(true), hit);
         }
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask> {
         if self.part > 0 || wanted.none() {
             return None;
