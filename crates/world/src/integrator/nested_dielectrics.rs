@@ -301,8 +301,8 @@ fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, dista
     } else {
         Vec3::from_fn(of)
     };
-    let left = |c: L| (-(c * distance)).exp();
-    Vec3::new(left(coefficients.x), left(coefficients.y), left(coefficients.z))
+    let fraction = |c: L| (-(c * distance)).exp();
+    Vec3::new(fraction(coefficients.x), fraction(coefficients.y), fraction(coefficients.z))
 }
 
 #[cfg(test)]
