@@ -17,19 +17,6 @@ use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::session::Session;
 use zerkalo_scene::{Scene, SceneFile};
 
-/// Action that the event loop must take after it has executed an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Continue. Results of the effect, if there are any, arrive as messages.
-    Done,
-    /// Await a picture of this generation, which the renderer has started.
-    Rendering(u64),
-    /// Suspend the program and give the terminal back to the shell.
-    Suspend,
-    /// End the dashboard and the program.
-    Quit,
-}
-
 /// Executor of effects: the session, the threads of the scene file, and the exports.
 pub struct EffectRunner {
     /// Renderer of the scene, or reader of watched films.
@@ -88,13 +75,14 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
-    /// Executes `effect`. Its results arrive as messages.
-    pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
+    /// Executes `effect`. Its results arrive as messages. Returns the generation of the picture that
+    /// it makes the renderer start.
+    pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Option<u64> {
         match effect {
-            Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
-            Effect::Restart => return Outcome::Rendering(self.session.restart()),
-            Effect::Suspend => return Outcome::Suspend,
-            Effect::Quit => return Outcome::Quit,
+            Effect::Show(scene) => return Some(self.session.set_scene(scene)),
+            Effect::Restart => return Some(self.session.restart()),
+            // The event loop suspends or quits after the present messages.
+            Effect::Suspend | Effect::Quit => {}
             Effect::Display(display) => self.session.set_display(display),
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
@@ -124,7 +112,7 @@ impl EffectRunner {
                 self.edit(|editing| editing.resized.iter().for_each(ResizedExport::cancel));
             }
         }
-        Outcome::Done
+        None
     }
 
     /// Calls `act` unless this is `zerkalo watch`, which neither edits nor renders.

@@ -1,7 +1,7 @@
 //! Event loop of the dashboard. One thread updates the model and draws it. Work that may block runs
 //! in other threads, whose results come back through channels.
 
-use crate::dashboard::run::effects::{EffectRunner, Outcome};
+use crate::dashboard::run::effects::EffectRunner;
 use crate::dashboard::run::exports::image_upload::ImageUpload;
 use crate::dashboard::run::frames::{DrawOutcome, FramePipeline};
 use crate::dashboard::run::input::{self, Input};
@@ -165,20 +165,17 @@ impl Dashboard {
         let is_snapshot = matches!(message, Message::Snapshot(_));
         let version = self.model.picture_version;
         for effect in update(&mut self.model, message, self.began.elapsed()) {
+            self.suspend |= effect == Effect::Suspend;
+            self.quit |= effect == Effect::Quit;
             let is_edit = matches!(effect, Effect::Show(_));
-            match self.effects.run(effect, &mut self.frames) {
-                Outcome::Done => {}
-                Outcome::Rendering(generation) => {
-                    // A change of lights alone needs none: the snapshot has one picture per light
-                    // group.
-                    let snapshot = self.model.snapshot.as_deref();
-                    let mix = snapshot.and_then(|s| s.mix_for(self.model.scene()));
-                    if !is_edit || mix.is_none() {
-                        awaited = Some(generation);
-                    }
+            if let Some(generation) = self.effects.run(effect, &mut self.frames) {
+                // A change of lights alone needs none: the snapshot has one picture per light
+                // group.
+                let snapshot = self.model.snapshot.as_deref();
+                let mix = snapshot.and_then(|s| s.mix_for(self.model.scene()));
+                if !is_edit || mix.is_none() {
+                    awaited = Some(generation);
                 }
-                Outcome::Suspend => self.suspend = true,
-                Outcome::Quit => self.quit = true,
             }
         }
         if version != self.model.picture_version && awaited.is_none() && !is_snapshot {
