@@ -110,14 +110,9 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
         Some(rest) => rest.strip_suffix(']')?,
         None => text,
     };
-    let words: Vec<_> =
-        inner.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty()).collect();
-    let is_number = |at: usize| words.get(at).is_some_and(|word| digits(word));
-    let between = |at: usize| {
-        ["x", "×"].contains(&words[at]) && at > 0 && is_number(at - 1) && is_number(at + 1)
-    };
-    let parts = (0..words.len()).filter(|at| !between(*at));
-    let parts = parts.flat_map(|at| words[at].split(['x', '×']));
+    let joined = inner.replace('×', "x").replace(" x ", "x");
+    let words = joined.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty());
+    let parts = words.flat_map(|word| word.split('x'));
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 

@@ -38,27 +38,20 @@ impl CommentKeeper {
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         sort_by_number(&mut comments, |(position, _)| -*position as i64);
+        let mut positions = Vec::new();
+        for_each_table(document.as_table_mut(), &mut |table| positions.extend(table.position()));
         for (position, comment) in comments {
-            let mut after: Option<isize> = None;
+            let Some(after) = positions.iter().copied().filter(|p| *p > position).min() else {
+                let end = document.trailing().as_str().unwrap_or_default();
+                let comment = comment.trim_end_matches('\n');
+                document.set_trailing(format!("{comment}\n{end}"));
+                continue;
+            };
             for_each_table(document.as_table_mut(), &mut |table| {
-                if let Some(p) = table.position().filter(|p| *p > position) {
-                    after = Some(after.map_or(p, |a| a.min(p)));
+                if table.position() == Some(after) {
+                    put_above(table, &comment);
                 }
             });
-            match after {
-                Some(after) => for_each_table(document.as_table_mut(), &mut |table| {
-                    if table.position() == Some(after) {
-                        put_above(table, &comment);
-                    }
-                }),
-                None => {
-                    let end = document.trailing().as_str().unwrap_or_default();
-                    document.set_trailing(format!(
-                        "{}{end}",
-                        comment.trim_end_matches('\n').to_owned() + "\n"
-                    ));
-                }
-            }
         }
     }
 }
