@@ -203,7 +203,7 @@ impl<'a> Part<'a> {
         let mut uvs = uvs.map(|a| self.pairs(a)).transpose()?;
         self.add_color(builder)?;
         let indices = self.primitive.indices();
-        let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar, a.data_type()));
+        let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar));
         let indices = indices.transpose()?;
         let corners = indices.as_ref().map_or(vertices, |s| s.count);
         let linear = self.map.matrix3;
@@ -262,7 +262,7 @@ impl<'a> Part<'a> {
         &self,
         accessor: Accessor<'a>,
     ) -> Result<impl Iterator<Item = [f32; 3]>, AssetError> {
-        let slice = self.slice(&accessor, Dimensions::Vec3, DataType::F32)?;
+        let slice = self.slice(&accessor, Dimensions::Vec3)?;
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
@@ -270,7 +270,7 @@ impl<'a> Part<'a> {
     /// 0..=1, floats are unchanged.
     fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
         let kind = accessor.data_type();
-        let slice = self.slice(&accessor, Dimensions::Vec2, kind)?;
+        let slice = self.slice(&accessor, Dimensions::Vec2)?;
         Ok((0..slice.count).map(move |i| match kind {
             DataType::U8 => [0, 1].map(|k| f32::from(slice.item(i)[k]) / 255.0),
             DataType::U16 => {
@@ -282,30 +282,26 @@ impl<'a> Part<'a> {
     }
 
     /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
-    /// (such as a vector of three) and components of the type `kind`, and that all elements are
+    /// (such as a vector of three) and components of a type that is read, and that all elements are
     /// inside their buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
         dimensions: Dimensions,
-        kind: DataType,
     ) -> Result<Slice<'a>, AssetError> {
         let place = || FileLocation::Part(format!("accessors[{}]", accessor.index()));
         let wrong =
             |found: String, expected: &str| Err(self.source.error(place(), found, expected));
-        let (found, found_kind) = (accessor.dimensions(), accessor.data_type());
-        let fits = match dimensions {
-            Dimensions::Scalar => matches!(kind, DataType::U8 | DataType::U16 | DataType::U32),
-            Dimensions::Vec2 => matches!(kind, DataType::U8 | DataType::U16 | DataType::F32),
-            _ => kind == DataType::F32,
+        let (found, kind) = (accessor.dimensions(), accessor.data_type());
+        let (kinds, expected): (&[DataType], _) = match dimensions {
+            Dimensions::Scalar => {
+                (&[DataType::U8, DataType::U16, DataType::U32], "unsigned integers")
+            }
+            Dimensions::Vec2 => (&[DataType::U8, DataType::U16, DataType::F32], "pairs of numbers"),
+            _ => (&[DataType::F32], "triples of 32-bit floats"),
         };
-        if found != dimensions || found_kind != kind || !fits {
-            let expected = match dimensions {
-                Dimensions::Scalar => "unsigned integers",
-                Dimensions::Vec2 => "pairs of numbers",
-                _ => "triples of 32-bit floats",
-            };
-            return wrong(format!("the data is {found:?} of {found_kind:?}"), expected);
+        if found != dimensions || !kinds.contains(&kind) {
+            return wrong(format!("the data is {found:?} of {kind:?}"), expected);
         }
         if accessor.sparse().is_some() {
             return wrong("the accessor is sparse".to_string(), "one that is not");
