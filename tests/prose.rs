@@ -63,6 +63,9 @@ fn faults(text: &str, is_rust: bool) -> Vec<(usize, String)> {
         if is_doc && !in_doc && FIRST_WORDS.split(' ').any(|word| word == first) {
             found.push((number + 1, format!("begins with `{first}`")));
         }
+        if is_doc && text.starts_with("# Errors ") {
+            found.push((number + 1, "has a sentence in its heading".to_string()));
+        }
         // An empty line of a doc comment ends a paragraph, not the comment.
         in_doc = is_doc;
         let words = words(text);
@@ -89,8 +92,12 @@ fn doc_comments_begin_with_a_noun_and_no_text_has_avoided_words() {
 
 #[test]
 fn faults_are_found_in_comments_only() {
-    let text = "/// What is seen.\n/// Where it is.\nfn told() {}\n//! Noun.\n// A thing; `told` is code.\n";
-    let expected = [(1, "begins with `What`".to_string()), (5, "has `thing`".to_string())];
+    let text = "/// What is seen.\n/// # Errors Fails.\nfn told() {}\n//! Noun.\n// A thing; `told` is code.\n";
+    let expected = [
+        (1, "begins with `What`".to_string()),
+        (2, "has a sentence in its heading".to_string()),
+        (5, "has `thing`".to_string()),
+    ];
     assert_eq!(faults(text, true), expected);
     assert_eq!(faults("It is no mesh.", false), [(1, "has `is no mesh`".to_string())]);
 }

@@ -370,7 +370,8 @@ impl PictureArgs {
 
     /// Sets the size of `scene` to `--size`.
     ///
-    /// # Errors Returns the first validation error of the scene with the new size.
+    /// # Errors
+    /// Returns the first validation error of the scene with the new size.
     pub fn resize(&self, scene: &mut Scene) -> Result<(), String> {
         let Some(size) = self.size else { return Ok(()) };
         scene.film.size = size;

@@ -28,7 +28,8 @@ impl CheckpointWriter {
 
     /// Checks that a render may write checkpoints to `path`, or continue the checkpoint `resume`.
     ///
-    /// # Errors Fails if `path` cannot be written, or is an existing file other than `resume`.
+    /// # Errors
+    /// Fails if `path` cannot be written, or is an existing file other than `resume`.
     pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
         check_writable(path)?;
         if resume == Some(path) || !path.exists() {

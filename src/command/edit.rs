@@ -112,7 +112,8 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
 /// Opens the scene of a checkpoint: its scene file, if the samples are still valid for that,
 /// otherwise the scene stored in the checkpoint.
 ///
-/// # Errors Fails if the stored scene is not valid.
+/// # Errors
+/// Fails if the stored scene is not valid.
 fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
     let source = checkpoint.header.source().unwrap_or_default();
     if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
@@ -126,7 +127,8 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
 /// Opens the scene file at `path`. The inner error is for the dashboard, which shows it until the
 /// user has corrected the file.
 ///
-/// # Errors Fails if the file cannot be read.
+/// # Errors
+/// Fails if the file cannot be read.
 fn open(
     path: &Path,
     assets: Arc<Assets>,

@@ -73,7 +73,8 @@ fn target(plan: &Plan) -> String {
 
 /// Compares `origin` with the scene file at `path`.
 ///
-/// # Errors Fails if the file of `origin` shows another scene, or has no scene hash.
+/// # Errors
+/// Fails if the file of `origin` shows another scene, or has no scene hash.
 fn compare(origin: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
     let document = read_scene(path)?;
     let scene = document.scene();

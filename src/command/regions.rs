@@ -23,7 +23,8 @@ impl Division {
     /// Divides the picture so that the process uses at most `cap` bytes. The first choice is a film
     /// with all light groups, the second a film with one, the third a division.
     ///
-    /// # Errors Fails if the smallest regions do not fit, or if a checkpoint is requested or
+    /// # Errors
+    /// Fails if the smallest regions do not fit, or if a checkpoint is requested or
     /// resumed and a film with all light groups does not fit.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         // The measured memory of the process then includes the scene.

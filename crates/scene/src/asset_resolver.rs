@@ -33,7 +33,7 @@ impl AssetResolver {
         self.assets.clone()
     }
 
-    /// Sets the folder: that of the scene file `scene`.
+    /// Resolves file names relative to the folder of the scene file `scene` from now on.
     pub(super) fn move_to(&self, scene: &Path) {
         *self.folder.write().unwrap_or_else(PoisonError::into_inner) = folder_of(scene);
     }

@@ -64,7 +64,8 @@ pub(super) struct FirstDiagnostics {
 }
 
 impl FirstDiagnostics {
-    /// Adds a diagnostic at the byte offset `at`. `make` leaves out file, line and column.
+    /// Adds the diagnostic that `make` returns, without file, line and column, at the byte offset
+    /// `at`.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;

@@ -60,7 +60,8 @@ pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
 /// The query does not wait for a terminal outside a local tmux, which may never reply. The caller
 /// passes such a late reply to [`Capabilities::learn`].
 ///
-/// # Errors Fails if the terminal is closed.
+/// # Errors
+/// Fails if the terminal is closed.
 pub fn query_capabilities(
     tty: &Tty,
     input: &mut InputReader,
@@ -92,7 +93,8 @@ pub fn query_capabilities(
 /// Measures the round trip to the terminal outside a multiplexer, if there is one, by a request of
 /// the cursor position.
 ///
-/// # Errors Fails if the terminal is closed.
+/// # Errors
+/// Fails if the terminal is closed.
 pub fn query_passthrough(
     tty: &Tty,
     input: &mut InputReader,

@@ -41,7 +41,8 @@ impl InputReader {
 
     /// Waits for events until `deadline`, at which the list is empty.
     ///
-    /// # Errors Fails if the terminal is closed.
+    /// # Errors
+    /// Fails if the terminal is closed.
     pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<TimedEvent>> {
         if !self.early.is_empty() {
             return Ok(std::mem::take(&mut self.early));

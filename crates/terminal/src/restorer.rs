@@ -28,7 +28,8 @@ pub struct Restorer {
 impl Restorer {
     /// Starts the helper process, which would restore the present modes of the terminal at stdin.
     ///
-    /// # Errors Fails if there is no shell or no `stty`.
+    /// # Errors
+    /// Fails if there is no shell or no `stty`.
     pub fn start() -> io::Result<Self> {
         let modes = Command::new("stty").arg("-g").stdin(Stdio::inherit()).output()?.stdout;
         let mut shell = Command::new("/bin/sh")

@@ -44,7 +44,8 @@ pub struct Tty {
 
 /// Returns the columns and rows of the terminal, or 80 and 24 if it does not report them.
 ///
-/// # Errors Fails if there is no terminal.
+/// # Errors
+/// Fails if there is no terminal.
 pub fn size() -> io::Result<[u16; 2]> {
     let size = terminal::window_size()?;
     let is_known = size.columns > 0 && size.rows > 0;
@@ -126,7 +127,8 @@ impl Drop for Screen {
 impl Tty {
     /// Writes `bytes` in one call. Does nothing outside full-screen use.
     ///
-    /// # Errors Fails if the terminal is closed.
+    /// # Errors
+    /// Fails if the terminal is closed.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
         let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if self.entered.load(Ordering::Acquire) {
@@ -175,7 +177,8 @@ impl Tty {
 
     /// Resumes full-screen use, even if other programs have changed the modes.
     ///
-    /// # Errors Fails if the terminal is closed.
+    /// # Errors
+    /// Fails if the terminal is closed.
     pub fn resume(&self) -> io::Result<()> {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;

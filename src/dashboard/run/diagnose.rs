@@ -21,7 +21,8 @@ pub struct TerminalReport {
 
 /// Queries the capabilities of the terminal at stdin and stdout.
 ///
-/// # Errors Fails if there is no terminal, or the terminal is closed during the query.
+/// # Errors
+/// Fails if there is no terminal, or the terminal is closed during the query.
 pub fn diagnose(environment: Environment) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not know.
     let signals = SignalQueue::of_terminal()?;

@@ -190,7 +190,8 @@ impl EffectRunner {
     /// for pictures that are being written, or without limit if it is `None`. Returns the path of
     /// the recovery file, or `None` if there are no unsaved edits.
     ///
-    /// # Errors Fails with the reason if unsaved edits are lost.
+    /// # Errors
+    /// Fails with the reason if unsaved edits are lost.
     pub fn finish(self, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
         let Self { session, editing, exporting, .. } = self;
         let (kept, resized) = match editing {

@@ -55,8 +55,8 @@ pub fn draw(
     typing
 }
 
-/// Draws a field, with a label of `labels` columns. `chosen` is the state of the list if the field
-/// is under the cursor. Returns the position of the text cursor.
+/// Draws a field, with a label of `labels` columns. `chosen` is the state of the list if the panel
+/// has the focus and the field is under the cursor. Returns the position of the text cursor.
 fn draw_field(
     field: &FieldLine,
     chosen: Option<&FieldList>,

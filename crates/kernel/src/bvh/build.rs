@@ -51,7 +51,7 @@ pub struct BuildQuality {
     pub window: SearchWindow,
     /// Share of the nodes, 0 to 1, that reinsertion may move before small leaves are merged.
     pub reinsertion: f32,
-    /// Share of the nodes that reinsertion may move afterwards.
+    /// Share of the nodes, 0 to 1, that reinsertion may move after small leaves have been merged.
     pub second_reinsertion: f32,
     /// Cost of a node visit divided by the cost of a primitive's intersection test, in the surface
     /// area heuristic. A higher cost gives larger leaves.

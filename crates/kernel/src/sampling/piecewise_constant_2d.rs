@@ -31,7 +31,7 @@ pub struct PixelSample {
     pub x: f64,
     /// Cosine of the polar angle.
     pub cos: f64,
-    /// Density of the direction \[1/sr\].
+    /// Density of the direction [1/sr].
     pub density: f64,
 }
 
@@ -120,7 +120,7 @@ impl PiecewiseConstant2D {
         PixelSample { x, cos, density: self.density_in(row, column) }
     }
 
-    /// Returns the density \[1/sr\] of the direction at position `[x, y]`, 0..=1.
+    /// Returns the density [1/sr] of the direction at position `[x, y]`, 0..=1.
     pub fn density(&self, [x, y]: [f64; 2]) -> f64 {
         let rows = self.rows.len() - 1;
         // The conversion to integers saturates.

@@ -63,7 +63,7 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
-/// Samples a direction in the hemisphere around z with the density cos(theta) / pi \[1/sr\], where
+/// Samples a direction in the hemisphere around z with the density cos(theta) / pi [1/sr], where
 /// theta is the angle to z. Malley's method: a uniform point of the disk, lifted to the hemisphere.
 #[inline(always)]
 pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
@@ -330,12 +330,13 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
 ///
 /// A point (s, s') of the unit disk stands for the microfacet with the slopes (s, s') / sqrt(1 -
 /// s^2 - s'^2), in units of alpha. The points of all microfacets, visible or not, are uniform in
-/// the disk. Coordinate s is along the azimuth of the view. It is divided by half the chord of the
-/// disk at s'. Where both sides of the groove are visible, the visible microfacets have the
-/// distribution function s + sqrt(1 - s^2) tan(theta), up to a constant; theta is the angle between
-/// the stretched view and z. Where one side is visible, the function is twice that of all
-/// microfacets. Both functions have inverses in closed form: with s = sin(a), the first is sin(a +
-/// theta) / cos(theta).
+/// the disk. Coordinate s points away from the view, along its azimuth. From here on it is in units
+/// of half the chord of the disk at s', so that it is uniform in \[-1, 1\] over all microfacets.
+/// Where both sides of the groove are visible, the visible microfacets have the distribution
+/// function s + sqrt(1 - s^2) tan(theta), up to a constant; theta is the angle between the
+/// stretched view and z. Where one side is visible, the function is twice that of all microfacets.
+/// Both functions have inverses in closed form: with s = sin(a), the first is sin(a + theta) /
+/// cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();

@@ -69,8 +69,8 @@ struct Layout {
 struct Span {
     first: usize,
     len: usize,
-    /// Cells that overlap each pixel along the axis, each as its index from `first` and the
-    /// fraction of the pixel that it covers.
+    /// For each pixel along the axis, the cells that overlap it: the cell's index, counted from
+    /// `first`, and the fraction of the pixel that it covers.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 

@@ -81,7 +81,7 @@ pub struct WatchedShards {
     pub state: WatchedState,
     /// Samples in the file, over all pixels and both replicates.
     pub samples: u64,
-    /// Value of `samples` for a complete file, if it is known.
+    /// Number of samples that the file will hold when it is complete; `None` if unknown.
     pub total: Option<u64>,
     /// Time since the last modification.
     pub age: Option<Duration>,

@@ -21,7 +21,8 @@ pub struct Prediction {
     pub tiles: Vec<PlannedTile>,
     /// Expected RMSE of the picture, in the unit of the error target.
     pub rmse: f64,
-    /// Slopes of tiles that are not glossy, and of glossy tiles.
+    /// Exponents p of the error model RMSE ~ n^-p: for tiles that are not glossy, and for glossy
+    /// tiles.
     pub slopes: [f64; 2],
 }
 

@@ -208,7 +208,7 @@ fn decode_png(source: &FileContents) -> Result<Image, AssetError> {
     Ok(Image::upright(image, exif.as_deref()))
 }
 
-/// Decodes a JPEG file. Colours become red, green and blue.
+/// Decodes a JPEG file to RGB, or to grey if the file is grey.
 fn decode_jpeg(source: &FileContents) -> Result<Image, AssetError> {
     let error = |e| decode_error(source, "JPEG", e);
     let options = DecoderOptions::default()

@@ -49,7 +49,8 @@ impl<T> Loaded<T> {
         self.0.as_ref()?.1.as_ref().ok()
     }
 
-    /// Loads the file `name`, unless it is loaded already. An empty name means no file.
+    /// Loads the file `name`, unless it was the last one to be loaded, even if that failed. An
+    /// empty name means no file.
     pub fn resolve(&mut self, name: &str, load: impl FnOnce(&str) -> Result<Arc<T>, AssetError>) {
         if self.0.as_ref().map_or("", |(known, _)| known) != name {
             self.0 = (!name.is_empty()).then(|| (name.to_string(), load(name)));

@@ -42,7 +42,7 @@ pub struct RadianceMap {
 pub struct DirectionSample {
     /// Unit vector of the direction.
     pub direction: [f64; 3],
-    /// Density with which it is sampled \[1/sr\].
+    /// Density with which it is sampled [1/sr].
     pub density: f64,
 }
 
@@ -162,7 +162,7 @@ impl RadianceMap {
         DirectionSample { direction: [-sin * sin_phi, cos, sin * cos_phi], density }
     }
 
-    /// Returns the density \[1/sr\] of [`RadianceMap::sample`].
+    /// Returns the density [1/sr] of [`RadianceMap::sample`].
     pub fn density(&self, direction: [f64; 3]) -> f64 {
         self.distribution.density(position(direction))
     }

@@ -12,7 +12,7 @@ use glam::DVec3;
 
 /// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
 /// object is moved to a free place on the same level, a plane down, a light along x. Fails for
-/// targets of which every scene has one.
+/// targets of which a scene has exactly one, such as the camera.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));

@@ -10,9 +10,10 @@ use crate::edit::properties::is_material;
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, KeyNode, KeyValue, ValueType, node_at, node_at_mut};
 
-/// Sets `key` of `subject` to the value in `text`. A kind of transform step is appended to a list.
-/// An empty `text` sets an optional key to its default, and removes a transform step. Returns the
-/// reason and the accepted values if this is refused.
+/// Sets `key` of `subject` to the value in `text`. If the key is the transform of an object, `text`
+/// is a kind of step, and an identity step of this kind is appended. An empty `text` sets an
+/// optional key to its default, and removes a transform step. Returns the reason and the accepted
+/// values if this is refused.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     part(scene, subject)?;

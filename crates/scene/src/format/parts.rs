@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Smallest length in bytes of a part; the next `[[object]]` then begins a new one.
+/// Length in bytes from which a part is full: the next `[[object]]` begins a new part.
 pub(crate) const PART_BYTES: usize = 256 << 10;
 
 /// Part of a scene file that is parsed as a TOML document of its own.

@@ -23,7 +23,7 @@ const SCENE_BYTES: u64 = 20;
 
 impl Scene {
     /// Reads and validates the scene file at `path`. Returns the first 100 errors, with line and
-    /// column. Values are validated only without errors in keys and types.
+    /// column. If keys or types have errors, values are not validated.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         Document::read(path, Arc::default()).map(Document::into_scene)
     }
@@ -134,7 +134,7 @@ impl<'a> SourceScene<'a> {
     }
 }
 
-/// Types that are tables of scene files, as TOML.
+/// Conversion from and to TOML, for types that are tables of scene files.
 pub trait TomlText: FieldValue {
     /// Parses the keys and values of one table, without a check of ranges.
     fn from_text(text: &str) -> Result<Self, SceneErrors> {

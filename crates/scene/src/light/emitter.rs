@@ -92,7 +92,7 @@ impl<S: Float> Sides<S> {
         ([x, y, height], behind)
     }
 
-    /// Returns the density \[1/sr\] of directions that are sampled uniformly in the cone that a
+    /// Returns the density [1/sr] of directions that are sampled uniformly in the cone that a
     /// sphere subtends. It is zero for receivers inside a sphere that emits outwards only.
     #[inline(always)]
     fn cone_density<L: SimdFloat<Scalar = S>>(&self, cone: &Cone<L>) -> L {
@@ -105,10 +105,10 @@ impl<S: Float> Sides<S> {
 pub(super) struct PointSample<L: SimdFloat> {
     pub wi: Vec3<L>,
     pub distance: L,
-    /// Density \[1/sr\] with which any triangle is sampled in this direction, for multiple importance
+    /// Density [1/sr] with which any triangle is sampled in this direction, for multiple importance
     /// sampling.
     pub density: L,
-    /// Density \[1/sr\] by which the radiance is divided; zero if no light arrives.
+    /// Density [1/sr] by which the radiance is divided; zero if no light arrives.
     pub pdf: L,
 }
 
@@ -326,7 +326,7 @@ impl<S: Float> Emitter<S> {
         PointSample { wi, distance, density, pdf: density }
     }
 
-    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction of a ray from
+    /// Returns the density [1/sr] with which [`Emitter::sample`] draws the direction of a ray from
     /// `origin` that hits the surface at `distance`. If the surface is a mesh, `triangle` is the
     /// index of the hit triangle, encoded by [`SimdFloat::from_id`].
     #[inline(never)]
@@ -391,7 +391,7 @@ impl<S: Float> Surface<S> {
     }
 }
 
-/// Returns the density \[1/sr\] of uniform directions in a cone with the half-angle theta, where
+/// Returns the density [1/sr] of uniform directions in a cone with the half-angle theta, where
 /// `one_minus_cos` is 1 - cos(theta).
 #[inline(always)]
 fn density_of_cone<L: SimdFloat>(one_minus_cos: L) -> L {
@@ -412,8 +412,8 @@ fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3
     ((across * x + up * y + normal * z) * inverse, distance)
 }
 
-/// Hit of each ray with the plane of a flat emitter: the distance, negative for rays that do not hit
-/// the front, and the coordinates of the hit point across and up. `to_center` is the vector from the
+/// Returns where each ray meets the plane of a flat emitter: the distance, negative for rays that
+/// do not meet its front, and the coordinates across and up. `to_center` is the vector from the
 /// rays' origin to the emitter's centre.
 #[inline(always)]
 fn plane_hit<L: SimdFloat>(

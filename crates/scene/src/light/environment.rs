@@ -102,7 +102,7 @@ impl EnvironmentLight {
     }
 
     /// Returns the radiance that arrives from the unit vectors `direction`, and the density
-    /// \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero outside `lanes`.
+    /// [1/sr] with which [`EnvironmentLight::sample`] draws them. Both are zero outside `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
         let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);

@@ -14,7 +14,7 @@ pub struct LightSample<L> {
     /// Irradiance on a surface that faces the light. For a light with a size or an environment it
     /// is an estimate: the radiance divided by the sampling density. Zero if no light arrives.
     pub irradiance: Vec3<L>,
-    /// Density \[1/sr\] with which `wi` is sampled; the largest finite number for lights without a
+    /// Density [1/sr] with which `wi` is sampled; the largest finite number for lights without a
     /// size, zero if no light arrives.
     pub density: L,
 }

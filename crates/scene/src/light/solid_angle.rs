@@ -9,7 +9,7 @@ use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 /// points by 1e-5 of the surface's size.
 const MIN_SOLID_ANGLE: f64 = 2e5;
 
-/// Returns the density \[1/sr\] of the directions to a flat surface on which points are sampled
+/// Returns the density [1/sr] of the directions to a flat surface on which points are sampled
 /// uniformly: distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the
 /// surface along its normal, relative to the receiver: negative if the receiver is in front of it;
 /// otherwise the density is zero.
@@ -46,7 +46,7 @@ impl<L: SimdFloat> Cone<L> {
         }
     }
 
-    /// Returns the density \[1/sr\] of uniform directions in the cone.
+    /// Returns the density [1/sr] of uniform directions in the cone.
     #[inline(always)]
     pub fn density(&self) -> L {
         (L::one() / (self.one_minus_cos * L::from_f64(TAU))).min(L::from_f64(L::MAX))
@@ -115,7 +115,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         [L::select(self.by_angle, x, by_area[0]), L::select(self.by_angle, y, by_area[1])]
     }
 
-    /// Returns the density \[1/sr\] with which [`Self::sample`] draws a direction that hits the
+    /// Returns the density [1/sr] with which [`Self::sample`] draws a direction that hits the
     /// rectangle at `distance`.
     #[inline(always)]
     pub fn density(&self, distance: L) -> L {

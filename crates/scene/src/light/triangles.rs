@@ -66,7 +66,7 @@ impl<S: Float> Triangle<S> {
         triangle.sample(sides, L::mask(sides.both), (u, v))
     }
 
-    /// Returns the density \[1/sr\] with which [`Self::sample_by_area`] draws the direction of a ray
+    /// Returns the density [1/sr] with which [`Self::sample_by_area`] draws the direction of a ray
     /// that hits `triangle`, encoded by [`SimdFloat::from_id`], at `distance`.
     #[inline(always)]
     pub fn density_by_area<L: SimdFloat<Scalar = S>>(
@@ -144,7 +144,7 @@ impl<'a, L: SimdFloat> FacesSeen<'a, L> {
         PointSample { density: self.density(), pdf: point.pdf.masked(seen), ..point }
     }
 
-    /// Returns the density \[1/sr\] with which [`Self::sample`] draws a direction that hits a
+    /// Returns the density [1/sr] with which [`Self::sample`] draws a direction that hits a
     /// triangle.
     #[inline(always)]
     pub fn density(&self) -> L {
@@ -255,7 +255,7 @@ impl<L: SimdFloat> PacketTriangle<L> {
         PointSample { wi, distance, density, pdf: density }
     }
 
-    /// Returns the density \[1/sr\] of a direction in which the triangle is hit at `distance`: the
+    /// Returns the density [1/sr] of a direction in which the triangle is hit at `distance`: the
     /// probability that the triangle is chosen, times the density of the direction within it.
     #[inline(always)]
     fn density(&self, seen: &SeenTriangle<L>, distance: L) -> L {

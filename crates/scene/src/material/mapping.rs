@@ -38,7 +38,8 @@ pub struct TextureMapping<S> {
     /// Centre, in the scene, of the part of the object that has this texture. Points are mapped
     /// relative to it, so that rounding errors are in proportion to the size of the part.
     center: [S; 3],
-    /// This centre in texture space, relative to the origin of the formula.
+    /// Position of `center` in texture space, relative to the point from which the projection
+    /// measures its coordinates.
     texture_center: [S; 3],
     /// Edge lengths of the part's bounding box in texture space.
     extent: [S; 3],

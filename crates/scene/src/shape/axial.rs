@@ -33,7 +33,8 @@ macro_rules! by_axis {
             vec![&mut self.$base, &mut self.$top]
         }
 
-        /// Returns `true`, without a change, if the axis is vertical.
+        /// Changes nothing. Returns `true` if the axis is vertical, where the rotation has no
+        /// effect; `false` otherwise, because the keys cannot express it.
         fn rotate_y(&mut self, _: f64) -> bool {
             self.$base[0] == self.$top[0] && self.$base[2] == self.$top[2]
         }

@@ -54,7 +54,8 @@ pub struct ImageLayout {
     pub size: [usize; 2],
     /// Width and height of the displayed image in pixels, at most `size`.
     pub shown: [usize; 2],
-    /// Width and height of the half blocks, which fill only the cells that the image covers fully.
+    /// Columns and half rows of the preview in half blocks. It fills only cells that the image
+    /// covers fully, so that nothing of it shows beside the image.
     pub halves: [usize; 2],
     /// Cells that the image covers, at least in part.
     pub place: Rect,
@@ -165,7 +166,8 @@ impl ViewerImage {
     /// Encodes an image. `image` has the displayed size and `raster` that of the half blocks. `png`
     /// encodes `image` as a PNG file, if the protocol sends one.
     ///
-    /// # Errors Fails if the image cannot be encoded.
+    /// # Errors
+    /// Fails if the image cannot be encoded.
     pub fn encode(
         viewport: &ImageViewport,
         layout: ImageLayout,

@@ -12,7 +12,8 @@ const MAX_STRIPS: u16 = 16;
 /// Returns the bytes that show `image` at `place` in strips of one or more rows of cells, each with
 /// at most `colors` colours. Other output can be sent between strips.
 ///
-/// # Errors Fails if the image is empty.
+/// # Errors
+/// Fails if the image is empty.
 pub fn transfer(
     image: &Raster,
     place: Rect,

@@ -93,8 +93,8 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// Closest point of a gap that widens around it, and the radius of a sphere whose gap to a
-    /// plane widens in the same way. `None` if the faces are parallel planes.
+    /// Point at which a gap that widens around it is narrowest, and the radius of the sphere that
+    /// has the same gap to a plane. `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 

@@ -181,7 +181,8 @@ struct LitBy {
 /// is computed.
 pub(crate) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// Factors of each object over all its parts; `None` if it reflects no direct light.
+    /// Direct light that each object reflects, over all its parts, relative to a white diffuse
+    /// surface; `None` if it reflects none.
     responses: Vec<Option<Response>>,
     /// Factors of ambient light.
     ambient: Response,

@@ -30,7 +30,8 @@ pub(crate) struct LightBuffer<S> {
     max_coordinate: S,
     /// Cells of all faces, face by face and row by row.
     cells: Vec<Cell<S>>,
-    /// Occluders of all cells, cell after cell, sorted by [`Entry::near`].
+    /// Occluders of all cells, cell after cell; those of a cell are in ascending order of
+    /// [`Entry::near`].
     entries: Vec<Entry<S>>,
 }
 

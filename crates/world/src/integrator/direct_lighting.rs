@@ -10,7 +10,7 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 use zerkalo_scene::light::{DeltaLight, LightSample};
 
-/// Returns the density \[1/sr\] of cosine-weighted directions whose angle to the normal has the
+/// Returns the density [1/sr] of cosine-weighted directions whose angle to the normal has the
 /// cosine `cos`.
 #[inline(always)]
 pub(crate) fn cosine_pdf<L: SimdFloat>(cos: L) -> L {
@@ -44,7 +44,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Returns the radiance at the eye of light of unit emission, where `value` is the BSDF
-    /// \[1/sr\] times the cosine of the angle of incidence.
+    /// [1/sr] times the cosine of the angle of incidence.
     #[inline(always)]
     pub fn unoccluded(&self, value: Vec3<L>, light: &LightSample<L>) -> Vec3<L> {
         let radiance = self.path.throughput.component_mul(value).component_mul(light.irradiance);
@@ -63,7 +63,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Returns the diffuse part and, in `lanes`, the highlights for light from `wi`: the BSDF
-    /// \[1/sr\] times the cosine of the angle of incidence. `diffuse` is this product for the
+    /// [1/sr] times the cosine of the angle of incidence. `diffuse` is this product for the
     /// diffuse part of a white surface.
     #[inline(always)]
     pub fn direct_value(&self, wi: Vec3<L>, diffuse: L, lanes: L::Mask) -> Vec3<L> {

@@ -161,7 +161,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         })
     }
 
-    /// Returns the BSDF \[1/sr\] times the cosine of the angle of incidence, weighted for multiple
+    /// Returns the BSDF [1/sr] times the cosine of the angle of incidence, weighted for multiple
     /// importance sampling, in the lanes in which `light` `arrives` at the surface. `rays` are the
     /// reflected rays that find this light, too. `diffuse` returns the weighted density of
     /// cosine-weighted directions for their density.

@@ -22,7 +22,7 @@ use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Frame, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::sampling::warp::cosine_hemisphere;
 
-/// Density \[1/sr\] that multiple importance sampling assumes for rays of diffuse bounces: so small
+/// Density [1/sr] that multiple importance sampling assumes for rays of diffuse bounces: so small
 /// that samples of points on emitters get the full weight. Rays of this density do not find
 /// environments.
 pub(crate) const NO_PDF: f64 = 1e-30;
@@ -72,9 +72,10 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `vertex`. `media` and `coincident` are those of a ray that leaves a hit on
-    /// the side from which the path arrived. Returns the lanes whose surface reflects diffusely:
-    /// they get no ambient light, because the diffuse bounce computes their indirect light.
+    /// Offers the hits of `vertex` to the reservoir. A diffuse bounce would start with `media` and
+    /// `coincident`, on the side from which the path arrived. Returns the lanes whose surface
+    /// reflects diffusely: they get no ambient light, because the diffuse bounce computes their
+    /// indirect light.
     #[inline(never)]
     pub fn offer(
         &mut self,

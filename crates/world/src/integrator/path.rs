@@ -45,7 +45,7 @@ pub struct Path<L> {
     pub ray: Ray<L>,
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
-    /// Density \[1/sr\] with which the ray was sampled; the largest finite number for camera rays,
+    /// Density [1/sr] with which the ray was sampled; the largest finite number for camera rays,
     /// mirrors and refraction. It is used only in worlds with emitters.
     pub lobe_pdf: L,
 }

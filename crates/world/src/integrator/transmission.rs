@@ -261,10 +261,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         Some(next)
     }
 
-    /// Continues `branch` with the transmitted paths, and with the reflected ones in other lanes.
-    /// Lanes with both store the reflected branch in `waiting`, or choose one of the two at random
-    /// after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of transmitted rays. Returns `false`
-    /// if no path continues.
+    /// Continues `branch` with the transmitted paths, and in lanes without one with the reflected
+    /// paths. Lanes with both store the reflected branch in `waiting`, or choose one of the two at
+    /// random after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of transmitted rays.
+    /// Returns `false` if no path continues.
     fn follow(
         &self,
         branch: &mut Branch<L>,

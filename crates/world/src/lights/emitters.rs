@@ -125,9 +125,8 @@ impl<S: Float> Emitters<S> {
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
     }
 
-    /// Returns those of `lanes` in which another object covers the point that was sampled on
-    /// emitter number `index`: the point is behind the surface of an object that touches the
-    /// emitter. `ray` are the shadow rays to the points, at `distance`.
+    /// Returns those of `lanes` whose point, sampled on emitter number `index`, is just inside an
+    /// object that touches the emitter. The shadow rays `ray` reach the points at `distance`.
     #[inline(always)]
     pub fn covered<L: SimdFloat<Scalar = S>>(
         &self,

@@ -12,7 +12,8 @@ const MOST: u32 = 100_000;
 /// `STEM-2.EXTENSION` and so on. `write` must create the file atomically and fail if the path
 /// exists.
 ///
-/// # Errors Fails with the error of `write`, or with a message if no name is unused.
+/// # Errors
+/// Fails with the error of `write`, or with a message if no name is unused.
 pub fn numbered<E: Display>(
     stem: &str,
     extension: &str,

@@ -119,7 +119,8 @@ impl Autosave {
 
     /// Returns the path of the recovery file that remains when the program ends.
     ///
-    /// # Errors Fails with a message for the user if the last edits could not be written.
+    /// # Errors
+    /// Fails with a message for the user if the last edits could not be written.
     pub fn kept(&self) -> Result<Option<PathBuf>, String> {
         match (&self.failed, self.recovery.path()) {
             (None, path) => Ok(path.map(Path::to_path_buf)),

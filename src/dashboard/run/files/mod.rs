@@ -110,7 +110,8 @@ impl Files {
     /// there are unsaved edits. If the disk of the scene file does not respond, they are kept in
     /// the state folder.
     ///
-    /// # Errors Fails with a message for the user if there are unsaved edits that cannot be kept.
+    /// # Errors
+    /// Fails with a message for the user if there are unsaved edits that cannot be kept.
     pub fn finish(&mut self) -> Result<Option<PathBuf>, String> {
         let Some([files, autosave]) = self.threads.take() else { return Ok(None) };
         self.give(Job::End);

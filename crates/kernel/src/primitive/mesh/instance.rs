@@ -123,7 +123,7 @@ fn surface_distance(mesh: &Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f6
 /// Mesh placed in the scene, compiled for ray intersection.
 pub struct MeshInstance<S> {
     mesh: Arc<Mesh>,
-    /// Rays that miss this box are not transformed.
+    /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
     extent: PrimitiveBox<S>,
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
