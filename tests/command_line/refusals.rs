@@ -128,11 +128,9 @@ fn film_that_does_not_fit_is_refused_with_sums_and_remedy() {
 }
 
 #[test]
-fn many_threads_are_reduced_with_a_warning() {
+fn many_threads_are_reduced() {
     let desk = Desk::new();
     let stats = desk.stats(&["--spp", "2", "--threads", "4096"]);
     let processors = std::thread::available_parallelism().unwrap().get() as u64;
     assert_eq!(stats["threads"].as_u64().unwrap(), (4 * processors).clamp(16, 4096));
-    let run = desk.render("a.png", &["--spp", "2", "--threads", "4096"]);
-    assert!(run.err.starts_with("warning: --threads 4096: "), "{}", run.err);
 }

@@ -159,7 +159,7 @@ fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
 fn terminal_without_replies_gets_a_fixed_rate() {
     let fixture = Fixture::new();
     let terminal = open_over_ssh(&fixture, false);
-    terminal.wait_for_text("KB/s fixed");
+    terminal.wait_for_text("30 KB/s");
     open_help_and_quit(terminal);
 }
 
@@ -167,7 +167,7 @@ fn terminal_without_replies_gets_a_fixed_rate() {
 fn unrequested_replies_are_not_keys() {
     let fixture = Fixture::new();
     let mut terminal = open_over_ssh(&fixture, true);
-    terminal.wait_for_text("KB/s");
+    terminal.wait_for_text("B/s");
     terminal.send("\x1b[24;80R\x1b]11;rgb:1e1e/1e1e/2e2e\x1b\\\x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[>0;276;0c");
     open_help_and_quit(terminal);
 }

@@ -61,7 +61,7 @@ pub(crate) enum CullingMode {
     Off,
 }
 
-/// What rays are tested against.
+/// Primitives that rays are tested against, with and without a tile.
 pub(crate) struct Culling<S> {
     pub mode: CullingMode,
     /// Candidates for rays that belong to no tile.
