@@ -6,11 +6,11 @@
 //! a pixel.
 //!
 //! The file consists of tiles, so that programs can read a part of a large picture. The header is
-//! written again at the end if metadata have changed.
+//! written again at the end, with sorted attributes and the final metadata.
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Replicates, Sums};
-use crate::image_file::exr_header::Ordered;
+use crate::image_file::exr_header::sorted_header;
 use crate::image_file::metadata::padded;
 use crate::image_file::output::{Bands, Depth, WriteSeek, replace_start};
 use exr::block::UncompressedBlock;
@@ -61,7 +61,7 @@ fn encode_to(
 ) -> Result<(), Error> {
     let channels = channels(&layer_names(&picture.group_names, picture.weights.weights.len()));
     let headers = headers(picture, &channels, &picture.metadata);
-    exr::block::write(Ordered::new(&mut *sink), headers, true, |meta, writer| {
+    exr::block::write(&mut *sink, headers, true, |meta, writer| {
         let mut rows = TileRow::new(picture, channels.iter().map(|(_, source)| *source).collect());
         let mut compressor = writer.sequential_blocks_compressor(&meta);
         for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
@@ -80,11 +80,10 @@ fn encode_to(
         }
         Ok(())
     })?;
-    if let Some(last) = bands.final_metadata() {
-        let [before, after] = [&picture.metadata, &last].map(|m| header(picture, &channels, m));
-        replace_start(sink, &before?, &after?)?;
-    }
-    Ok(())
+    let last = bands.final_metadata();
+    let [before, after] = [&picture.metadata, last.as_ref().unwrap_or(&picture.metadata)]
+        .map(|metadata| header(picture, &channels, metadata));
+    Ok(replace_start(sink, &before?, &after?)?)
 }
 
 /// Returns all bytes before the table of chunks.
@@ -93,10 +92,10 @@ fn header(
     channels: &[(String, Source)],
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, Error> {
-    let mut file = Ordered::new(Cursor::new(Vec::new()));
+    let mut file = Cursor::new(Vec::new());
     let headers = headers(picture, channels, metadata);
     match exr::block::write(&mut file, headers, true, |_, _| Err(Error::Aborted)) {
-        Ok(()) | Err(Error::Aborted) => Ok(file.into_header()),
+        Ok(()) | Err(Error::Aborted) => sorted_header(file.get_ref()).ok_or(Error::Aborted),
         Err(error) => Err(error),
     }
 }
