@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use zerkalo_render::RenderState;
 use zerkalo_render::export::{Provenance, film_header};
 use zerkalo_render::film::Film;
-use zerkalo_render::film::file::{
-    FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file,
-};
+use zerkalo_render::film::file::{EncodedFilm, FilmFileHeader};
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::plan::Part;
 use zerkalo_render::session::Report;
@@ -38,12 +36,7 @@ impl FilmOutput {
     /// `header`.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
-            Self::Film(path) => {
-                let mut pieces = vec![header.encode()];
-                pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));
-                pieces.push(encode_end(film, &pieces));
-                write_film_file(path, &pieces, Existing::Replace)
-            }
+            Self::Film(path) => EncodedFilm::new(header, film, None).write(path, Existing::Replace),
             Self::Picture(output, depth) => output.write(header, *depth, &mut &*film),
         }
     }

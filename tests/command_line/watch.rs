@@ -5,6 +5,7 @@ use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
 use crate::harness::*;
 use std::time::SystemTime;
+use zerkalo_render::film::file::EncodedFilm;
 use zerkalo_render::plan::{FilmFiles, WatchedShards, WatchedState};
 
 fn open(desk: &Desk, names: &[&str]) -> Result<FilmFiles, String> {
@@ -95,13 +96,10 @@ fn unfinished_shards_are_running_and_then_late() {
     let text = String::from_utf8(header.chunks[b"PART"].clone()).unwrap();
     header.chunks.insert(*b"PART", text.replace("complete", "unfinished").into_bytes());
     let empty = Film::new(whole.film.clone());
-    let mut pieces = vec![header.encode()];
-    let tiles = 0..zerkalo_render::film::file::tile_chunks(&empty);
-    pieces.extend(tiles.map(|i| zerkalo_render::film::file::encode_tiles(&empty, i)));
-    pieces.push(zerkalo_render::film::file::encode_end(&empty, &pieces));
+    let file = EncodedFilm::new(&header, &empty, None).pieces.concat();
     let complete = fs::read(desk.path("job-1.zk")).unwrap();
     let mut films = open(&desk, &["job.plan"]).unwrap();
-    replace(&desk, "job-1.zk", &pieces.concat());
+    replace(&desk, "job-1.zk", &file);
     assert!(films.poll());
     let at = |films: &FilmFiles, later: u64| {
         let now = SystemTime::now() + Duration::from_secs(later);
@@ -119,10 +117,8 @@ fn unfinished_shards_are_running_and_then_late() {
     assert!(sum(&films).bytes() == film(&desk, "job-0.zk").bytes());
     // A film file of a shard is not used if it is marked complete but has no samples.
     header.chunks.insert(*b"PART", text.into_bytes());
-    pieces[0] = header.encode();
-    pieces.pop();
-    pieces.push(zerkalo_render::film::file::encode_end(&empty, &pieces));
-    replace(&desk, "job-1.zk", &pieces.concat());
+    let file = EncodedFilm::new(&header, &empty, None).pieces.concat();
+    replace(&desk, "job-1.zk", &file);
     assert!(films.poll());
     assert!(refusal(&films).contains("its 0 samples are not the"), "{}", refusal(&films));
     replace(&desk, "job-1.zk", &complete);

@@ -3,7 +3,7 @@
 use crate::features::row::*;
 use crate::harness::*;
 use std::time::SystemTime;
-use zerkalo_render::film::file::{encode_end, encode_tiles, tile_chunks, write_film_file};
+use zerkalo_render::film::file::EncodedFilm;
 use zerkalo_render::film::testing::header;
 use zerkalo_render::plan::{FilmFiles, Part, PartShard, PlannedTile, ShardRender, WatchedState};
 
@@ -100,10 +100,7 @@ fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     let mut header = header(film);
     let shards = vec![PartShard { number, complete }];
     Part { plan: Arc::new(plan.clone()), shards, rays: 0 }.record(&mut header);
-    let mut pieces = vec![header.encode()];
-    pieces.extend((0..tile_chunks(film)).map(|i| encode_tiles(film, i)));
-    pieces.push(encode_end(film, &pieces));
-    pieces.concat()
+    EncodedFilm::new(&header, film, None).pieces.concat()
 }
 
 /// Watches the film files of the shards of `scene` while they are written. Each file is first
@@ -114,8 +111,7 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     let parts = parts(scene, &plan)?;
     let path = |number: u32| folder.join(format!("job-{number}.zk"));
     let write = |number: u32, bytes: &[u8]| {
-        write_film_file(&path(number), &[bytes.to_vec()], Existing::Replace)
-            .map_err(|e| e.to_string())
+        zerkalo_scene::disk::write(&path(number), bytes).map_err(|e| e.to_string())
     };
     fs::write(folder.join("job.plan"), plan.text()).map_err(|e| e.to_string())?;
     (0..4).for_each(|number| drop(fs::remove_file(path(number))));

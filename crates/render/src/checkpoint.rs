@@ -9,18 +9,14 @@
 use crate::export::{Provenance, film_header};
 use crate::file_error::FileError;
 use crate::film::Film;
-use crate::film::file::{
-    Fields, FilmFileHeader, FilmReader, Tag, encode_end, encode_tiles, tile_chunks, write_film_file,
-};
+use crate::film::file::{EncodedFilm, Fields, FilmFileHeader, FilmReader, Tag};
 use crate::schedule::{Schedule, Settings};
 use crate::session::Report;
 use crate::{Options, RenderState};
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_scene::Scene;
-use zerkalo_scene::disk::{Existing, WriteError};
 use zerkalo_world::{self as world, AnyWorld};
 
 const SCENE: Tag = *b"SCEN";
@@ -92,40 +88,21 @@ impl SampleInputs {
     }
 }
 
-/// Checkpoint encoded as bytes, so that another thread can write it.
-pub struct EncodedCheckpoint(Vec<Vec<u8>>);
-
-impl EncodedCheckpoint {
-    /// Encodes a render on the threads of `pool`. `report` is the latest report on it.
-    pub(super) fn new(
-        state: &RenderState,
-        schedule: &Schedule,
-        report: &Report,
-        provenance: &Provenance,
-        pool: &rayon::ThreadPool,
-    ) -> Self {
-        let film = &state.film;
-        let compiled = &state.lighting.compiled;
-        let mut header = film_header(state, report, provenance);
-        header.chunks.extend([
-            SampleInputs::new(compiled, provenance.sampler).encode(),
-            (SCHEDULE, schedule.encode()),
-            (CLOCK, report.seconds.to_le_bytes().to_vec()),
-        ]);
-        let mut pieces = vec![header.encode()];
-        pool.install(|| {
-            let tiles = (0..tile_chunks(film)).into_par_iter();
-            pieces.par_extend(tiles.map(|index| encode_tiles(film, index)));
-        });
-        pieces.push(encode_end(film, &pieces));
-        Self(pieces)
-    }
-
-    /// Writes the checkpoint to the file at `path`, in one step. `existing` decides if a file there
-    /// may be replaced. After an error an existing file is unchanged.
-    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
-        write_film_file(path, &self.0, existing)
-    }
+/// Encodes a render as a checkpoint on the threads of `pool`. `report` is the latest report on it.
+pub(super) fn encode(
+    state: &RenderState,
+    schedule: &Schedule,
+    report: &Report,
+    provenance: &Provenance,
+    pool: &rayon::ThreadPool,
+) -> EncodedFilm {
+    let mut header = film_header(state, report, provenance);
+    header.chunks.extend([
+        SampleInputs::new(&state.lighting.compiled, provenance.sampler).encode(),
+        (SCHEDULE, schedule.encode()),
+        (CLOCK, report.seconds.to_le_bytes().to_vec()),
+    ]);
+    EncodedFilm::new(&header, &state.film, Some(pool))
 }
 
 /// Checkpoint that was read from a file.

@@ -23,7 +23,7 @@ mod sync_render;
 mod threads;
 pub mod wave;
 
-pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
+pub use checkpoint::{Checkpoint, SampleInputs};
 pub use file_error::FileError;
 pub use first_hit_buffer::FirstHitBuffer;
 pub use region_render::RegionRender;

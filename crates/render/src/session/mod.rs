@@ -26,10 +26,11 @@ mod worker;
 
 use crate::export::Provenance;
 use crate::film::Display;
+use crate::film::file::EncodedFilm;
 use crate::plan::FilmFiles;
 pub use crate::plan::{WatchedShards, WatchedState};
 use crate::schedule::{Settings, Stop};
-use crate::{Checkpoint, EncodedCheckpoint, Options, RenderState, threads};
+use crate::{Checkpoint, Options, RenderState, threads};
 use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use picture::Picture;
@@ -152,7 +153,7 @@ impl Session {
     pub fn checkpoint(
         &self,
         provenance: Provenance,
-        task: impl FnOnce(Option<EncodedCheckpoint>) + Send + 'static,
+        task: impl FnOnce(Option<EncodedFilm>) + Send + 'static,
     ) {
         self.submit(move |picture| {
             task(picture.and_then(|picture| picture.checkpoint(&provenance)));

@@ -1,11 +1,11 @@
 //! Picture of a session at the moment at which a task runs.
 
 use crate::export::{Provenance, film_header};
-use crate::film::file::FilmFileHeader;
+use crate::film::file::{EncodedFilm, FilmFileHeader};
 use crate::film::{Film, LightWeights};
 use crate::session::active_render::ActiveRender;
 use crate::session::report::Report;
-use crate::{EncodedCheckpoint, RenderState};
+use crate::{RenderState, checkpoint};
 use zerkalo_scene::Scene;
 
 /// Film of a session with its report.
@@ -49,11 +49,11 @@ impl<'a> Picture<'a> {
 
     /// Encodes the render as a checkpoint. Returns `None` before the first picture, or if the
     /// session watches films.
-    pub(super) fn checkpoint(&self, provenance: &Provenance) -> Option<EncodedCheckpoint> {
+    pub(super) fn checkpoint(&self, provenance: &Provenance) -> Option<EncodedFilm> {
         match self.source {
             Source::Render(ActiveRender { state, schedule, first_picture_after, .. }, pool) => {
                 first_picture_after
-                    .map(|_| EncodedCheckpoint::new(state, schedule, self.report, provenance, pool))
+                    .map(|_| checkpoint::encode(state, schedule, self.report, provenance, pool))
             }
             Source::Files(_) => None,
         }

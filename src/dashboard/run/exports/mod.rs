@@ -15,8 +15,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use zerkalo_kernel::sampling::SamplerKind;
-use zerkalo_render::EncodedCheckpoint;
 use zerkalo_render::export::{Provenance, scene_hash};
+use zerkalo_render::film::file::EncodedFilm;
 use zerkalo_render::image_file::{Depth, ImageOutput};
 use zerkalo_render::session::{Picture, Session, State};
 use zerkalo_scene::Scene;
@@ -75,10 +75,7 @@ impl Exporter {
     }
 
     /// Writes a checkpoint to a file with the next free name.
-    pub fn write_checkpoint(
-        &self,
-        checkpoint: Option<EncodedCheckpoint>,
-    ) -> Result<Exported, String> {
+    pub fn write_checkpoint(&self, checkpoint: Option<EncodedFilm>) -> Result<Exported, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
         let write = |path: &Path| checkpoint.write(path, Existing::Refuse);
         let path = numbered(&self.stem(""), "zk", write)?;

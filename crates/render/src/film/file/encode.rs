@@ -4,6 +4,7 @@ use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
 };
 use crate::film::store::Film;
+use rayon::prelude::*;
 use std::io::Write;
 use std::path::Path;
 use zerkalo_scene::disk::{Existing, WriteError, replace_file};
@@ -13,7 +14,7 @@ pub(super) const CHECKSUM_BYTES: usize = 4;
 
 impl FilmFileHeader {
     /// Encodes the part of the film file before the tiles.
-    pub fn encode(&self) -> Vec<u8> {
+    pub(super) fn encode(&self) -> Vec<u8> {
         let mut out = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
         out.extend(chunk(HEAD, |head| self.encode_head(head)));
         out.extend(chunk(META, |meta| {
@@ -48,13 +49,37 @@ impl FilmFileHeader {
     }
 }
 
-/// Returns the number of `TILE` chunks in the film file of `film`.
-pub fn tile_chunks(film: &Film) -> usize {
-    film.tile_count().div_ceil(TILES_PER_CHUNK)
+/// Film file encoded as bytes, so that another thread can write it.
+pub struct EncodedFilm {
+    /// Header, `TILE` chunks, `DONE` chunk.
+    pub pieces: Vec<Vec<u8>>,
+}
+
+impl EncodedFilm {
+    /// Encodes `film`, on the threads of `pool` if there is one.
+    pub fn new(header: &FilmFileHeader, film: &Film, pool: Option<&rayon::ThreadPool>) -> Self {
+        let mut pieces = vec![header.encode()];
+        let chunks = 0..film.tile_count().div_ceil(TILES_PER_CHUNK);
+        let encode = |index| encode_tiles(film, index);
+        match pool {
+            Some(pool) => pool.install(|| pieces.par_extend(chunks.into_par_iter().map(encode))),
+            None => pieces.extend(chunks.map(encode)),
+        }
+        pieces.push(encode_end(film, &pieces));
+        Self { pieces }
+    }
+
+    /// Writes the file at `path`, in one step. `existing` decides if a file there may be replaced.
+    /// After an error an existing file is unchanged.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
+        replace_file(path, existing, |file| {
+            self.pieces.iter().try_for_each(|piece| file.write_all(piece))
+        })
+    }
 }
 
 /// Encodes `TILE` chunk `index`. A tile in its first pass is written as one without samples.
-pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
+fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
     chunk(TILES, |out| {
@@ -65,7 +90,7 @@ pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
 }
 
 /// Encodes the last chunk of a film file. `pieces` are the encoded header and tile chunks.
-pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
+fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
     // Of a tile chunk the checksum covers only the checksum at its end.
     for (i, piece) in pieces.iter().enumerate() {
@@ -77,16 +102,6 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
         out.extend((film.tile_count() as u64).to_le_bytes());
         out.extend(checksum.to_le_bytes());
     })
-}
-
-/// Writes a film file from its encoded pieces: header, tiles, end. An old file is unchanged after
-/// an error.
-pub fn write_film_file(
-    path: &Path,
-    pieces: &[Vec<u8>],
-    existing: Existing,
-) -> Result<(), WriteError> {
-    replace_file(path, existing, |file| pieces.iter().try_for_each(|piece| file.write_all(piece)))
 }
 
 fn text(text: &str, out: &mut Vec<u8>) {

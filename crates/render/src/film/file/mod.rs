@@ -37,7 +37,7 @@ mod tests;
 mod tile_record;
 
 pub use decode::{Fields, FilmReader, is_film_file};
-pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
+pub use encode::EncodedFilm;
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;

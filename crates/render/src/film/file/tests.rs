@@ -47,10 +47,7 @@ fn header_of(film: &Film) -> FilmFileHeader {
 }
 
 fn pieces(film: &Film) -> Vec<Vec<u8>> {
-    let mut pieces = vec![header_of(film).encode()];
-    pieces.extend((0..tile_chunks(film)).map(|i| encode_tiles(film, i)));
-    pieces.push(encode_end(film, &pieces));
-    pieces
+    EncodedFilm::new(&header_of(film), film, None).pieces
 }
 
 fn read(bytes: &[u8]) -> Result<(FilmFileHeader, Film), FileError> {
@@ -78,10 +75,7 @@ fn saturated_sums_are_restored() {
         tile.advance(0, 1 << 20);
     });
     assert_eq!(film.saturated_pixels(), 2);
-    let mut pieces = vec![header_of(&film).encode()];
-    pieces.push(encode_tiles(&film, 0));
-    pieces.push(encode_end(&film, &pieces));
-    let (_, restored) = read(&pieces.concat()).unwrap();
+    let (_, restored) = read(&pieces(&film).concat()).unwrap();
     assert_eq!(restored.saturated_pixels(), 2);
     assert_eq!(restored.bytes(), film.bytes());
 }
@@ -168,8 +162,7 @@ fn claimed_size_is_compared_with_the_length_of_the_file() {
     let film = film(1, 1, &[1.0]);
     let mut header = header_of(&film);
     (header.film.width, header.film.height) = (1 << 17, 1 << 17);
-    let head = vec![header.encode()];
-    let end = encode_end(&film, &head);
-    let error = read(&[&head[0][..], &end].concat()).unwrap_err().to_string();
+    let file = EncodedFilm::new(&header, &film, None).pieces.concat();
+    let error = read(&file).unwrap_err().to_string();
     assert!(error.contains("its header has invalid values"), "{error}");
 }
