@@ -6,6 +6,7 @@ use crate::film::box_filter::{Coverage, coverage, fill_gaps};
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
+use rayon::prelude::*;
 
 /// Film downsampled to a smaller image: the mean radiance of each cell in each light group. When
 /// light weights change, the film need not be read again.
@@ -28,7 +29,7 @@ impl Thumbnail {
     /// that of the nearest row. A film without samples is black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
         let mut downsample = IncrementalDownsample::new(film, cols, rows);
-        downsample.stale(film).into_iter().for_each(DirtyTile::refresh);
+        downsample.update(film, None);
         downsample.thumbnail()
     }
 
@@ -85,14 +86,6 @@ struct TilePart {
     sums: Vec<f64>,
 }
 
-/// Film tile that has changed since the previous downsampling.
-pub struct DirtyTile<'a> {
-    layout: &'a Layout,
-    part: &'a mut TilePart,
-    film: &'a Film,
-    index: usize,
-}
-
 impl IncrementalDownsample {
     /// Creates the cache for `cols` x `rows` cells over an empty film of the size of `film`.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
@@ -121,17 +114,22 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since the previous call, each of which must be
-    /// refreshed. All calls must pass the same film.
-    pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
+    /// Reads the tiles that have changed since the previous call, on the threads of `pool` if there
+    /// is one. Returns their number. All calls must pass the same film.
+    pub fn update(&mut self, film: &Film, pool: Option<&rayon::ThreadPool>) -> usize {
         let layout = &self.layout;
-        let stale = |(index, part): (usize, &'a mut TilePart)| {
-            let version = film.tile(index).map(|t| (film.epoch(), t.counts(), t.lattice_px()));
-            let changed = version != part.version;
-            part.version = version;
-            changed.then_some(DirtyTile { layout, part, film, index })
-        };
-        self.parts.iter_mut().enumerate().filter_map(stale).collect()
+        let mut stale: Vec<(usize, &mut TilePart)> = self.parts.iter_mut().enumerate().collect();
+        stale.retain_mut(|(index, part)| {
+            let version = film.tile(*index).map(|t| (film.epoch(), t.counts(), t.lattice_px()));
+            std::mem::replace(&mut part.version, version) != version
+        });
+        let changed = stale.len();
+        let refresh = |(index, part): (usize, &mut TilePart)| part.refresh(layout, film, index);
+        match pool.filter(|_| changed > 0) {
+            Some(pool) => pool.install(|| stale.into_par_iter().for_each(refresh)),
+            None => stale.into_iter().for_each(refresh),
+        }
+        changed
     }
 
     /// Returns the smaller image, from the cached contributions.
@@ -183,17 +181,16 @@ impl Span {
     }
 }
 
-impl DirtyTile<'_> {
-    /// Reads the current samples of the tile, on any thread.
-    pub fn refresh(self) {
-        let Self { layout, part, film, index } = self;
+impl TilePart {
+    /// Reads the current samples of tile `index`.
+    fn refresh(&mut self, layout: &Layout, film: &Film, index: usize) {
         let columns = film.tile_columns();
         let (across, down) = (&layout.across[index % columns], &layout.down[index / columns]);
-        part.sums.clear();
+        self.sums.clear();
         let Some(tile) = film.tile(index).filter(|tile| tile.any_sampled()) else { return };
         let cell = 1 + 3 * layout.groups;
         let width = across.len * cell;
-        part.sums.resize(down.len * width, 0.0);
+        self.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
         // In the first pass, only the pixels of the lattice have a sample.
@@ -202,7 +199,7 @@ impl DirtyTile<'_> {
             line.fill(0.0);
             add_row(tile, y, step, across, &per_unit, &mut line);
             for (row, height) in rows {
-                let sums = &mut part.sums[row * width..][..width];
+                let sums = &mut self.sums[row * width..][..width];
                 sums.iter_mut().zip(&line).for_each(|(sum, value)| *sum += height * value);
             }
         }
@@ -245,9 +242,7 @@ mod tests {
         let mut film = film(70, 40, &[1.0, 2.0]);
         let mut raster = IncrementalDownsample::new(&film, 9, 7);
         let refresh = |raster: &mut IncrementalDownsample, film: &Film| {
-            let stale = raster.stale(film);
-            let count = stale.len();
-            stale.into_iter().for_each(DirtyTile::refresh);
+            let count = raster.update(film, None);
             assert_eq!(raster.thumbnail(), Thumbnail::of_film(film, 9, 7));
             count
         };

@@ -25,7 +25,7 @@ mod tile;
 
 pub use box_filter::box_means;
 pub use display::{Display, Tone, quantised_16};
-pub use downsample::{DirtyTile, IncrementalDownsample, Thumbnail};
+pub use downsample::{IncrementalDownsample, Thumbnail};
 pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 pub use light_weights::{LightWeights, Replicates, Sums};
 pub use linear_image::LinearImage;

@@ -6,7 +6,7 @@ use crate::first_hit_buffer::FirstHitBuffer;
 use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
 use crate::session::report::{QUALITIES, Report, State};
-use crate::session::snapshot::{Frame, Snapshot, View, tile_estimates};
+use crate::session::snapshot::{Snapshot, View, tile_estimates};
 use crate::wave::{Wave, WaveReport};
 use crate::{Options, RenderState};
 use crossbeam_channel::{Receiver, Sender};
@@ -199,16 +199,15 @@ impl ActiveRender {
             return;
         }
         self.update_first_hits(context, FIRST_HITS_SECONDS);
-        let coarse = self.report(context, State::Tracing);
-        let (frame, downsample) = (self.frame(context), &mut self.downsample);
+        let coarse = self.snapshot(context, State::Tracing);
+        let (display, downsample) = (self.state.display(), &mut self.downsample);
         let start = Instant::now();
         let mut first = true;
         let mut publish = |film: &Film| {
-            if !std::mem::take(&mut first) && !context.snapshot_wanted(false) {
-                return;
+            if std::mem::take(&mut first) || context.snapshot_wanted(false) {
+                let snapshot = coarse.clone();
+                context.put(snapshot.with_view(film, &display, &[], context, downsample));
             }
-            let report = coarse.clone();
-            context.put(frame.snapshot(film, &[], report, downsample, &context.pool));
         };
         let report = self.state.trace_first_pass(
             &wave,
@@ -263,13 +262,14 @@ impl ActiveRender {
         self.first_hit_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
 
-    fn frame(&self, context: &WorkContext) -> Frame {
-        Frame {
-            view: context.view,
+    /// Creates a snapshot without what it shows of the film.
+    fn snapshot(&self, context: &WorkContext, state: State) -> Snapshot {
+        Snapshot {
+            report: self.report(context, state),
             weights: self.state.weights.clone(),
-            display: self.state.display(),
             lighting: Some(Arc::clone(&self.state.lighting)),
             first_hits: self.first_hits.clone(),
+            ..Snapshot::default()
         }
     }
 
@@ -281,13 +281,14 @@ impl ActiveRender {
             return;
         }
         self.update_first_hits(context, f64::INFINITY);
-        let (frame, report) = (self.frame(context), self.report(context, state));
-        let estimates: Vec<_> = match report.noise {
+        let snapshot = self.snapshot(context, state);
+        let estimates: Vec<_> = match snapshot.report.noise {
             Some(_) => self.schedule.tile_estimates().collect(),
             None => Vec::new(),
         };
-        let (film, downsample) = (&self.state.film, &mut self.downsample);
-        context.put(frame.snapshot(film, &estimates, report, downsample, &context.pool));
+        let (film, display) = (&self.state.film, self.state.display());
+        let downsample = &mut self.downsample;
+        context.put(snapshot.with_view(film, &display, &estimates, context, downsample));
     }
 
     pub fn report(&self, context: &WorkContext, state: State) -> Report {

@@ -1,11 +1,11 @@
 //! Snapshots: picture and progress of a render at one moment.
 
 use crate::film::{
-    DirtyTile, Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe,
-    Thumbnail, TileNoise,
+    Display, Estimator, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail, TileNoise,
 };
 use crate::first_hit_buffer::FirstHitBuffer;
 use crate::relighting::Relighting;
+use crate::session::active_render::WorkContext;
 use crate::session::report::Report;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -47,6 +47,30 @@ impl Snapshot {
     /// `None` if `scene` needs new samples.
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
+    }
+
+    /// Adds what the client has requested of `film`. `estimates` are the errors of the tiles, or
+    /// nothing before the first estimate. `downsample` caches the contributions of tiles to the
+    /// picture, so that only changed tiles are read again.
+    pub(super) fn with_view(
+        mut self,
+        film: &Film,
+        display: &Display,
+        estimates: &[Option<TileNoise>],
+        context: &WorkContext,
+        downsample: &mut Option<IncrementalDownsample>,
+    ) -> Self {
+        if let Some([columns, rows]) = context.view.raster {
+            let cached = downsample.take().filter(|cached| cached.is_for(film, columns, rows));
+            let downsample = downsample
+                .insert(cached.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
+            downsample.update(film, Some(&context.pool));
+            self.picture = Some(downsample.thumbnail());
+            self.tiles = Arc::new(TileMaps::of(film, estimates));
+        }
+        let probe = |pixel| PixelProbe::of_film(film, pixel, &self.weights, display);
+        self.probe = context.view.probe.and_then(probe);
+        self
     }
 }
 
@@ -91,55 +115,4 @@ pub(super) fn tile_estimates(
     let unless_cancelled = |tile| (!cancel.load(Ordering::Relaxed)).then(|| estimate(tile));
     let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
     pool.install(|| tiles.map(unless_cancelled).collect())
-}
-
-/// Inputs of a snapshot besides the film.
-pub(super) struct Frame {
-    pub view: View,
-    pub weights: LightWeights,
-    pub display: Display,
-    pub lighting: Option<Arc<Relighting>>,
-    pub first_hits: Option<Arc<FirstHitBuffer>>,
-}
-
-impl Frame {
-    /// Creates a snapshot of `film`. `estimates` are the errors of the tiles, or nothing before the
-    /// first estimate. `downsample` caches the contributions of tiles to the picture, so that only
-    /// changed tiles are read again.
-    pub fn snapshot(
-        &self,
-        film: &Film,
-        estimates: &[Option<TileNoise>],
-        report: Report,
-        downsample: &mut Option<IncrementalDownsample>,
-        pool: &rayon::ThreadPool,
-    ) -> Snapshot {
-        let picture = self.view.raster.map(|[columns, rows]| {
-            let cached = downsample.take().filter(|cached| cached.is_for(film, columns, rows));
-            let downsample = downsample
-                .insert(cached.unwrap_or_else(|| IncrementalDownsample::new(film, columns, rows)));
-            let stale = downsample.stale(film);
-            if !stale.is_empty() {
-                pool.install(|| stale.into_par_iter().for_each(DirtyTile::refresh));
-            }
-            downsample.thumbnail()
-        });
-        let tiles = match self.view.raster {
-            Some(_) => Arc::new(TileMaps::of(film, estimates)),
-            None => Arc::default(),
-        };
-        let probe = self
-            .view
-            .probe
-            .and_then(|pixel| PixelProbe::of_film(film, pixel, &self.weights, &self.display));
-        Snapshot {
-            report,
-            picture,
-            weights: self.weights.clone(),
-            lighting: self.lighting.clone(),
-            first_hits: self.first_hits.clone(),
-            tiles,
-            probe,
-        }
-    }
 }

@@ -9,7 +9,7 @@ use crate::session::Command;
 use crate::session::active_render::WorkContext;
 use crate::session::picture::{Picture, Source};
 use crate::session::report::Report;
-use crate::session::snapshot::{Frame, tile_estimates};
+use crate::session::snapshot::{Snapshot, tile_estimates};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant, SystemTime};
@@ -137,15 +137,16 @@ impl Watcher {
     fn publish(&mut self) {
         let (Some((_, film)), Some(shown)) = (&self.films.sum, &self.shown) else { return };
         let Shown { header, report, tiles } = shown;
-        let frame = Frame {
-            view: self.context.view,
-            weights: header.weights.clone(),
-            display: header.display,
-            lighting: None,
-            first_hits: None,
-        };
-        let (downsample, pool) = (&mut self.downsample, &self.context.pool);
-        self.context.put(frame.snapshot(film, tiles, report.clone(), downsample, pool));
+        let (report, weights) = (report.clone(), header.weights.clone());
+        let snapshot = Snapshot { report, weights, ..Snapshot::default() };
+        let downsample = &mut self.downsample;
+        self.context.put(snapshot.with_view(
+            film,
+            &header.display,
+            tiles,
+            &self.context,
+            downsample,
+        ));
     }
 }
 
