@@ -11,7 +11,7 @@ use zerkalo_render::image_file::Depth;
 use zerkalo_render::plan::MAX_SHARDS;
 use zerkalo_scene::{Acceleration, Scene};
 use zerkalo_terminal::Environment;
-use zerkalo_world::{self as world, Precision};
+use zerkalo_world::Precision;
 
 /// A progressive, accumulating ray tracer that lives in a terminal.
 #[derive(Debug, Parser)]
@@ -354,12 +354,6 @@ impl ComputeArgs {
     /// Returns the number of threads that trace rays.
     pub fn threads(&self) -> usize {
         self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
-    }
-}
-
-impl PrecisionArgs {
-    pub fn world_options(&self) -> world::Options {
-        world::Options { precision: self.precision, ..world::Options::default() }
     }
 }
 

@@ -19,7 +19,7 @@ use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
 use zerkalo_scene::{Recovery, SceneErrors, SceneFile, state_folder};
 use zerkalo_terminal::Environment;
-use zerkalo_world::{self as world, Precision};
+use zerkalo_world::Precision;
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let environment = terminal_environment().map_err(|reason| {
@@ -53,11 +53,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         checkpoint,
         state,
         threads: args.compute.threads(),
-        options: Options {
-            world: world::Options { precision, ..world::Options::default() },
-            sampling,
-            display: Display::default(),
-        },
+        options: Options::new(precision, sampling, Display::default()),
         settings: Settings::new(true, DEFAULT_STOP),
         terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),

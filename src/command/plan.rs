@@ -61,11 +61,8 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let document = read_scene_and_warn(path)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
-    let options = Options {
-        world: args.precision.world_options(),
-        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler },
-        display: args.picture.display(),
-    };
+    let sampling = SampleSettings { seed: args.compute.seed, kind: args.sampler };
+    let options = Options::new(args.precision.precision, sampling, args.picture.display());
     warn_of_precision(&scene, &options.world);
     let threads = args.compute.threads();
     let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;

@@ -5,7 +5,7 @@ use crate::command::{Failure, warn};
 use zerkalo_render::memory_budget::{Regions, check, divide};
 use zerkalo_scene::Scene;
 use zerkalo_scene::process_memory::{available_memory, megabytes, resident_memory};
-use zerkalo_world::AnyWorld;
+use zerkalo_world::{self as world, AnyWorld};
 
 /// Name of the memory limit in messages, unless the machine has less memory.
 const OPTION: &str = "--memory";
@@ -26,9 +26,14 @@ impl Division {
     /// # Errors
     /// Fails if the smallest regions do not fit, or if a checkpoint is requested or
     /// resumed and a film with all light groups does not fit.
-    pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
+    pub fn new(
+        scene: &Scene,
+        options: &world::Options,
+        args: &RenderArgs,
+        cap: u64,
+    ) -> Result<Self, Failure> {
         // The measured memory of the process then includes the scene.
-        let world = AnyWorld::compile(scene, &args.precision.world_options());
+        let world = AnyWorld::compile(scene, options);
         let groups = world.info().groups.members.len();
         let merged = world.info().groups.merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());

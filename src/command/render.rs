@@ -44,7 +44,10 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         warn(&format!("warning: {warning}"));
     }
     let signals = handle_signals()?;
-    let division = args.memory.map(|cap| Division::new(&scene, args, cap)).transpose()?;
+    let sampling = SampleSettings { seed: args.compute.seed, kind: args.sampler };
+    let mut options = Options::new(args.precision.precision, sampling, args.picture.display());
+    let division = args.memory.map(|cap| Division::new(&scene, &options.world, args, cap));
+    let division = division.transpose()?;
 
     let size = scene.film.size;
     let provenance = Provenance {
@@ -53,7 +56,6 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         sampler: args.sampler,
         adaptive: !args.uniform,
     };
-    let mut options = options(args);
     warn_of_precision(&scene, &options.world);
     options.world.merge_lights = division.is_some_and(|division| division.merge_lights);
     let job = Job { args, scene, options, output: &output, provenance, signals, started };
@@ -245,14 +247,6 @@ fn check_outputs(args: &RenderArgs, output: &ImageOutput) -> Result<(), Failure>
     match &args.checkpoint {
         Some(path) => CheckpointWriter::check(path, args.resume.as_deref()),
         None => Ok(()),
-    }
-}
-
-fn options(args: &RenderArgs) -> Options {
-    Options {
-        world: args.precision.world_options(),
-        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler },
-        display: args.picture.display(),
     }
 }
 

@@ -20,7 +20,7 @@ use zerkalo_render::{FileError, Options, RenderState};
 use zerkalo_scene::Document;
 use zerkalo_scene::disk::WriteError;
 use zerkalo_terminal::Signals;
-use zerkalo_world::{self as world, Precision};
+use zerkalo_world::Precision;
 
 /// Time to the first checkpoint. Each later interval is twice the previous one.
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
@@ -153,11 +153,8 @@ fn start(
         scene.trace.acceleration = acceleration;
     }
     let precision = Precision::of_name(&settings.precision);
-    let options = Options {
-        world: world::Options { precision, ..world::Options::default() },
-        sampling: SampleSettings { seed: settings.seed, kind: settings.sampler },
-        display: settings.display,
-    };
+    let sampling = SampleSettings { seed: settings.seed, kind: settings.sampler };
+    let options = Options::new(precision, sampling, settings.display);
     let mut state = RenderState::new(&Arc::new(scene), &options, None)
         .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;

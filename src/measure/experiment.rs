@@ -8,7 +8,7 @@ use zerkalo_render::schedule::{Settings, Stop};
 use zerkalo_render::{Options, SyncRender};
 use zerkalo_scene::material::Lobe;
 use zerkalo_scene::{Acceleration, RayTypes, Scene};
-use zerkalo_world::{self as world, AnyWorld, Precision};
+use zerkalo_world::{AnyWorld, Precision};
 
 /// Experiment: variants of one setting that trades speed for accuracy, against its default.
 #[derive(Debug)]
@@ -201,15 +201,12 @@ impl Plan {
     /// Returns the default settings, then the changed settings of each experiment that differ from
     /// the default in this scene.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
+        let sampling = SampleSettings { seed: self.seed, kind: SamplerKind::Sobol };
         let base = Variant {
             experiment: &DEFAULT,
             name: DEFAULT.name.to_string(),
             scene: Arc::clone(scene),
-            options: Options {
-                world: world::Options::default(),
-                sampling: SampleSettings { seed: self.seed, kind: SamplerKind::Sobol },
-                display: self.display,
-            },
+            options: Options::new(Precision::Auto, sampling, self.display),
             adaptive: true,
             threads: self.threads,
         };

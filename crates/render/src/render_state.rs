@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use zerkalo_kernel::sampling::SampleSettings;
 use zerkalo_scene::Scene;
-use zerkalo_world::{self as world, AnyWorld};
+use zerkalo_world::{self as world, AnyWorld, Precision};
 
 /// Options of a render: scene compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
@@ -20,6 +20,14 @@ pub struct Options {
     pub sampling: SampleSettings,
     /// Display transform of the picture whose noise is estimated.
     pub display: Display,
+}
+
+impl Options {
+    /// Creates options with separate light groups.
+    pub fn new(precision: Precision, sampling: SampleSettings, display: Display) -> Self {
+        let world = world::Options { precision, ..world::Options::default() };
+        Self { world, sampling, display }
+    }
 }
 
 /// State of a progressive render: compiled scene, its film, and the estimator of the film's noise.

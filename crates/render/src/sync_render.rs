@@ -2,7 +2,6 @@
 //! not depend on the moments at which a session would publish snapshots.
 
 use crate::schedule::{Schedule, Settings, Step, StoppedBy};
-
 use crate::{Options, RenderState, threads};
 use std::io;
 use std::sync::Arc;
