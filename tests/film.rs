@@ -300,12 +300,11 @@ fn exr_files_hold_linear_layers() {
         let channel = layer.channel_data.list.iter().find(|c| c.name.eq(name)).unwrap();
         channel.sample_data.value_by_flat_index(y * WIDTH + x)
     };
-    let mut row = vec![];
     for (x, y) in [(0, 0), (36, 20), (17, 3), (2, 19)] {
         for (layer, replicates) in
             [("", Replicates::Both), ("A.", Replicates::A), ("B.", Replicates::B)]
         {
-            film.row(y, replicates, &mix(), &mut row);
+            let row = film.row(y, replicates, &mix());
             for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
                 let got = value(&format!("{layer}{color}"), x, y).to_f32();
                 assert_eq!(got, row[x][c] as f32, "{layer}{color} at {x} {y}");

@@ -60,10 +60,9 @@ fn light_weights_replace_retracing() {
         let unchanged = picture(&rendering, Replicates::Both).concat();
         for (what, after) in &changes {
             let mix = LightWeights { weights: rendering.world.info().groups.mix(after) };
-            let (mut mixed, mut row) = (Vec::new(), Vec::new());
+            let mut mixed = Vec::new();
             for y in 0..rendering.film.height() {
-                rendering.film.row(y, Replicates::Both, &mix, &mut row);
-                mixed.extend(row.concat());
+                mixed.extend(rendering.film.row(y, Replicates::Both, &mix).concat());
             }
             let fresh = values(after, precision);
             let apart = difference(&mixed, &fresh);

@@ -4,6 +4,10 @@ use zerkalo_render::film::{Display, Film, LightWeights, Replicates};
 
 /// Reference picture, with an estimate of its own error.
 pub struct Reference {
+    /// Samples per pixel of its render; 0 if it was read from a file.
+    pub spp: f64,
+    /// Seconds of its render; 0 if it was read from a file.
+    pub seconds: f64,
     /// Pixels in linear radiance, `[row][column]`.
     pixels: Vec<[f64; 3]>,
     levels: Vec<[f64; 3]>,
@@ -83,13 +87,7 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
 
 /// Returns the pixels of the picture of `film`, `[row][column]`.
 fn pixels(film: &Film, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
-    let mut all = Vec::with_capacity(film.width() * film.height());
-    let mut row = Vec::new();
-    for y in 0..film.height() {
-        film.row(y, replicates, weights, &mut row);
-        all.extend_from_slice(&row);
-    }
-    all
+    (0..film.height()).flat_map(|y| film.row(y, replicates, weights)).collect()
 }
 
 impl Reference {
@@ -113,7 +111,8 @@ impl Reference {
     pub fn of_pixels(pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         let levels = pixels.iter().map(|x| display.levels(*x)).collect();
         let own = Squares::default();
-        Self { pixels, levels, halves: Vec::new(), own, display: *display }
+        let halves = Vec::new();
+        Self { spp: 0.0, seconds: 0.0, pixels, levels, halves, own, display: *display }
     }
 
     /// Returns the RMSE of the reference itself, estimated from its replicates, in 8-bit levels.

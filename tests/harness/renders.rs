@@ -178,11 +178,6 @@ pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
 
 /// Returns the radiance of every pixel, row by row.
 pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]> {
-    let mut row = Vec::new();
-    let mut all = Vec::new();
-    for y in 0..rendering.film.height() {
-        rendering.film.row(y, replicates, &rendering.weights, &mut row);
-        all.extend_from_slice(&row);
-    }
-    all
+    let RenderState { film, weights, .. } = rendering;
+    (0..film.height()).flat_map(|y| film.row(y, replicates, weights)).collect()
 }

@@ -8,9 +8,8 @@ use crate::harness::*;
 fn levels(session: &Session) -> (Vec<[f64; 3]>, f64) {
     let read = |r: &RenderState| {
         let mut all = Vec::new();
-        let mut row = Vec::new();
         for y in 0..r.film.height() {
-            r.film.row(y, Replicates::Both, &r.weights, &mut row);
+            let row = r.film.row(y, Replicates::Both, &r.weights);
             all.extend(row.iter().map(|x| Display::default().levels(*x)));
         }
         all

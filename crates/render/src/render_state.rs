@@ -63,7 +63,7 @@ impl RenderState {
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
         let size = [self.film.width() as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header().clone() };
-        let film = self.film.reuse_for(header);
+        let film = Film::try_new(header, Some(self.film));
         let film = film.map_err(|_| memory_budget::refused(size, self.weights.weights.len()))?;
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
@@ -98,10 +98,7 @@ impl RenderState {
         };
         let weights = LightWeights { weights: world.info().groups.mix(&scene) };
         let estimator = Estimator::new(&header.scales, &weights, &options.display);
-        let film = match previous {
-            Some(previous) => previous.film.reuse_for(header),
-            None => Film::try_new(header),
-        };
+        let film = Film::try_new(header, previous.map(|previous| previous.film));
         let film = film.map_err(|_| memory_budget::refused(size, groups))?;
         let film = film.starting_at(rows.start as usize);
         let groups = world.info().groups.clone();

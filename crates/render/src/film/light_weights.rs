@@ -105,11 +105,10 @@ mod tests {
         for (x, y) in [(0, 0), (19, 17), (16, 15), (3, 16)] {
             assert_eq!(film.pixel(x, y, &mix), expected(x as f64, y as f64), "{x} {y}");
         }
-        let mut row = Vec::new();
-        film.row(17, Replicates::Both, &mix, &mut row);
+        let row = film.row(17, Replicates::Both, &mix);
         assert_eq!(row.len(), 20);
         assert_eq!(row[19], expected(19.0, 17.0));
-        film.row(17, Replicates::B, &only(0, 2), &mut row);
+        let row = film.row(17, Replicates::B, &only(0, 2));
         assert_eq!(row[5], [5.0 / 4.0, 17.0 / 4.0, 0.5]);
     }
 

@@ -191,11 +191,8 @@ fn both_tone_curves_are_estimated_as_displayed() {
         // The validation estimate comes from the white pixels of the checkerboard.
         let mut mse = 0.0;
         for y in 0..16 {
-            let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|replicates| {
-                let mut row = vec![];
-                film.row(y, replicates, &white(1), &mut row);
-                row
-            });
+            let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B]
+                .map(|replicates| film.row(y, replicates, &white(1)));
             for ((m, a), b) in m.iter().zip(&a).zip(&b).skip((y + 1) % 2).step_by(2) {
                 let [m, a, b] = [m, a, b].map(|radiance| display.levels(*radiance));
                 for c in 0..3 {

@@ -71,18 +71,26 @@ impl Film {
     /// Panics if width, height or the number of groups is 0, if there are more than
     /// [`MAX_FILM_GROUPS`] groups, or if a scale is not a power of two.
     pub fn new(header: Header) -> Self {
-        Self::try_new(header).expect("memory for the tiles of a film")
+        Self::try_new(header, None).expect("memory for the tiles of a film")
     }
 
-    /// Creates a film without samples. A large film gets all its memory here.
+    /// Creates a film without samples, in the memory of `previous`. A large film gets all its
+    /// memory here.
     ///
     /// # Errors
     /// Fails if there is too little memory.
     ///
     /// # Panics
     /// See [`Film::new`].
-    pub fn try_new(header: Header) -> Result<Self, TryReserveError> {
+    pub fn try_new(header: Header, previous: Option<Self>) -> Result<Self, TryReserveError> {
         let mut film = Self::without_memory(header)?;
+        if let Some(previous) = previous {
+            // Caches that compare epochs must not mistake the new film for the old one.
+            film.epoch = previous.epoch + 1;
+            for (tile, old) in film.tiles.iter_mut().zip(previous.tiles) {
+                tile.take_memory(old);
+            }
+        }
         film.reserve()?;
         Ok(film)
     }
@@ -125,29 +133,6 @@ impl Film {
                 .map(|extent| Tile::cleared(scales.len(), extent)),
         );
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
-    }
-
-    /// Creates a film without samples in the memory of this one.
-    ///
-    /// # Errors
-    /// Fails if there is too little memory.
-    ///
-    /// # Panics
-    /// See [`Film::new`].
-    pub fn reuse_for(mut self, header: Header) -> Result<Self, TryReserveError> {
-        if header == self.header {
-            self.restart();
-            self.first_row = 0;
-            return Ok(self);
-        }
-        let mut film = Self::without_memory(header)?;
-        // Caches that compare epochs must not mistake the new film for the old one.
-        film.epoch = self.epoch + 1;
-        for (tile, old) in film.tiles.iter_mut().zip(self.tiles) {
-            tile.take_memory(old);
-        }
-        film.reserve()?;
-        Ok(film)
     }
 
     /// Returns this film as a band of a picture that begins in row `first_row`. Methods count rows
@@ -270,19 +255,13 @@ impl Film {
         self.touched().map(|(_, tile)| samples_of_tile(tile)).sum()
     }
 
-    /// Writes the radiance of the pixels in row `y` to `row`: the mean over the samples in
-    /// `replicates`, black without samples.
-    pub fn row(
-        &self,
-        y: usize,
-        replicates: Replicates,
-        weights: &LightWeights,
-        row: &mut Vec<[f64; 3]>,
-    ) {
-        row.clear();
-        row.resize(self.width(), [0.0; 3]);
+    /// Returns the radiance of the pixels in row `y`: the mean over the samples in `replicates`,
+    /// black without samples.
+    pub fn row(&self, y: usize, replicates: Replicates, weights: &LightWeights) -> Vec<[f64; 3]> {
+        let mut row = vec![[0.0; 3]; self.width()];
         let per_unit = weights.radiance_per_step(self.scales());
         self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
+        row
     }
 
     /// Calls `f` with the column and the integer sums of each pixel of row `y`. Tiles without
@@ -452,7 +431,7 @@ mod tests {
         // more and fewer light groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
             let (header, bytes) = expected(width, height, groups);
-            old = old.reuse_for(header).unwrap();
+            old = Film::try_new(header, Some(old)).unwrap();
             assert_eq!((old.samples(), old.touched().count()), (0, 0));
             fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
             assert_eq!(old.bytes(), bytes, "{width} x {height}, {groups} groups");

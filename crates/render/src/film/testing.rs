@@ -94,9 +94,7 @@ impl TestFilm for Film {
     }
 
     fn pixels_of_row(&self, y: usize, weights: &LightWeights) -> Vec<[f64; 3]> {
-        let mut row = Vec::new();
-        self.row(y, Replicates::Both, weights, &mut row);
-        row
+        self.row(y, Replicates::Both, weights)
     }
 
     fn bytes(&self) -> Vec<u8> {

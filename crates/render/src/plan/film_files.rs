@@ -346,7 +346,7 @@ fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
     let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
     memory_budget::check(size, groups, 0)?;
-    Film::try_new(film.clone()).map_err(|_| memory_budget::refused(size, groups))
+    Film::try_new(film.clone(), None).map_err(|_| memory_budget::refused(size, groups))
 }
 
 impl Contents {
