@@ -40,15 +40,14 @@ pub struct End {
 /// while the error halves.
 const POINT_RATIO: f64 = 0.84;
 
-/// Render that has reached the end of its error curve.
-pub struct Followed {
-    pub points: Vec<Point>,
-    pub render: SyncRender,
-}
-
 /// Renders with the settings of `variant` until `end`, or until further samples cannot change the
-/// picture. Returns the error of the system if a thread cannot be started.
-pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<Followed> {
+/// picture. Returns the error curve and the render, or the error of the system if a thread cannot be
+/// started.
+pub fn follow(
+    variant: &Variant,
+    reference: &Reference,
+    end: End,
+) -> io::Result<(Vec<Point>, SyncRender)> {
     let mut render = variant.start()?;
     let mut points: Vec<Point> = Vec::new();
     let mut last_estimate = f64::INFINITY;
@@ -79,7 +78,7 @@ pub fn follow(variant: &Variant, reference: &Reference, end: End) -> io::Result<
             }
         }
     }
-    Ok(Followed { points, render })
+    Ok((points, render))
 }
 
 /// Renders with the settings of `variant` again, and adds the seconds to each point of its error

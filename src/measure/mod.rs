@@ -20,4 +20,4 @@ pub use error_curve::Point;
 pub use experiment::{DEFAULT, EXPERIMENTS, Experiment, Plan, Variant};
 pub use reference_image::{Bias, Errors, Reference};
 pub use result::{Expected, Measured, Measurement, Median, TimeToTarget, median, spread};
-pub use run::{Progress, measure};
+pub use run::{Observer, measure};

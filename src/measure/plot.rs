@@ -49,20 +49,13 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
 
 /// Returns the experiments with their variants, each of which has a panel that also shows the
 /// default settings. They have a panel of their own only if there are no experiments.
-fn panels(measurement: &Measurement) -> Vec<(&'static Experiment, Vec<&Measured>)> {
-    let mut panels: Vec<(&'static Experiment, Vec<&Measured>)> = Vec::new();
-    for measured in measurement.measured.iter().skip(1) {
-        match panels.last_mut() {
-            Some((experiment, variants)) if *experiment == measured.experiment => {
-                variants.push(measured)
-            }
-            _ => panels.push((measured.experiment, vec![measured])),
-        }
+fn panels(measurement: &Measurement) -> Vec<(&'static Experiment, &[Measured])> {
+    let changed = measurement.measured.get(1..).unwrap_or_default();
+    let panels = changed.chunk_by(|a, b| a.experiment == b.experiment);
+    match changed {
+        [] => vec![(&experiment::DEFAULT, changed)],
+        _ => panels.map(|variants| (variants[0].experiment, variants)).collect(),
     }
-    if panels.is_empty() {
-        panels.push((&experiment::DEFAULT, Vec::new()));
-    }
-    panels
 }
 
 /// Returns the number of columns and rows of a grid for `panels` panels of the plot.
@@ -134,9 +127,9 @@ fn panel(
     area: &DrawingArea<SVGBackend, Shift>,
     measurement: &Measurement,
     experiment: &Experiment,
-    variants: &[&Measured],
+    variants: &[Measured],
 ) -> Drawn {
-    let all = measurement.measured.first().into_iter().chain(variants.iter().copied());
+    let all = measurement.measured.first().into_iter().chain(variants);
     let curves: Vec<(&str, Vec<(f64, f64)>)> =
         all.map(|measured| (measured.name.as_str(), points(measured))).collect();
     let numbers = || curves.iter().flat_map(|(_, points)| points);

@@ -1,7 +1,7 @@
 //! Course of a measurement: renders the reference, follows the error curve of every variant, and
 //! repeats the renders for the medians of the times.
 
-use crate::measure::error_curve::{End, Followed, follow, repeat};
+use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
@@ -11,15 +11,10 @@ use std::time::Instant;
 use zerkalo_render::SyncRender;
 use zerkalo_scene::Scene;
 
-/// Progress of a measurement.
-pub struct Progress<'a> {
-    /// Render in progress: `reference`, or the name of a variant.
-    pub step: &'a str,
-    /// Number of renders that have ended.
-    pub done: usize,
-    /// Expected number of renders.
-    pub total: usize,
-}
+/// Observer of a measurement. It gets the render in progress, which is `reference` or the name of a
+/// variant, and the numbers of renders that have ended and that are expected. If it returns `false`,
+/// the measurement ends with the results so far.
+pub type Observer<'a> = &'a mut dyn FnMut(&str, usize, usize) -> bool;
 
 /// Seconds of tracing before the measurement, until clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
@@ -44,13 +39,12 @@ const MAX_STEADY_ROUNDS: usize = 7;
 const MAX_ROUNDS: usize = 31;
 
 /// Measures `scene`, which must be valid. Without a `reference`, one is rendered with another
-/// random seed. `report` receives the progress; if it returns `false`, the measurement ends with
-/// the results so far. Returns the error of the system if a thread cannot be started.
+/// random seed. Returns the error of the system if a thread cannot be started.
 pub fn measure(
     scene: &Arc<Scene>,
     plan: &Plan,
     reference: Option<Reference>,
-    report: &mut dyn FnMut(Progress) -> bool,
+    report: Observer,
 ) -> io::Result<Measurement> {
     let (variants, started) = (plan.variants(scene), Instant::now());
     let mut course = Course { plan, variants, started, report, keep_going: true };
@@ -60,27 +54,26 @@ pub fn measure(
     while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
     drop(warm_up);
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
-    let rendered = match reference {
-        Some(given) => RenderedReference { reference: given, spp: 0.0, seconds: 0.0 },
+    let reference = match reference {
+        Some(given) => given,
         None => render_reference(&default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
     };
-    let reference = &rendered.reference;
     let idle = |experiment: &&'static Experiment| {
         !course.variants.iter().any(|variant| variant.experiment == *experiment)
     };
     let mut measurement = Measurement {
         size: scene.film.size,
-        reference_spp: rendered.spp,
+        reference_spp: reference.spp,
         reference_levels: reference.noise_levels(),
         reference_linear: reference.noise_linear(),
-        reference_seconds: rendered.seconds,
+        reference_seconds: reference.seconds,
         compared_at: COMPARED_AT,
         targets: plan.targets.clone(),
         expected: Vec::new(),
         idle: plan.experiments.iter().copied().filter(idle).collect(),
         measured: Vec::new(),
     };
-    course.follow_all(reference, least, &mut measurement)?;
+    course.follow_all(&reference, least, &mut measurement)?;
     course.repeat_all(&mut measurement)?;
     Ok(measurement)
 }
@@ -90,14 +83,14 @@ struct Course<'a> {
     plan: &'a Plan,
     variants: Vec<Variant>,
     started: Instant,
-    report: &'a mut dyn FnMut(Progress) -> bool,
+    report: Observer<'a>,
     keep_going: bool,
 }
 
 impl Course<'_> {
     fn announce(&mut self, step: &str, done: usize) {
         let total = 1 + self.variants.len() * self.plan.repetitions.max(1);
-        self.keep_going &= (self.report)(Progress { step, done: done.min(total), total });
+        self.keep_going &= (self.report)(step, done.min(total), total);
     }
 
     /// Follows the error curves of all variants: that of the default settings to the noise `least`,
@@ -118,7 +111,7 @@ impl Course<'_> {
             let levels = if i == 0 { least } else { measurement.compared_at };
             let use_estimate = !variant.experiment.is_unbiased;
             let end = End { levels, seconds: longest, use_estimate };
-            let Followed { points, render } = follow(variant, reference, end)?;
+            let (points, render) = follow(variant, reference, end)?;
             let bias =
                 use_estimate.then(|| reference.bias(&render.state.film, &render.state.weights));
             let result = Measured {
@@ -204,16 +197,9 @@ fn is_steady(measured: &Measured, levels: f64) -> bool {
     measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY
 }
 
-/// Reference picture with the cost of rendering it.
-struct RenderedReference {
-    reference: Reference,
-    spp: f64,
-    seconds: f64,
-}
-
 /// Renders a reference with another random seed, until its noise is at most `levels` 8-bit levels
 /// or `seconds` have passed.
-fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<RenderedReference> {
+fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<Reference> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mut render = other.start()?;
@@ -223,11 +209,9 @@ fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<
         }
     }
     let (state, display) = (&render.state, &other.options.display);
-    Ok(RenderedReference {
-        reference: Reference::of_film(&state.film, &state.weights, display),
-        spp: render.schedule.spp().mean,
-        seconds: render.seconds,
-    })
+    let mut reference = Reference::of_film(&state.film, &state.weights, display);
+    (reference.spp, reference.seconds) = (render.schedule.spp().mean, render.seconds);
+    Ok(reference)
 }
 
 #[cfg(test)]

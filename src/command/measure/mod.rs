@@ -36,12 +36,13 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     drop(world);
     let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
-    let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        bar.set_message(progress.step.to_string());
-        signals.caught().is_none()
-    })?;
+    let measurement =
+        measure::measure(&Arc::new(scene), &plan, reference, &mut |step, done, total| {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+            bar.set_message(step.to_string());
+            signals.caught().is_none()
+        })?;
     bar.finish_and_clear();
 
     let report = table::MeasureReport {

@@ -177,17 +177,12 @@ impl MeasureReport<'_> {
         let default = self.measurement.measured[0].time_to(levels);
         let reached_at = measured.true_time_to(levels);
         let followed = || measured.points.last().map_or(0.0, |p| median(&p.seconds));
-        let (time, speed) = match (&reached_at, &default) {
-            (Some(target), Some(default)) => {
-                (reached(target), format!("{:.2}x", default.seconds / target.seconds))
-            }
-            (Some(target), None) => (reached(target), String::new()),
-            (None, Some(default)) => (
-                format!("> {}", time(followed())),
-                format!("< {:.2}x", default.seconds / followed()),
-            ),
-            (None, None) => (format!("> {}", time(followed())), String::new()),
+        let (bound, seconds, time) = match &reached_at {
+            Some(target) => ("", target.seconds, reached(target)),
+            None => ("< ", followed(), format!("> {}", time(followed()))),
         };
+        let speed = default.map(|default| format!("{bound}{:.2}x", default.seconds / seconds));
+        let speed = speed.unwrap_or_default();
         let spp = reached_at.as_ref().map_or(String::new(), |c| format!("{:.0}", c.spp));
         let rate = measured.samples_per_second().map_or(0.0, |speed| speed.value * 1e-6);
         write!(f, "  {name:<18}  {time:>14}  {speed:>9}  {spp:>9}  {rate:>9.1}")?;
