@@ -104,7 +104,7 @@ fn extreme_29_stopped_and_resumed() {
                         stopped.trace_wave(&all, &pool, &cancel)
                     });
                     let mut remaining = all.clone();
-                    let mut done = report.reports.iter().map(Option::is_some);
+                    let mut done = report.iter().map(Option::is_some);
                     remaining.jobs.retain(|_| !done.next().unwrap());
                     assert!(pause.is_some() || remaining.jobs.len() == all.jobs.len());
                     trace(&mut resumed, &remaining, &pool);

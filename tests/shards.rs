@@ -51,7 +51,7 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
         base_plan: None,
     };
     let mut schedule = pilot.schedule.clone();
-    schedule.set_stop(until(noise).stop);
+    schedule.settings.stop = until(noise).stop;
     Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings).unwrap()
 }
 

@@ -63,7 +63,9 @@ impl CheckpointWriter {
     fn request(&self, session: &Session) -> Receiver<Result<(), WriteError>> {
         let (sender, written) = channel();
         let path = self.path.clone();
-        session.checkpoint(self.provenance.clone(), move |checkpoint| {
+        let provenance = self.provenance.clone();
+        session.submit(move |picture| {
+            let checkpoint = picture.and_then(|picture| picture.checkpoint(&provenance));
             std::thread::spawn(move || {
                 let written = checkpoint.map_or(Ok(()), |it| it.write(&path, Existing::Replace));
                 // After an error of the render, the channel is closed.

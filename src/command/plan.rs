@@ -82,7 +82,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         base_plan: None,
     };
     let mut schedule = pilot.schedule.clone();
-    schedule.set_stop(stop(args.noise));
+    schedule.settings.stop = stop(args.noise);
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
         .ok_or("the pilot has no estimate of its noise")?;
     let part = Part {

@@ -93,7 +93,7 @@ fn uniform_curve(
         for replicate in [0, 1] {
             let wave = wave(&rendering.film, replicate, done, count);
             let report = trace(&mut rendering, &wave, &pool);
-            rays += report.reports.iter().flatten().map(|job| job.rays).sum::<u64>();
+            rays += report.iter().flatten().map(|job| job.rays).sum::<u64>();
         }
         done += count;
         curve.push(Point { rays: rays as f64, square: reference.square(&rendering) });

@@ -349,7 +349,9 @@ fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> (Vec<
                 sampler: SamplerKind::Sobol,
                 adaptive: true,
             };
-            session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
+            session.submit(move |picture| {
+                sender.send(picture.unwrap().checkpoint(&provenance)).unwrap();
+            });
             receiver.recv().unwrap().expect("a picture").write(path, Existing::Replace).unwrap();
         }
         if let State::Finished(_) = report.state {

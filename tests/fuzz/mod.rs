@@ -239,7 +239,9 @@ fn checkpoints() -> Vec<Vec<u8>> {
                 sampler: SamplerKind::Sobol,
                 adaptive: true,
             };
-            session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
+            session.submit(move |picture| {
+                sender.send(picture.unwrap().checkpoint(&provenance)).unwrap();
+            });
             receiver.recv().unwrap().expect("a picture").write(&path, Existing::Replace).unwrap();
             std::fs::read(&path).unwrap()
         })

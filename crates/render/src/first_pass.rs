@@ -58,7 +58,7 @@ pub fn run<L: SimdFloat>(
         previous_step = step;
     }
     let report = |c: Counts| Some(JobReport { rays: c.rays, glossy: c.glossy, error: None });
-    Some(WaveReport { reports: counts.into_iter().map(report).collect() })
+    Some(counts.into_iter().map(report).collect())
 }
 
 struct StripPixel {

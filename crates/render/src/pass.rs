@@ -61,12 +61,11 @@ pub fn run_typed<L: SimdFloat>(
     };
     // The calling thread traces a single job, if the pool has a single thread: no switch of
     // threads.
-    let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
+    if pool.current_num_threads() == 1 && slots.len() == 1 {
         slots.into_iter().zip(&wave.jobs).map(trace).collect()
     } else {
         pool.install(|| slots.into_par_iter().zip(&wave.jobs).with_max_len(1).map(trace).collect())
-    };
-    WaveReport { reports }
+    }
 }
 
 pub(super) struct TileRenderer<'a, L: SimdFloat> {

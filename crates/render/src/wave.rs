@@ -51,11 +51,8 @@ pub struct JobReport {
     pub error: Option<TileNoise>,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub struct WaveReport {
-    /// Reports in the order of the jobs. `None` for a job that was cancelled before it started.
-    pub reports: Vec<Option<JobReport>>,
-}
+/// Reports in the order of the jobs. `None` for a job that was cancelled before it started.
+pub type WaveReport = Vec<Option<JobReport>>;
 
 #[cfg(test)]
 mod tests {

@@ -173,8 +173,10 @@ impl EffectRunner {
     fn write_checkpoint(&mut self, scene: &Scene) {
         let (exporter, results) = (self.exporter.clone(), self.results.clone());
         let running = self.begin_export();
-        self.session.checkpoint(self.exporter.provenance(scene), move |checkpoint| {
+        let provenance = self.exporter.provenance(scene);
+        self.session.submit(move |picture| {
             let _running = running;
+            let checkpoint = picture.and_then(|picture| picture.checkpoint(&provenance));
             let written = exporter.write_checkpoint(checkpoint);
             let _ = results.send(Message::Exported(written));
         });

@@ -101,7 +101,7 @@ impl ShardRender {
         for replicate in 0..2 {
             wave.replicate = replicate;
             let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
-            self.rays += report.reports.iter().flatten().map(|report| report.rays).sum::<u64>();
+            self.rays += report.iter().flatten().map(|report| report.rays).sum::<u64>();
         }
         for job in &wave.jobs {
             traced += 2 * u64::from(job.count) * self.state.film.tile_pixels(job.tile as usize);

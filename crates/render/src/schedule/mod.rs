@@ -21,7 +21,7 @@ mod tests;
 mod tile;
 
 use crate::film::{Noise, TileNoise};
-use crate::wave::{Job, Wave, WaveReport};
+use crate::wave::{Job, JobReport, Wave};
 use convergence_fit::ConvergenceFit;
 pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
@@ -70,7 +70,8 @@ pub struct Spp {
 /// Sample counts and noise estimates of the tiles of a render, and the jobs to trace next.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    settings: Settings,
+    /// Settings. A finished render resumes if new stop criteria are not reached.
+    pub settings: Settings,
     tiles: Vec<Tile>,
     /// Jobs of the current round, each for both replicates.
     round: Vec<Job>,
@@ -145,8 +146,8 @@ impl Schedule {
 
     /// Records the report of a wave that [`Schedule::next`] returned, or of the piece that
     /// [`Wave::cut`] left. Jobs that were cut off or cancelled are part of a later wave.
-    pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
-        let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
+    pub fn complete(&mut self, wave: &Wave, reports: &[Option<JobReport>]) {
+        let mut reports = wave.jobs.iter().zip(reports).peekable();
         let mut partial = Vec::new();
         let remaining = std::mem::take(&mut self.remaining);
         for whole in remaining {
@@ -172,16 +173,6 @@ impl Schedule {
         if self.remaining.is_empty() && wave.estimate {
             self.update_noise();
         }
-    }
-
-    /// Sets the stop criteria. A finished render resumes if the new ones are not reached.
-    pub fn set_stop(&mut self, stop: Stop) {
-        self.settings.stop = stop;
-    }
-
-    /// Sets [`Settings::rays_per_pixel`](crate::schedule::Settings::rays_per_pixel).
-    pub fn set_rays_per_pixel(&mut self, cap: u32) {
-        self.settings.rays_per_pixel = cap;
     }
 
     /// Discards all noise estimates after a change of light weights or display transform. The

@@ -7,7 +7,7 @@ use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::session::Shared;
 use crate::session::report::{QUALITIES, Report, State};
 use crate::session::snapshot::{Snapshot, View, tile_estimates};
-use crate::wave::{Wave, WaveReport};
+use crate::wave::{JobReport, Wave};
 use crate::{Options, RenderState};
 use crossbeam_channel::{Receiver, Sender};
 use std::sync::Arc;
@@ -149,7 +149,7 @@ impl ActiveRender {
         if !self.state.try_reuse(scene) {
             return false;
         }
-        self.schedule.set_rays_per_pixel(scene.film.rays_per_pixel);
+        self.schedule.settings.rays_per_pixel = scene.film.rays_per_pixel;
         if self.state.weights != weights {
             self.invalidate_estimates();
         }
@@ -163,9 +163,9 @@ impl ActiveRender {
     }
 
     /// Records the report of a wave that took the time `traced_for`.
-    fn complete(&mut self, wave: &Wave, report: &WaveReport, traced_for: Duration) {
+    fn complete(&mut self, wave: &Wave, reports: &[Option<JobReport>], traced_for: Duration) {
         let before = self.schedule.samples;
-        self.schedule.complete(wave, report);
+        self.schedule.complete(wave, reports);
         self.traced_for += traced_for;
         let (samples, seconds) = (self.schedule.samples - before, traced_for.as_secs_f64());
         // All jobs of a cancelled wave may be missing.

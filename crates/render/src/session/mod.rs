@@ -24,9 +24,7 @@ mod tests;
 mod watch;
 mod worker;
 
-use crate::export::Provenance;
 use crate::film::Display;
-use crate::film::file::EncodedFilm;
 use crate::plan::FilmFiles;
 pub use crate::plan::{WatchedShards, WatchedState};
 use crate::schedule::{Settings, Stop};
@@ -146,18 +144,6 @@ impl Session {
     /// this is not possible, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
-    }
-
-    /// Encodes the render as a checkpoint and calls `task` with it, as [`Session::submit`] does.
-    /// The argument of `task` is `None` if there is no picture yet.
-    pub fn checkpoint(
-        &self,
-        provenance: Provenance,
-        task: impl FnOnce(Option<EncodedFilm>) + Send + 'static,
-    ) {
-        self.submit(move |picture| {
-            task(picture.and_then(|picture| picture.checkpoint(&provenance)));
-        });
     }
 
     /// Compiles the newest scene again and starts with an empty film. Returns a new generation.

@@ -49,7 +49,7 @@ impl<'a> Picture<'a> {
 
     /// Encodes the render as a checkpoint. Returns `None` before the first picture, or if the
     /// session watches films.
-    pub(super) fn checkpoint(&self, provenance: &Provenance) -> Option<EncodedFilm> {
+    pub fn checkpoint(&self, provenance: &Provenance) -> Option<EncodedFilm> {
         match self.source {
             Source::Render(ActiveRender { state, schedule, first_picture_after, .. }, pool) => {
                 first_picture_after

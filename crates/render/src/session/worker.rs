@@ -108,7 +108,7 @@ impl Worker {
             Command::View(view) => self.context.view = view,
             Command::Stop(stop) => {
                 self.settings.stop = stop;
-                self.work().into_iter().for_each(|work| work.schedule.set_stop(stop));
+                self.work().into_iter().for_each(|work| work.schedule.settings.stop = stop);
             }
             Command::Display(display) => self.set_display(display),
             Command::Task(task) => self.tasks.push(task),

@@ -60,7 +60,7 @@ fn higher_target_resumes_after_the_lower_one() {
                 StoppedBy::Spp
             );
             assert_eq!(schedule.spp().mean, f64::from(low));
-            schedule.set_stop(spp(2000));
+            schedule.settings.stop = spp(2000);
             // Jobs may now start at any sample index. The simulated picture still panics if samples
             // are repeated or out of order.
             model.aligned = false;
@@ -80,9 +80,9 @@ fn higher_target_resumes_after_the_lower_one() {
             assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
             assert_eq!(schedule.spp().mean, 2000.0);
             // The lower target is reached at once.
-            schedule.set_stop(spp(low));
+            schedule.settings.stop = spp(low);
             assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Spp));
-            schedule.set_stop(noise(1e6));
+            schedule.settings.stop = noise(1e6);
             assert_eq!(schedule.next(0.0), Step::Finished(StoppedBy::Noise));
         }
     }
@@ -118,10 +118,10 @@ fn new_estimates_replace_the_old_ones() {
 fn cap_may_rise_and_fall() {
     let mut model = Model::exact(mixed());
     let mut schedule = model.schedule(until(spp(100), false));
-    schedule.set_rays_per_pixel(40);
+    schedule.settings.rays_per_pixel = 40;
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
-    schedule.set_rays_per_pixel(0);
+    schedule.settings.rays_per_pixel = 0;
     // The cap was 20 samples per replicate, which is no multiple of `SAMPLE_ALIGNMENT`. Jobs after
     // it start at unaligned samples.
     model.aligned = false;

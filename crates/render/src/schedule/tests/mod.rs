@@ -9,6 +9,7 @@ use crate::film::testing::Rng;
 use crate::film::{Mse, TileNoise};
 use crate::schedule::*;
 use crate::wave::JobReport;
+use crate::wave::WaveReport;
 
 /// Value of [`TileNoise::squares`] in all simulated estimates: the sum of e^2 over the pixels of a
 /// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
@@ -124,8 +125,7 @@ impl Model {
 
     fn run(&mut self, wave: &Wave) -> WaveReport {
         self.waves += 1;
-        let reports = wave.jobs.iter().map(|job| Some(self.job(wave, job))).collect();
-        WaveReport { reports }
+        wave.jobs.iter().map(|job| Some(self.job(wave, job))).collect()
     }
 
     fn job(&mut self, wave: &Wave, job: &Job) -> JobReport {

@@ -6,7 +6,7 @@ use crate::schedule::tests::*;
 /// Both are RMSE in 8-bit levels.
 fn predicted(model: &mut Model, pilot: f64, target: f64) -> Prediction {
     let (mut schedule, _) = model.finish(until(noise(pilot), true));
-    schedule.set_stop(noise(target));
+    schedule.settings.stop = noise(target);
     schedule.predict([USUAL_SLOPE; 2]).unwrap()
 }
 
@@ -75,7 +75,7 @@ fn reached_target_needs_no_samples_beyond_exploration() {
 fn schedule_of_samples_predicts_what_the_schedule_does() {
     let mut model = Model::exact(clustered(100, 0.5));
     let (mut schedule, _) = model.finish(until(noise(1.0), true));
-    schedule.set_stop(noise(0.5));
+    schedule.settings.stop = noise(0.5);
     let planned = |tile: &Tile| PlannedTile {
         base: 0,
         end: tile.done,

@@ -121,7 +121,7 @@ fn cancelled_jobs_are_traced_later() {
         cancelled += wave.jobs.len() - part;
         let run = Wave { jobs: wave.jobs[..part].to_vec(), ..wave.clone() };
         let mut report = model.run(&run);
-        report.reports.resize(wave.jobs.len(), None);
+        report.resize(wave.jobs.len(), None);
         schedule.complete(&wave, &report);
     }
     assert!(cancelled > 0);
