@@ -82,7 +82,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         base_plan: None,
     };
     let mut schedule = pilot.schedule.clone();
-    schedule.settings.stop = stop(args.noise);
+    schedule.settings.stop.noise_levels = Some(args.noise);
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
         .ok_or("the pilot has no estimate of its noise")?;
     let part = Part {
@@ -153,10 +153,6 @@ fn default_base(plan: &Path) -> PathBuf {
     plan.with_file_name(name)
 }
 
-fn stop(noise_levels: f64) -> Stop {
-    Stop { noise_levels: Some(noise_levels), ..Stop::default() }
-}
-
 fn settings(noise_levels: f64) -> Settings {
-    Settings::new(true, stop(noise_levels))
+    Settings::new(true, Stop { noise_levels: Some(noise_levels), ..Stop::default() })
 }

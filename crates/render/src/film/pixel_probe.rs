@@ -20,8 +20,6 @@ pub struct PixelProbe {
     /// Half the difference of both replicates in radiance, which estimates the error within a
     /// factor of two or three. `None` if one of them has no samples.
     pub difference: Option<[f64; 3]>,
-    /// Estimated RMSE of the pixel's tile, in linear radiance. `None` without an estimate.
-    pub tile_rmse_linear: Option<f64>,
     /// Estimated RMSE of the pixel's tile, in 8-bit levels. `None` without an estimate.
     pub tile_rmse_levels: Option<f64>,
 }
@@ -52,11 +50,8 @@ impl PixelProbe {
                 [Replicates::A, Replicates::B].map(|replicates| sums.mean(replicates, &per_unit));
             probe.difference = Some([0, 1, 2].map(|c| 0.5 * (a[c] - b[c]).abs()));
         }
-        if let Some(noise) = Estimator::new(film.scales(), weights, display).tile_so_far(tile) {
-            let noise = noise.of_all();
-            probe.tile_rmse_linear = Some(noise.linear.sqrt());
-            probe.tile_rmse_levels = Some(noise.levels.sqrt());
-        }
+        let noise = Estimator::new(film.scales(), weights, display).tile_so_far(tile);
+        probe.tile_rmse_levels = noise.map(|noise| noise.of_all().levels.sqrt());
         Some(probe)
     }
 }
@@ -86,9 +81,11 @@ mod tests {
         assert_eq!(full.levels, display.levels([2.0, 4.0, 6.0]));
         assert_eq!(full.difference, Some([1.0, 2.0, 0.0]));
         // The corner tile has 4 x 2 pixels. One of them has an error of 1 in red and 2 in green.
-        let rmse = full.tile_rmse_linear.unwrap();
-        assert!((rmse - (5.0f64 / 24.0).sqrt()).abs() < 1e-12, "{rmse}");
-        assert!(full.tile_rmse_levels.is_some_and(|levels| levels > 0.0));
+        let estimator = Estimator::new(film.scales(), &mix, &display);
+        let noise = estimator.tile_so_far(film.tile(3).unwrap()).unwrap().of_all();
+        assert!((noise.linear - 5.0 / 24.0).abs() < 1e-12, "{noise:?}");
+        assert_eq!(full.tile_rmse_levels, Some(noise.levels.sqrt()));
+        assert!(noise.levels > 0.0);
         film.restart();
         each_tile(&mut film, |tile, _| tile.set_lattice(8));
         assert_eq!(probe(&film, [16, 16]).unwrap().samples, [1, 0]);

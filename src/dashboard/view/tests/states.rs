@@ -161,7 +161,6 @@ fn probing(model: &mut Model) {
         radiance: [0.2123, 0.18, 0.0904],
         levels: [127.46, 118.2, 83.9],
         difference: Some([0.012, 0.01, 0.004]),
-        tile_rmse_linear: Some(0.01),
         tile_rmse_levels: Some(0.84),
     });
 }
