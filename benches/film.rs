@@ -3,7 +3,7 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use zerkalo_render::film::testing::header;
+use zerkalo_render::film::testing::{TestFilm, header};
 use zerkalo_render::film::{
     Display, Estimator, Film, Header, LightWeights, TILE_PIXELS, Thumbnail, Tone,
 };

@@ -63,7 +63,7 @@ fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) 
 fn trace_slot(slot: TileHandle, replicate: usize, range: Range<u32>) {
     let origin = slot.origin;
     let tile = slot.prepare();
-    let [width, height] = tile.extent();
+    let [width, height] = tile.extent;
     for index in range.clone() {
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             trace_pixel(tile, origin, replicate, y * TILE + x, index);
@@ -81,7 +81,7 @@ fn trace_lattices(film: &mut Film, steps: &[usize]) {
         for slot in film.slots(&all) {
             let origin = slot.origin;
             let tile = slot.prepare();
-            let [width, height] = tile.extent();
+            let [width, height] = tile.extent;
             for pixel in lattice_pixels(before, step) {
                 if pixel % TILE < width && pixel / TILE < height {
                     trace_pixel(tile, origin, 0, pixel, 0);

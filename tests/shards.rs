@@ -89,7 +89,7 @@ fn interrupted_shard_equals_uninterrupted() {
     let plan = plan(&scene, &pilot, 0, 0.4, 2);
     let ranges = plan.ranges(2);
     let (whole, whole_rays) = shard(&scene, &plan, 2);
-    let (mut film, mut rays, mut starts) = (Film::new(whole.film.header().clone()), 0, 0);
+    let (mut film, mut rays, mut starts) = (Film::new(whole.film.header.clone()), 0, 0);
     loop {
         let mut state = rendering(&scene, 0);
         state.film.add(&film).unwrap();

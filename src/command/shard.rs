@@ -159,7 +159,7 @@ fn start(
         .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;
     if let Some((film, saved_rays)) = saved {
-        if film.header() != state.film.header() {
+        if film.header != state.film.header {
             return Err(Failure::Failed(format!(
                 "{} is the film of another scene; remove it or name another file",
                 args.output.display()

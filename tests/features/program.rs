@@ -23,7 +23,7 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
             let [x, y] = [i % film.tile_columns(), i / film.tile_columns()].map(|n| n * TILE);
             let rows = y..(y + TILE).min(film.height());
             let pixels = rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x));
-            (tile.counts().iter().sum(), pixels.into_iter().any(|p| hits[p].reflects))
+            (tile.counts.iter().sum(), pixels.into_iter().any(|p| hits[p].reflects))
         })
         .collect()
 }

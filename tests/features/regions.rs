@@ -20,9 +20,9 @@ fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
     let mut films = 0;
     for y in 0..SIZE[1] as usize {
         let film = render.film_with_row(y, &mut observe).map_err(|e| e.to_string())?;
-        films += u32::from(y == film.first_row());
+        films += u32::from(y == film.first_row);
         for replicates in [Replicates::A, Replicates::B] {
-            let region = film.row(y - film.first_row(), replicates, &mix);
+            let region = film.row(y - film.first_row, replicates, &mix);
             let expected = whole.row(y, replicates, &mix);
             ensure(region == expected, || format!("row {y} of regions of {rows} rows differs"))?;
         }

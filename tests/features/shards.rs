@@ -23,7 +23,7 @@ fn film_of_one(scene: &Scene) -> Film {
 fn plan(film: &Film, shards: u32) -> Plan {
     let tile = |i: usize| PlannedTile {
         base: 4,
-        end: film.tile(i).map_or(0, |tile| tile.counts()[0]),
+        end: film.tile(i).map_or(0, |tile| tile.counts[0]),
         rays_per_sample: 2.0,
         glossy: false,
     };
@@ -34,7 +34,7 @@ fn plan(film: &Film, shards: u32) -> Plan {
             size: SIZE,
             seed: SEED,
             sampler: SamplerKind::Sobol,
-            precision: film.header().precision.clone(),
+            precision: film.header.precision.clone(),
             display: Display::default(),
             rays_per_pixel: 0,
             noise_levels: 1.0,
@@ -62,7 +62,7 @@ fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
 fn shards_add_to(one: &Film, scene: &Scene, shards: u32) -> Verdict {
     let parts = parts(scene, &plan(one, shards))?;
     for descending in [false, true] {
-        let mut sum = Film::new(one.header().clone());
+        let mut sum = Film::new(one.header.clone());
         for i in 0..parts.len() {
             let part = if descending { parts.len() - 1 - i } else { i };
             sum.add(&parts[part]).map_err(|e| e.to_string())?;
@@ -86,7 +86,7 @@ fn e1_shards() {
         ],
     );
     let plan = plan(&one, 3);
-    let mut left_out = Film::new(one.header().clone());
+    let mut left_out = Film::new(one.header.clone());
     for part in &parts(&shipped("mirror-room.toml"), &plan).unwrap()[..3] {
         left_out.add(part).unwrap();
     }
@@ -117,7 +117,7 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     (0..4).for_each(|number| drop(fs::remove_file(path(number))));
     let mut films = FilmFiles::open(&[folder.join("job.plan")])?;
     ensure(films.sum.is_none(), || "a film without files".to_string())?;
-    let mut sum = Film::new(one.header().clone());
+    let mut sum = Film::new(one.header.clone());
     for (number, film) in (0..).zip(&parts) {
         let whole = part_file(&plan, number, true, film);
         write(number, &whole[..whole.len() - 1])?;
@@ -125,7 +125,7 @@ fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
         let refused = |state: &WatchedState| matches!(state, WatchedState::Refused(_));
         let rows = films.shards(SystemTime::now());
         ensure(refused(&rows[0].state), || format!("a damaged part is {:?}", rows[0].state))?;
-        let empty = Film::new(film.header().clone());
+        let empty = Film::new(film.header.clone());
         write(number, &part_file(&plan, number, false, &empty))?;
         films.poll();
         ensure(films.sum.as_ref().is_some_and(|(_, film)| film.bytes() == sum.bytes()), || {

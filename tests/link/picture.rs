@@ -58,7 +58,7 @@ impl Work {
             }
         }
         let film = &self.rendering.film;
-        let counts = film.tile(0).map_or([0, 0], |tile| tile.counts());
+        let counts = film.tile(0).map_or([0, 0], |tile| tile.counts);
         self.samples = f64::from(counts[0] + counts[1]);
         self.version += 1;
         let radiance = picture(&self.rendering, Replicates::Both);

@@ -62,7 +62,7 @@ fn counts(rendering: &RenderState) -> Vec<f64> {
     let tile = |x: usize, y: usize| y / TILE * film.tile_columns() + x / TILE;
     let count_of = |i: usize| {
         let tile = film.tile(tile(i % film.width(), i / film.width()));
-        tile.map_or(0, |t| t.counts().iter().sum::<u32>())
+        tile.map_or(0, |t| t.counts.iter().sum::<u32>())
     };
     (0..film.width() * film.height()).map(|i| f64::from(count_of(i))).collect()
 }

@@ -170,7 +170,7 @@ impl Checkpoint {
         }
         let mut state = RenderState::new(&compiled, options, None)
             .map_err(|fault| self.error(fault, "correct the scene"))?;
-        let (ours, theirs) = (state.film.header(), &self.header.film);
+        let (ours, theirs) = (&state.film.header, &self.header.film);
         if ours.precision != theirs.precision {
             let what = format!("its precision is {}, not {}", theirs.precision, ours.precision);
             return Err(self.error(what, &format!("add --precision {}", theirs.precision)));

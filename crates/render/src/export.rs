@@ -38,7 +38,7 @@ pub fn film_header(
     provenance: &Provenance,
 ) -> FilmFileHeader {
     FilmFileHeader {
-        film: state.film.header().clone(),
+        film: state.film.header.clone(),
         weights: state.weights.clone(),
         group_names: state.group_names(),
         display: state.display(),
@@ -55,7 +55,7 @@ pub fn metadata(
 ) -> Vec<(String, String)> {
     let biases = &state.world.info().biases;
     let biased = if biases.is_empty() { "no".to_string() } else { biases.join("; ") };
-    let header = state.film.header();
+    let header = &state.film.header;
     let (sampler, adaptive) = (provenance.sampler.name(), provenance.adaptive);
     let origin = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),

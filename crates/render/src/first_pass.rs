@@ -78,7 +78,7 @@ fn pixels_to_add(
 ) -> Vec<StripPixel> {
     let mut pixels = Vec::with_capacity(TILE_PIXELS);
     for (index, (origin, tile)) in tiles.iter().enumerate() {
-        let extent = tile.extent();
+        let extent = tile.extent;
         let inside = |p: &usize| p % TILE < extent[0] && p / TILE < extent[1];
         pixels.extend(lattice_pixels(previous_step, step).filter(inside).map(|pixel| {
             let (x, y) = (origin[0] + pixel % TILE, origin[1] + pixel / TILE);
@@ -102,7 +102,7 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         } else {
             for (tile, counts) in tiles.chunks_mut(1).zip(counts.chunks_mut(1)) {
                 let pixels = pixels_to_add(tile, steps);
-                let rectangle = (tile[0].0, tile[0].1.extent());
+                let rectangle = (tile[0].0, tile[0].1.extent);
                 let positions = pixels.iter().map(|p| p.position);
                 if let Some(tracer) = self.tracer.tile(0, rectangle, positions) {
                     self.add_pixels(tile, tracer, &pixels, counts);

@@ -97,10 +97,10 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     /// many samples remain; otherwise it holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
-        let pixels = if tile.extent() == [TILE; 2] {
+        let pixels = if tile.extent == [TILE; 2] {
             &self.whole_tile
         } else {
-            partial_tile = pixels_of(tile.extent());
+            partial_tile = pixels_of(tile.extent);
             &partial_tile
         };
         let position = |pixel: &u8| {
@@ -108,8 +108,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             ((origin[0] + pixel % TILE) as u32, (origin[1] + pixel / TILE) as u32)
         };
         let positions = pixels.iter().map(position);
-        let Some(mut tracer) = self.tracer.tile(replicate, (origin, tile.extent()), positions)
-        else {
+        let Some(mut tracer) = self.tracer.tile(replicate, (origin, tile.extent), positions) else {
             tile.advance(replicate, job.count);
             return Counts::default();
         };

@@ -62,7 +62,7 @@ impl RenderState {
     /// there is not enough memory, the state is lost.
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
         let size = [self.film.width() as u32, rows.len() as u32];
-        let header = Header { height: rows.len(), ..self.film.header().clone() };
+        let header = Header { height: rows.len(), ..self.film.header.clone() };
         let film = Film::try_new(header, Some(self.film));
         let film = film.map_err(|_| memory_budget::refused(size, self.weights.weights.len()))?;
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })

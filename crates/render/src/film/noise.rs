@@ -104,7 +104,7 @@ impl Estimator {
     /// Estimates the error of a tile. `None` if the tile has no samples, or different numbers of
     /// them in both replicates.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
-        let [count, count_b] = tile.counts();
+        let [count, count_b] = tile.counts;
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
@@ -117,7 +117,7 @@ impl Estimator {
     /// With stratified samples, the variance of a mean of n samples may fall faster than v / n. The
     /// estimate is then too high, by at most a quarter if B has at least half as many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
-        let counts = tile.counts();
+        let counts = tile.counts;
         if counts.contains(&0) || tile.lattice_px() != 0 {
             return None;
         }
@@ -127,7 +127,7 @@ impl Estimator {
         };
         let (per_sum_a, per_sum_b) = (per_sum(n), per_sum(m));
         let (share_a, spread) = (n / (n + m), (n * m).sqrt() / (n + m));
-        let [width, height] = tile.extent();
+        let [width, height] = tile.extent;
         let (mut halves, mut squares) = ([Mse::default(); 2], Mse::default());
         for y in 0..height {
             for x in 0..width {

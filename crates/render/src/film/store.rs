@@ -39,10 +39,13 @@ impl Header {
 /// pixel in a light group is its sum divided by the group's scale and by the number of samples.
 #[derive(Debug)]
 pub struct Film {
-    header: Header,
+    /// Properties of the film.
+    pub header: Header,
     /// Row of the picture in which the film begins, a multiple of [`TILE`].
-    first_row: usize,
-    epoch: u64,
+    pub first_row: usize,
+    /// Counter of restarts. The contents of a tile are unchanged as long as the epoch,
+    /// [`Tile::counts`] and [`Tile::lattice_px`] are unchanged.
+    pub(super) epoch: u64,
     tiles: Vec<Tile>,
 }
 
@@ -145,11 +148,6 @@ impl Film {
         Self { first_row, ..self }
     }
 
-    /// Returns the row of the picture in which the film begins.
-    pub fn first_row(&self) -> usize {
-        self.first_row
-    }
-
     /// Returns the width of the film in pixels.
     pub fn width(&self) -> usize {
         self.header.width
@@ -168,17 +166,6 @@ impl Film {
     /// Returns the scale of each light group, see [`Header::scales`].
     pub fn scales(&self) -> &[f64] {
         &self.header.scales
-    }
-
-    /// Returns the properties of the film.
-    pub fn header(&self) -> &Header {
-        &self.header
-    }
-
-    /// Returns the film's epoch, a counter of its restarts. The contents of a tile are unchanged as
-    /// long as the epoch, [`Tile::counts`] and [`Tile::lattice_px`] are unchanged.
-    pub(super) fn epoch(&self) -> u64 {
-        self.epoch
     }
 
     /// Discards all samples.
@@ -203,13 +190,19 @@ impl Film {
 
     /// Returns the number of pixels of tile `index` that are inside the picture.
     pub fn tile_pixels(&self, index: usize) -> u64 {
-        let [width, height] = self.tiles[index].extent();
+        let [width, height] = self.tiles[index].extent;
         (width * height) as u64
     }
 
     /// Returns [`Tile::counts`] of tile `index`.
     pub fn counts(&self, index: usize) -> [u32; 2] {
-        self.tile(index).map_or([0; 2], Tile::counts)
+        self.tile(index).map_or([0; 2], |tile| tile.counts)
+    }
+
+    /// Returns the samples per pixel of tile `index`, over both replicates.
+    pub fn spp(&self, index: usize) -> u32 {
+        let [a, b] = self.counts(index);
+        a.saturating_add(b)
     }
 
     /// Iterates over the tiles written since the last restart, with their numbers.
@@ -244,8 +237,8 @@ impl Film {
     /// Returns the number of samples of all pixels and both replicates.
     pub fn samples(&self) -> u64 {
         let samples_of_tile = |tile: &Tile| {
-            let [width, height] = tile.extent();
-            let counts = tile.counts().map(u64::from);
+            let [width, height] = tile.extent;
+            let counts = tile.counts.map(u64::from);
             let lattice = match tile.lattice_px() {
                 0 => 0,
                 step => width.div_ceil(step) * height.div_ceil(step),
@@ -270,7 +263,7 @@ impl Film {
         let columns = self.tile_columns();
         for column in 0..columns {
             let Some(tile) = self.tile(y / TILE * columns + column) else { continue };
-            for x in 0..tile.extent()[0] {
+            for x in 0..tile.extent[0] {
                 f(column * TILE + x, tile.sums(y % TILE * TILE + x));
             }
         }
@@ -301,24 +294,9 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film, which hold another range of sample indices.
-    ///
-    /// # Errors
-    /// Fails, without a change, if the headers differ, or if both films have the first sample of
-    /// only some pixels of a tile: in their sum, pixels would have different numbers of samples.
-    pub fn add(&mut self, other: &Self) -> Result<(), String> {
-        self.check_addable(other)?;
-        for (index, theirs) in other.touched() {
-            let ours = &mut self.tiles[index];
-            ours.clear_if_stale(self.epoch);
-            ours.add_tile(theirs);
-        }
-        Ok(())
-    }
-
     /// Creates an empty tile for [`Film::add_at`].
     pub(super) fn new_tile(&self, index: usize) -> Tile {
-        let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
+        let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent);
         tile.clear_if_stale(self.epoch);
         tile
     }
@@ -355,20 +333,6 @@ impl Film {
             ))
         })
     }
-
-    fn check_addable(&self, other: &Self) -> Result<(), String> {
-        self.check_header(&other.header)?;
-        let is_partial = |tile: &Tile| tile.lattice_px() != 0;
-        let both = other.touched().find(|(index, theirs)| {
-            is_partial(theirs) && self.tile(*index).is_some_and(is_partial)
-        });
-        both.map_or(Ok(()), |(index, _)| {
-            Err(format!(
-                "these films cannot be added: both hold the first sample of tile {index}; \
-                 only films of disjoint sample ranges can"
-            ))
-        })
-    }
 }
 
 #[cfg(test)]
@@ -381,7 +345,7 @@ mod tests {
     fn tiles_cover_the_film() {
         let mut film = film(33, 17, &[1.0]);
         assert_eq!((film.tile_count(), film.tile_columns()), (6, 3));
-        let places = film.slots(&[5, 1]).into_iter().map(|slot| (slot.origin, slot.tile.extent()));
+        let places = film.slots(&[5, 1]).into_iter().map(|slot| (slot.origin, slot.tile.extent));
         assert_eq!(places.collect::<Vec<_>>(), [([32, 16], [1, 1]), ([16, 0], [16, 16])]);
         assert_eq!(film.touched().count(), 0);
     }
@@ -394,7 +358,7 @@ mod tests {
         assert_eq!(order, [[16, 16], [0, 0], [32, 16], [32, 0]]);
         // Only the prepared tile counts as touched.
         slots.into_iter().nth(2).unwrap().prepare().advance(0, 3);
-        let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
+        let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts)).collect();
         assert_eq!(touched, [(5, [3, 0])]);
         assert_eq!(film.samples(), 3 * 256);
     }
@@ -422,7 +386,7 @@ mod tests {
         let mut old = film(40, 40, &[1.0]);
         fill(&mut old, 2, |x, _, _| value(x));
         let expected = |width, height, groups: usize| {
-            let header = film(width, height, &vec![4.0; groups]).header().clone();
+            let header = film(width, height, &vec![4.0; groups]).header.clone();
             let mut fresh = Film::new(header.clone());
             fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
             (header, fresh.bytes())
@@ -444,7 +408,7 @@ mod tests {
         fill(&mut ours, 2, |x, _, _| vec![x as f64; 3]);
         let before = ours.bytes();
         let altered = |change: fn(&mut Header)| {
-            let mut header = ours.header().clone();
+            let mut header = ours.header.clone();
             change(&mut header);
             Film::new(header)
         };
@@ -471,9 +435,7 @@ mod tests {
             film.slots(&[0]).remove(0).prepare().set_lattice(8);
             film
         };
-        let mut ours = lattice();
-        let error = ours.add(&lattice()).unwrap_err();
-        assert!(error.contains("both hold the first sample of tile 0"), "{error}");
+        let ours = lattice();
         let mut others = film(16, 16, &[1.0]);
         fill(&mut others, 4, |_, _, _| vec![4.0; 3]);
         others.add(&ours).unwrap();

@@ -17,7 +17,7 @@ pub fn white(groups: usize) -> LightWeights {
 /// Returns a header of the file of `film`, with light weights of 1 and without metadata.
 pub fn header(film: &Film) -> FilmFileHeader {
     FilmFileHeader {
-        film: film.header().clone(),
+        film: film.header.clone(),
         weights: white(film.groups()),
         group_names: vec![String::new(); film.groups()],
         display: Display::default(),
@@ -46,7 +46,7 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {
-        let [width, height] = tile.extent();
+        let [width, height] = tile.extent;
         for replicate in 0..2 {
             for pixel in (0..height).flat_map(|y| (0..width).map(move |x| y * TILE + x)) {
                 let sums = sums(x0 + pixel % TILE, y0 + pixel / TILE, replicate);
@@ -70,6 +70,10 @@ pub trait TestFilm {
 
     /// Returns the radiance of each pixel of the row `y`, as [`Self::pixel`] does.
     fn pixels_of_row(&self, y: usize, weights: &LightWeights) -> Vec<[f64; 3]>;
+
+    /// Adds the samples of another film, which hold another range of sample indices. Fails if the
+    /// headers differ.
+    fn add(&mut self, other: &Film) -> Result<(), String>;
 
     /// Returns the film as bytes. Films with equal samples have equal bytes, in whatever order the
     /// samples were added.
@@ -97,9 +101,17 @@ impl TestFilm for Film {
         self.row(y, Replicates::Both, weights)
     }
 
+    fn add(&mut self, other: &Film) -> Result<(), String> {
+        self.check_header(&other.header)?;
+        for (index, theirs) in other.touched() {
+            self.slots(&[index]).remove(0).prepare().add_tile(theirs);
+        }
+        Ok(())
+    }
+
     fn bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        let header = self.header();
+        let header = &self.header;
         for n in [header.width, header.height, header.scales.len()] {
             out.extend(u32_bytes(n));
         }
@@ -133,9 +145,9 @@ fn add_tile(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.any_sampled()) else {
         return out.extend([0; 9]);
     };
-    tile.counts().iter().for_each(|count| out.extend(count.to_le_bytes()));
+    tile.counts.iter().for_each(|count| out.extend(count.to_le_bytes()));
     out.push(tile.lattice_px() as u8);
-    let [width, height] = tile.extent();
+    let [width, height] = tile.extent;
     for replicate in 0..2 {
         for pixel in (0..height).flat_map(|y| (0..width).map(move |x| y * TILE + x)) {
             tile.pixel(replicate, pixel).iter().for_each(|sum| out.extend(sum.to_le_bytes()));

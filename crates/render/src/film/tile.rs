@@ -28,8 +28,11 @@ pub struct Tile {
     epoch: u64,
     /// Number of integer sums of a pixel and replicate: `groups * 3`.
     stride: usize,
-    extent: [usize; 2],
-    pub(super) counts: [u32; 2],
+    /// Width and height of the tile's part inside the picture, 1..=16 pixels.
+    pub extent: [usize; 2],
+    /// Number of samples of every pixel in the replicates A and B, without an incomplete first
+    /// pass.
+    pub counts: [u32; 2],
     lattice_px: u8,
     /// `true` if an integer sum has reached `i64::MAX`.
     pub(super) full: bool,
@@ -89,17 +92,6 @@ impl Tile {
 
     pub(super) fn is_of(&self, epoch: u64) -> bool {
         self.epoch == epoch
-    }
-
-    /// Returns width and height of the tile's part inside the picture, 1..=16 pixels.
-    pub fn extent(&self) -> [usize; 2] {
-        self.extent
-    }
-
-    /// Returns the number of samples of every pixel in the replicates A and B, without an
-    /// incomplete first pass.
-    pub fn counts(&self) -> [u32; 2] {
-        self.counts
     }
 
     /// Returns the progress of the first pass: pixels whose x and y are multiples of the result
@@ -292,9 +284,9 @@ mod tests {
         assert!(!tile.any_sampled());
         tile.set_lattice(8);
         assert!(tile.any_sampled() && tile.counts_of(137) == [0; 2]);
-        assert_eq!((tile.counts(), tile.counts_of(8)), ([0, 0], [1, 0]));
+        assert_eq!((tile.counts, tile.counts_of(8)), ([0, 0], [1, 0]));
         tile.set_lattice(1);
-        assert_eq!((tile.counts(), tile.lattice_px()), ([1, 0], 0));
+        assert_eq!((tile.counts, tile.lattice_px()), ([1, 0], 0));
         assert_eq!(tile.counts_of(137), [1, 0]);
     }
 
@@ -329,10 +321,10 @@ mod tests {
         tile.advance(0, 1);
         tile.record_saturated(3);
         tile.clear_if_stale(1);
-        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (1, [1, 0]));
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts), (1, [1, 0]));
         assert_eq!(tile.saturated_samples, 3);
         tile.clear_if_stale(2);
-        assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
+        assert_eq!((tile.pixel(0, 0)[0], tile.counts), (0, [0, 0]));
         assert_eq!(tile.saturated_samples, 0);
         // The first access to the cleared tile is a write. Below, tiles with 1 and 3 groups reuse
         // memory of a tile with another number of groups.

@@ -62,17 +62,19 @@ fn encode_to(
     let channels = channels(&layer_names(&picture.group_names, picture.weights.weights.len()));
     let headers = headers(picture, &channels, &picture.metadata);
     exr::block::write(&mut *sink, headers, true, |meta, writer| {
-        let mut rows = TileRow::new(picture, channels.iter().map(|(_, source)| *source).collect());
+        let mut bytes = vec![Vec::new(); channels.len()];
         let mut compressor = writer.sequential_blocks_compressor(&meta);
         for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
             let Vec2(left, top) = block.pixel_position;
             if left == 0 {
-                rows.load(top..top + block.pixel_size.height(), bands)?;
+                bytes.iter_mut().for_each(Vec::clear);
+                let rows = top..top + block.pixel_size.height();
+                encode_rows(picture, &channels, rows, bands, &mut bytes)?;
             }
-            let channels = &meta.headers[0].channels;
-            let block = UncompressedBlock::from_lines(channels, block, |line| {
+            let descriptions = &meta.headers[0].channels;
+            let block = UncompressedBlock::from_lines(descriptions, block, |line| {
                 let Vec2(x, y) = line.location.position;
-                let bytes = &rows.bytes[line.location.channel];
+                let bytes = &bytes[line.location.channel];
                 let start = ((y - top) * picture.film.width + x) * 4;
                 line.value.copy_from_slice(&bytes[start..start + line.value.len()]);
             });
@@ -176,48 +178,38 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Encoded pixels of a row of tiles.
-struct TileRow<'a> {
-    picture: &'a FilmFileHeader,
-    sources: Vec<Source>,
-    /// Encoded values of each channel, `[row][column]`.
-    bytes: Vec<Vec<u8>>,
-}
-
-impl<'a> TileRow<'a> {
-    fn new(picture: &'a FilmFileHeader, sources: Vec<Source>) -> Self {
-        Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
-    }
-
-    fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
-        let Self { picture, sources, bytes } = self;
-        bytes.iter_mut().for_each(Vec::clear);
-        for y in rows {
-            let film = bands.film_with_row(y)?;
-            let mixed = &picture.weights.radiance_per_step(film.scales());
-            let start = bytes.first().map_or(0, Vec::len);
-            for bytes in bytes.iter_mut() {
-                bytes.resize(start + film.width() * 4, 0);
+/// Encodes the pixels of a row of tiles: appends the values of each of `channels`, `[row][column]`,
+/// to its list in `bytes`.
+fn encode_rows(
+    picture: &FilmFileHeader,
+    channels: &[(String, Source)],
+    rows: Range<usize>,
+    bands: &mut dyn Bands,
+    bytes: &mut [Vec<u8>],
+) -> io::Result<()> {
+    for y in rows {
+        let film = bands.film_with_row(y)?;
+        let mixed = &picture.weights.radiance_per_step(film.scales());
+        let start = bytes.first().map_or(0, Vec::len);
+        bytes.iter_mut().for_each(|bytes| bytes.resize(start + film.width() * 4, 0));
+        film.visit_row(y - film.first_row, |x, sums| {
+            let means = [Replicates::Both, Replicates::A, Replicates::B]
+                .map(|replicates| sums.mean(replicates, mixed));
+            for ((_, source), bytes) in channels.iter().zip(bytes.iter_mut()) {
+                let value = match *source {
+                    Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
+                    Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
+                    Source::Group(group, c) => {
+                        group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
+                    }
+                    Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
+                };
+                bytes[start + x * 4..][..4].copy_from_slice(&value);
             }
-            film.visit_row(y - film.first_row(), |x, sums| {
-                let means = [Replicates::Both, Replicates::A, Replicates::B]
-                    .map(|replicates| sums.mean(replicates, mixed));
-                for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
-                    let value = match *source {
-                        Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
-                        Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
-                        Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
-                        Source::Group(group, c) => {
-                            group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
-                        }
-                        Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
-                    };
-                    bytes[start + x * 4..][..4].copy_from_slice(&value);
-                }
-            });
-        }
-        Ok(())
+        });
     }
+    Ok(())
 }
 
 /// Returns the mean over a pixel's samples of sum `i`, in the order `[group][channel]`; 0 without

@@ -70,10 +70,7 @@ impl Report {
 
     /// Creates the report of a film without its error.
     pub(super) fn of_samples(film: &Film) -> Self {
-        let counts = (0..film.tile_count()).map(|tile| {
-            let [a, b] = film.counts(tile);
-            a.saturating_add(b)
-        });
+        let counts = (0..film.tile_count()).map(|tile| film.spp(tile));
         let (min, max) = counts.fold((u32::MAX, 0), |(min, max), n| (min.min(n), max.max(n)));
         let samples = film.samples();
         let pixels = film.width() * film.height();

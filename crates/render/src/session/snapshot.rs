@@ -89,16 +89,12 @@ impl TileMaps {
     fn of(film: &Film, estimates: &[Option<TileNoise>]) -> Self {
         let levels =
             |tile: &Option<TileNoise>| tile.map_or(0.0, |t| t.of_all().levels.sqrt() as f32);
-        let count = |tile: usize| {
-            let [a, b] = film.counts(tile);
-            a.saturating_add(b)
-        };
         let columns = film.tile_columns();
         Self {
             columns,
             rows: film.tile_count() / columns,
             noise_levels: estimates.iter().map(levels).collect(),
-            spp: (0..film.tile_count()).map(count).collect(),
+            spp: (0..film.tile_count()).map(|tile| film.spp(tile)).collect(),
         }
     }
 }

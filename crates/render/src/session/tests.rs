@@ -182,7 +182,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
     assert_eq!(end.report.state, State::Finished(StoppedBy::Spp));
     assert_eq!(end.report.spp, Spp { min: spp, mean: f64::from(spp), max: spp });
     let counts = session
-        .with(|state, _| state.film.touched().map(|(_, tile)| tile.counts()).collect::<Vec<_>>());
+        .with(|state, _| state.film.touched().map(|(_, tile)| tile.counts).collect::<Vec<_>>());
     assert_eq!(counts, Some(vec![[spp / 2; 2]; 64]));
 }
 

@@ -19,7 +19,7 @@ fn sample_film() -> Film {
         }
         let counts = [1 << (rng.bits() % 20), (rng.bits() % 3) as u32];
         for (replicate, count) in counts.into_iter().enumerate() {
-            let [width, height] = tile.extent();
+            let [width, height] = tile.extent;
             for pixel in (0..height).flat_map(|y| (0..width).map(move |x| y * TILE + x)) {
                 let largest = (u64::from(count) << 49).min(1 << (rng.bits() % 62));
                 let sums: Vec<i64> = (0..6).map(|_| (rng.bits() % largest.max(1)) as i64).collect();
@@ -37,7 +37,7 @@ fn sample_film() -> Film {
 
 fn header_of(film: &Film) -> FilmFileHeader {
     FilmFileHeader {
-        film: film.header().clone(),
+        film: film.header.clone(),
         weights: white(film.groups()),
         group_names: vec!["lamp".to_string(), "ambient".to_string()],
         display: Display { exposure_ev: -1.5, tone: "neutral".parse().unwrap() },
@@ -84,7 +84,7 @@ fn saturated_sums_are_restored() {
 fn files_of_disjoint_samples_add_up() {
     let film = sample_film();
     let bytes = pieces(&film).concat();
-    let mut twice = Film::new(film.header().clone());
+    let mut twice = Film::new(film.header.clone());
     for _ in 0..2 {
         let length = bytes.len() as u64;
         let reader = FilmReader::new(Path::new("a.zk"), Cursor::new(&bytes[..]), length).unwrap();

@@ -13,10 +13,10 @@ const WORD: usize = 8;
 
 /// Appends the record of `tile` to `out`.
 pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
-    let Some(tile) = tile.filter(|tile| tile.counts() != [0; 2]) else {
+    let Some(tile) = tile.filter(|tile| tile.counts != [0; 2]) else {
         return out.extend([0; 8]);
     };
-    tile.counts().iter().for_each(|count| out.extend(count.to_le_bytes()));
+    tile.counts.iter().for_each(|count| out.extend(count.to_le_bytes()));
     out.extend(tile.saturated_samples.to_le_bytes());
     let bad = &tile.bad;
     out.extend(bad.count.to_le_bytes());
@@ -27,7 +27,7 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
     for replicate in 0..2 {
         let mut pixels: [&[i64]; TILE_PIXELS] = [&[]; TILE_PIXELS];
-        let [width, height] = tile.extent();
+        let [width, height] = tile.extent;
         let pixels = &mut pixels[..width * height];
         for (sums, pixel) in pixels.iter_mut().zip(inside([width, height])) {
             *sums = tile.pixel(replicate, pixel);
@@ -64,7 +64,7 @@ pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Opt
     if tile.bad.count < tile.bad.first.len() as u64 {
         return None;
     }
-    let extent = tile.extent();
+    let extent = tile.extent;
     let pixels = extent[0] * extent[1];
     for (replicate, count) in tile.counts.into_iter().enumerate() {
         let limit = (u64::from(count).saturating_mul(LARGEST_SAMPLE)).min(i64::MAX as u64);
