@@ -96,26 +96,25 @@ impl<'a> Builder<'a> {
         self.positions.len()
     }
 
-    /// Adds a vertex. This method does not check the number of vertices; [`Builder::finish`] fails
-    /// if there are more than [`MAX_VERTICES`].
-    pub fn vertex(&mut self, position: [f64; 3]) {
+    /// Adds a vertex, and returns its index. This method does not check the number of vertices;
+    /// [`Builder::finish`] fails if there are more than [`MAX_VERTICES`].
+    pub fn vertex(
+        &mut self,
+        position: [f64; 3],
+        normal: Option<[f32; 3]>,
+        uv: Option<[f32; 2]>,
+    ) -> u32 {
+        let index = self.positions.len();
         self.positions.push(position);
-    }
-
-    /// Sets the normal of the vertex added last.
-    pub fn normal(&mut self, normal: [f32; 3]) {
-        self.normals.resize(self.positions.len(), [0.0; 3]);
-        if let Some(last) = self.normals.last_mut() {
-            *last = normal;
+        if let Some(normal) = normal {
+            self.normals.resize(index, [0.0; 3]);
+            self.normals.push(normal);
         }
-    }
-
-    /// Sets the texture coordinates of the vertex added last.
-    pub fn uv(&mut self, uv: [f32; 2]) {
-        self.uvs.resize(self.positions.len(), [0.0; 2]);
-        if let Some(last) = self.uvs.last_mut() {
-            *last = uv;
+        if let Some(uv) = uv {
+            self.uvs.resize(index, [0.0; 2]);
+            self.uvs.push(uv);
         }
+        index as u32
     }
 
     /// Returns `true` if [`Builder::color`] was called.
@@ -178,7 +177,7 @@ impl<'a> Builder<'a> {
             return Err(source.fault("the mesh has no triangles", "at least one"));
         }
         self.coordinates()?;
-        let center = self.center();
+        let center = self.center().to_array();
         let positions: Vec<[f32; 3]> = self
             .positions
             .drain(..)
@@ -186,15 +185,9 @@ impl<'a> Builder<'a> {
             .collect();
         self.positions = Vec::new();
         self.drop_flat(&positions)?;
-        let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        for corner in self.triangles.iter().flatten() {
-            for (i, x) in positions[*corner as usize].into_iter().enumerate() {
-                bounds[0][i] = bounds[0][i].min(x);
-                bounds[1][i] = bounds[1][i].max(x);
-            }
-        }
-        let extent = (0..3).map(|i| f64::from(bounds[1][i]) - f64::from(bounds[0][i]));
-        let extent = extent.fold(0.0, f64::max);
+        let corners = self.triangles.iter().flatten().map(|i| positions[*i as usize]);
+        let [low, high] = bounds(corners.map(|p| p.map(f64::from)));
+        let extent = (high - low).max_element();
         if extent < MIN_EXTENT {
             let found = format!("the mesh is {extent:e} large");
             return Err(source.fault(found, "a size from 1e-9 to 1e9"));
@@ -211,7 +204,7 @@ impl<'a> Builder<'a> {
             uvs,
             colors: self.colors,
             color_of,
-            bounds,
+            bounds: [low, high].map(|corner| corner.as_vec3().to_array()),
             notes: self.notes,
         })
     }
@@ -233,15 +226,11 @@ impl<'a> Builder<'a> {
     /// Returns the point that is subtracted from all positions before they are converted to single
     /// precision. This point is the centre of the bounding box if the mesh is far from the origin
     /// relative to its size, otherwise the origin.
-    fn center(&self) -> [f64; 3] {
-        let positions = self.positions.iter().map(|p| DVec3::from_array(*p));
-        let (low, high) = positions
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
-                (low.min(p), high.max(p))
-            });
+    fn center(&self) -> DVec3 {
+        let [low, high] = bounds(self.positions.iter().copied());
         let max_coordinate = low.abs().max(high.abs()).max_element();
         let is_far = max_coordinate > MAX_OFFSET * (high - low).max_element();
-        if is_far { (0.5 * (low + high)).to_array() } else { [0.0; 3] }
+        if is_far { 0.5 * (low + high) } else { DVec3::ZERO }
     }
 
     /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
@@ -319,4 +308,11 @@ impl<'a> Builder<'a> {
         uvs.resize(vertices, [0.0; 2]);
         Ok(Some(uvs))
     }
+}
+
+/// Returns the lowest and the highest corner of the bounding box.
+fn bounds(positions: impl Iterator<Item = [f64; 3]>) -> [DVec3; 2] {
+    positions
+        .map(DVec3::from_array)
+        .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
 }

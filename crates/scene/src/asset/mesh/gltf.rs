@@ -196,11 +196,12 @@ impl<'a> Part<'a> {
             return Ok(());
         };
         let vertices = positions.count();
-        let positions = self.triples(positions)?;
+        let positions = self.slice(&positions, Dimensions::Vec3)?;
         let normals = self.primitive.get(&Semantic::Normals);
-        let normals = normals.map(|a| self.triples(a)).transpose()?;
+        let normals = normals.map(|a| self.slice(&a, Dimensions::Vec3));
+        let normals = normals.transpose()?;
         let uvs = self.primitive.get(&Semantic::TexCoords(0));
-        let mut uvs = uvs.map(|a| self.pairs(a)).transpose()?;
+        let uvs = uvs.map(|a| self.slice(&a, Dimensions::Vec2)).transpose()?;
         self.add_color(builder)?;
         let indices = self.primitive.indices();
         let indices = indices.map(|a| self.slice(&a, Dimensions::Scalar));
@@ -211,25 +212,24 @@ impl<'a> Part<'a> {
         builder.reserve(vertices, faces.len())?;
         let base = builder.vertices();
         let normal_map = linear.inverse().transpose();
-        let mut normals = normals.map(|normals| {
-            normals.map(|n| (normal_map * DVec3::from_array(n.map(f64::from))).normalize_or_zero())
-        });
-        for position in positions {
-            let p = self.map.transform_point3(DVec3::from_array(position.map(f64::from)));
-            builder.vertex(p.to_array());
-            if let Some(normal) = normals.as_mut().and_then(Iterator::next) {
-                builder.normal(normal.as_vec3().to_array());
-            }
-            if let Some([u, v]) = uvs.as_mut().and_then(Iterator::next) {
+        for i in 0..vertices {
+            let position = self.map.transform_point3(DVec3::from_array(positions.numbers(i)));
+            let normal = normals.filter(|normals| i < normals.count).map(|normals| {
+                let normal = normal_map * DVec3::from_array(normals.numbers(i));
+                normal.normalize_or_zero().as_vec3().to_array()
+            });
+            let uv = uvs.filter(|uvs| i < uvs.count).map(|uvs| {
+                let [u, v] = uvs.numbers(i).map(|x| (x / uvs.largest()) as f32);
                 // The texture coordinate v points downwards in glTF, and upwards in
                 // [`TriangleMesh::uvs`].
-                builder.uv([u, 1.0 - v]);
-            }
+                [u, 1.0 - v]
+            });
+            builder.vertex(position.to_array(), normal, uv);
         }
         let place =
             || FileLocation::Part(format!("meshes[..].primitives[{}]", self.primitive.index()));
         let corner = |i: usize| match &indices {
-            Some(slice) => slice.index(i),
+            Some(slice) => slice.numbers::<1>(i)[0] as u32,
             None => i as u32,
         };
         for face in faces {
@@ -255,30 +255,6 @@ impl<'a> Part<'a> {
             builder.color([r, g, b])?;
         }
         Ok(())
-    }
-
-    /// Returns the elements of `accessor`, a glTF list of single-precision vectors.
-    fn triples(
-        &self,
-        accessor: Accessor<'a>,
-    ) -> Result<impl Iterator<Item = [f32; 3]>, AssetError> {
-        let slice = self.slice(&accessor, Dimensions::Vec3)?;
-        Ok((0..slice.count).map(move |i| slice.floats(i)))
-    }
-
-    /// Returns the texture coordinates in `accessor`, a glTF list. Unsigned integers are mapped to
-    /// 0..=1, floats are unchanged.
-    fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
-        let kind = accessor.data_type();
-        let slice = self.slice(&accessor, Dimensions::Vec2)?;
-        Ok((0..slice.count).map(move |i| match kind {
-            DataType::U8 => [0, 1].map(|k| f32::from(slice.item(i)[k]) / 255.0),
-            DataType::U16 => {
-                let b = slice.item(i);
-                [0, 2].map(|k| f32::from(u16::from_le_bytes([b[k], b[k + 1]])) / 65535.0)
-            }
-            _ => slice.floats(i),
-        }))
     }
 
     /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
@@ -319,7 +295,7 @@ impl<'a> Part<'a> {
             view.get(accessor.offset()..accessor.offset().checked_add(items)?)
         });
         match bytes {
-            Some(bytes) if stride >= size => Ok(Slice { bytes, stride, size, count }),
+            Some(bytes) if stride >= size => Ok(Slice { bytes, stride, kind, count }),
             _ => wrong(
                 format!("{count} items of {size} bytes do not lie in their buffer"),
                 "a range inside its bufferView and buffer, with at least one item",
@@ -334,29 +310,29 @@ impl<'a> Part<'a> {
 struct Slice<'a> {
     bytes: &'a [u8],
     stride: usize,
-    size: usize,
+    kind: DataType,
     count: usize,
 }
 
 impl Slice<'_> {
-    fn item(&self, i: usize) -> &[u8] {
-        &self.bytes[i * self.stride..][..self.size]
-    }
-
-    fn floats<const N: usize>(&self, i: usize) -> [f32; N] {
-        let item = self.item(i);
-        std::array::from_fn(|k| {
-            let b = &item[4 * k..];
-            f32::from_le_bytes([b[0], b[1], b[2], b[3]])
+    /// Returns the numbers of element `i`.
+    fn numbers<const N: usize>(&self, i: usize) -> [f64; N] {
+        let size = self.kind.size();
+        std::array::from_fn(|k| match self.bytes[i * self.stride + k * size..][..size] {
+            [a] => a.into(),
+            [a, b] => u16::from_le_bytes([a, b]).into(),
+            [a, b, c, d] if self.kind == DataType::U32 => u32::from_le_bytes([a, b, c, d]).into(),
+            [a, b, c, d] => f32::from_le_bytes([a, b, c, d]).into(),
+            _ => f64::NAN,
         })
     }
 
-    fn index(&self, i: usize) -> u32 {
-        match *self.item(i) {
-            [a] => u32::from(a),
-            [a, b] => u32::from(u16::from_le_bytes([a, b])),
-            [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
-            _ => u32::MAX,
+    /// Returns the number that stands for 1 in texture coordinates.
+    fn largest(&self) -> f64 {
+        match self.kind {
+            DataType::U8 => 255.0,
+            DataType::U16 => 65535.0,
+            _ => 1.0,
         }
     }
 }

@@ -146,14 +146,9 @@ impl Parser<'_> {
     fn vertex(&mut self, corner: Corner) -> u32 {
         *self.vertices.entry(corner).or_insert_with(|| {
             let (position, uv, normal) = corner;
-            self.builder.vertex(self.positions[position]);
-            if let Some(i) = normal {
-                self.builder.normal(self.normals[i].map(|x| x as f32));
-            }
-            if let Some(i) = uv {
-                self.builder.uv(self.uvs[i].map(|x| x as f32));
-            }
-            (self.builder.vertices() - 1) as u32
+            let normal = normal.map(|i| self.normals[i].map(|x| x as f32));
+            let uv = uv.map(|i| self.uvs[i].map(|x| x as f32));
+            self.builder.vertex(self.positions[position], normal, uv)
         })
     }
 

@@ -115,16 +115,12 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
                 library_error(source, &e, (header.encoding != Encoding::Ascii).then_some(byte))
             })?;
             for (i, record) in records.iter().enumerate() {
-                let n = &record.numbers;
                 match element.name.as_str() {
                     "vertex" => {
-                        builder.vertex([n[0], n[1], n[2]]);
-                        if normals {
-                            builder.normal([n[3] as f32, n[4] as f32, n[5] as f32]);
-                        }
-                        if uvs {
-                            builder.uv([n[6] as f32, n[7] as f32]);
-                        }
+                        let [x, y, z, ref others @ ..] = record.numbers;
+                        let [nx, ny, nz, u, v] = others.map(|number| number as f32);
+                        let normal = normals.then_some([nx, ny, nz]);
+                        builder.vertex([x, y, z], normal, uvs.then_some([u, v]));
                     }
                     "face" => {
                         let place = || FileLocation::Part(format!("face {} (from 0)", done + i));

@@ -103,10 +103,8 @@ impl Parser<'_> {
         let corners = corners.map(|position| {
             // +0 and -0 are the same position.
             let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });
-            *self.known.entry(key).or_insert_with(|| {
-                self.builder.vertex(position.map(f64::from));
-                (self.builder.vertices() - 1) as u32
-            })
+            let vertex = || self.builder.vertex(position.map(f64::from), None, None);
+            *self.known.entry(key).or_insert_with(vertex)
         });
         self.builder.triangle(corners, place)
     }
