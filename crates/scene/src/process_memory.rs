@@ -91,30 +91,6 @@ fn free_address_space() -> Option<u64> {
     Some(limit.saturating_sub(in_use + starting * ARENA))
 }
 
-/// File names of one version of Linux control groups.
-struct ControlGroupFiles {
-    /// Mount point of the memory controller.
-    root: &'static str,
-    limit: &'static str,
-    in_use: &'static str,
-    /// Entry of `memory.stat` for file pages that the kernel can reclaim.
-    reclaimable: &'static str,
-}
-
-const VERSION_1: ControlGroupFiles = ControlGroupFiles {
-    root: "/sys/fs/cgroup/memory",
-    limit: "memory.limit_in_bytes",
-    in_use: "memory.usage_in_bytes",
-    reclaimable: "total_inactive_file",
-};
-
-const VERSION_2: ControlGroupFiles = ControlGroupFiles {
-    root: "/sys/fs/cgroup",
-    limit: "memory.max",
-    in_use: "memory.current",
-    reclaimable: "inactive_file",
-};
-
 fn free_in_own_control_groups() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     free_in_control_groups(&groups, |path| fs::read_to_string(path).ok())
@@ -125,29 +101,31 @@ fn free_in_own_control_groups() -> Option<u64> {
 /// `/proc/PID/cgroup`; `read` returns the text of a file. File pages that the kernel can reclaim
 /// count as free. Returns `None` if no group has a limit.
 fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> {
-    let own = groups.lines().filter_map(|line| {
+    let free = |line: &str| {
         let mut fields = line.splitn(3, ':');
         let (hierarchy, controllers, path) = (fields.next()?, fields.next()?, fields.next()?);
-        let files = match hierarchy {
-            "0" => VERSION_2,
-            _ if controllers.split(',').any(|name| name == "memory") => VERSION_1,
+        // The mount point of the memory controller, two files, and an entry of `memory.stat`.
+        let (root, limit, in_use, reclaimable) = match hierarchy {
+            // Version 2 has one hierarchy, with this number.
+            "0" => ("/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
+            _ if controllers.split(',').any(|name| name == "memory") => (
+                "/sys/fs/cgroup/memory",
+                "memory.limit_in_bytes",
+                "memory.usage_in_bytes",
+                "total_inactive_file",
+            ),
             _ => return None,
         };
-        Some((files, path.trim_start_matches('/')))
-    });
-    let free = |(files, path): (ControlGroupFiles, &str)| {
-        let root = Path::new(files.root);
         let free_in = |folder: &Path| -> Option<u64> {
             let number = |file: &str| first_number(&read(&folder.join(file))?);
             let statistics = read(&folder.join("memory.stat")).unwrap_or_default();
-            let reclaimable = number_after(&statistics, files.reclaimable).unwrap_or(0);
-            let in_use = number(files.in_use)?.saturating_sub(reclaimable);
-            Some(number(files.limit)?.saturating_sub(in_use))
+            let reclaimable = number_after(&statistics, reclaimable).unwrap_or(0);
+            Some(number(limit)?.saturating_sub(number(in_use)?.saturating_sub(reclaimable)))
         };
-        let folder = root.join(path);
+        let folder = Path::new(root).join(path.trim_start_matches('/'));
         folder.ancestors().take_while(|folder| folder.starts_with(root)).filter_map(free_in).min()
     };
-    own.filter_map(free).min()
+    groups.lines().filter_map(free).min()
 }
 
 /// Returns the number of bytes of memory and swap that the machine can provide without ending other
