@@ -11,7 +11,7 @@ use crate::value::{fnv1a64, sort_by_number};
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use tempfile::NamedTempFile;
@@ -231,11 +231,7 @@ fn locked_temporary(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
 
 /// Writes `text` to a new locked recovery file: `name`, `name-2`, `name-3` and so on.
 fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
-    let mut folders = DirBuilder::new();
-    folders.recursive(true);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut folders, 0o700);
-    folders.create(folder)?;
+    DirBuilder::new().recursive(true).mode(0o700).create(folder)?;
     let mut file = locked_temporary(folder, text)?;
     for number in 1..=MAX_FILES {
         let path = folder.join(numbered(name, number));
