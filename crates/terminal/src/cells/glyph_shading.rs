@@ -50,16 +50,8 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
 });
 
 /// Mean colours of [`CELLS`].
-static SHADED: LazyLock<QuantisedPalette> = LazyLock::new(|| {
-    let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
-        (Color::Indexed(fg), Color::Indexed(bg)) => {
-            mixture(xterm_rgb(fg), xterm_rgb(bg), coverage(cell.glyph))
-        }
-        (_, Color::Indexed(bg)) => Oklab::of(xterm_rgb(bg)),
-        _ => Oklab::of(PLAIN_BG),
-    };
-    QuantisedPalette::new(CELLS.iter().map(look).collect())
-});
+static SHADED: LazyLock<QuantisedPalette> =
+    LazyLock::new(|| QuantisedPalette::new(CELLS.iter().map(|cell| cell.halves()[0]).collect()));
 
 /// The 16 ANSI colours.
 static BARE: LazyLock<QuantisedPalette> = LazyLock::new(|| {

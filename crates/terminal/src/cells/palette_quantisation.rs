@@ -53,29 +53,18 @@ const FIRST: u8 = 16;
 /// First index of the greys.
 const GREYS: u8 = 232;
 
-/// Default values of the 16 ANSI colours in xterm.
-const ANSI: [[u8; 3]; 16] = [
-    [0, 0, 0],
-    [205, 0, 0],
-    [0, 205, 0],
-    [205, 205, 0],
-    [0, 0, 238],
-    [205, 0, 205],
-    [0, 205, 205],
-    [229, 229, 229],
-    [127, 127, 127],
-    [255, 0, 0],
-    [0, 255, 0],
-    [255, 255, 0],
-    [92, 92, 255],
-    [255, 0, 255],
-    [0, 255, 255],
-    [255, 255, 255],
+/// Default values of the 16 ANSI colours in xterm, as `0xrrggbb`.
+const ANSI: [u32; 16] = [
+    0x000000, 0xcd0000, 0x00cd00, 0xcdcd00, 0x0000ee, 0xcd00cd, 0x00cdcd, 0xe5e5e5, 0x7f7f7f,
+    0xff0000, 0x00ff00, 0xffff00, 0x5c5cff, 0xff00ff, 0x00ffff, 0xffffff,
 ];
 
 pub fn xterm_rgb(index: u8) -> [u8; 3] {
     match index {
-        ..FIRST => ANSI[usize::from(index)],
+        ..FIRST => {
+            let [_, rgb @ ..] = ANSI[usize::from(index)].to_be_bytes();
+            rgb
+        }
         GREYS.. => [8 + 10 * (index - GREYS); 3],
         _ => {
             let i = index - FIRST;

@@ -7,19 +7,6 @@ use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Attributes in the order of the SGR parameters that set them: 1 for bold, 2 for dim and so on.
-const ATTRIBUTES: [Modifier; 9] = [
-    Modifier::BOLD,
-    Modifier::DIM,
-    Modifier::ITALIC,
-    Modifier::UNDERLINED,
-    Modifier::SLOW_BLINK,
-    Modifier::RAPID_BLINK,
-    Modifier::REVERSED,
-    Modifier::HIDDEN,
-    Modifier::CROSSED_OUT,
-];
-
 /// Attributes that are visible on a space.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
@@ -138,9 +125,9 @@ impl Encoder {
             self.pen = Pen::default();
             codes.push("0".to_string());
         }
-        let missing = pen.modifier - self.pen.modifier;
-        let set = (1..).zip(ATTRIBUTES).filter(|(_, attribute)| missing.contains(*attribute));
-        codes.extend(set.map(|(parameter, _): (u8, _)| parameter.to_string()));
+        // Bit n of a modifier is the attribute that the SGR parameter n + 1 sets: bold, dim and so on.
+        let missing = (pen.modifier - self.pen.modifier).iter();
+        codes.extend(missing.map(|bit| (bit.bits().trailing_zeros() + 1).to_string()));
         for (new, old, base) in [(pen.fg, self.pen.fg, 30), (pen.bg, self.pen.bg, 40)] {
             if new != old {
                 codes.push(color_code(new, base));
