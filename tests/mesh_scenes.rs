@@ -267,7 +267,7 @@ fn scene_is_not_saved_where_mesh_would_be_missing() {
     let path = desk.put("scene.toml", &text);
     let elsewhere = tempfile::tempdir().unwrap();
     let mut file = SceneFile::open(&path).unwrap();
-    let scene = file.document().scene().clone();
+    let scene = file.document.scene().clone();
     let other = elsewhere.path().join("scene.toml");
     let refusal = file.save_as(&other, &scene, false).unwrap_err().to_string();
     assert!(refusal.contains("\"ball.obj\"") && !other.exists(), "{refusal}");

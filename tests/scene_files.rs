@@ -64,7 +64,7 @@ fn every_scene_reads_and_has_a_title_comment() {
         assert!(text.starts_with("# "), "{} opens without a comment", path.display());
         let file = path.file_name().unwrap().to_str().unwrap();
         let expected = WARNED.iter().find(|(name, _)| *name == file).map(|(_, words)| *words);
-        let warnings: Vec<_> = document.warnings().iter().map(|w| w.to_string()).collect();
+        let warnings: Vec<_> = document.warnings.iter().map(|w| w.to_string()).collect();
         match expected {
             None => assert_eq!(warnings, [] as [&str; 0]),
             Some(words) => {
@@ -128,7 +128,7 @@ fn warnings_have_line_and_column() {
                 [[light]]\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
                 [materials.steep]\nlobe = \"ggx\"\nalpha = 3\n";
     let document = Document::parse(text.to_string(), "dubious.toml").unwrap();
-    let warnings: Vec<_> = document.warnings().iter().map(|w| w.to_string()).collect();
+    let warnings: Vec<_> = document.warnings.iter().map(|w| w.to_string()).collect();
     assert_eq!(warnings.len(), 2, "{warnings:?}");
     assert!(warnings[0].starts_with(
         "dubious.toml:9:13  light \"lamp\": intensity is 0, so that it gives no light (and one more like it)."

@@ -113,7 +113,7 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
 fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
     let source = checkpoint.header.source().unwrap_or_default();
     if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
-        && checkpoint.inputs.fit(file.document().scene())
+        && checkpoint.inputs.fit(file.document.scene())
     {
         return Ok(file);
     }

@@ -151,7 +151,7 @@ fn read_scene(path: &Path) -> Result<Document, Failure> {
 /// Reads a scene file and prints its warnings.
 fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
     let document = read_scene(path)?;
-    for warning in document.warnings() {
+    for warning in &document.warnings {
         warn(&format!("warning: {warning}"));
     }
     Ok(document)

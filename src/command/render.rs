@@ -34,7 +34,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let output =
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let document = read_scene(&args.scene)?;
-    let warnings = document.warnings().to_vec();
+    let warnings = document.warnings.clone();
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
     // Reported before the render starts.

@@ -127,7 +127,7 @@ fn texture_edits_read_each_file_once() {
         }
     }));
     let mut file = SceneFile::open_with(&path, assets).unwrap();
-    let mut scene = file.document().scene().clone();
+    let mut scene = file.document.scene().clone();
     let m = Target::Material("m".into());
     let row =
         |scene: &Scene, key: &str| rows(scene, &m).unwrap().into_iter().find(|row| row.key == key);
@@ -168,7 +168,7 @@ fn texture_edits_read_each_file_once() {
     assert!(toggle(&none, &m, "texture", true).unwrap().scene.materials["m"].texture.is_some());
     assert!(set(&scene, &m, "bump", "").unwrap().scene.materials["m"].bump.is_none());
 
-    let mut document: Document = file.document().clone();
+    let mut document: Document = file.document.clone();
     document.apply(&scene);
     let written = document.text();
     assert!(written.starts_with("# A ball.\n") && written.contains("# white"), "{written}");

@@ -10,7 +10,8 @@ use std::sync::{Arc, PoisonError, RwLock};
 #[derive(Clone, Debug, Default)]
 pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
-    assets: Arc<Assets>,
+    /// Cache of asset files.
+    pub assets: Arc<Assets>,
 }
 
 /// All resolvers are equal: scenes with the same description are equal wherever their files are.
@@ -26,11 +27,6 @@ impl AssetResolver {
         let out = Self { folder: Arc::default(), assets };
         out.move_to(scene);
         out
-    }
-
-    /// Returns the cache of asset files.
-    pub fn assets(&self) -> Arc<Assets> {
-        self.assets.clone()
     }
 
     /// Resolves file names relative to the folder of the scene file `scene` from now on.

@@ -2,7 +2,6 @@
 
 use crate::asset::Assets;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::disk::open_regular;
 use crate::format::patch::rewrite;
 use crate::format::read::{SourceScene, read_text};
 use crate::{AssetResolver, Scene, TomlText};
@@ -16,12 +15,13 @@ use toml_edit::DocumentMut;
 /// concerns; the rest of the text is kept.
 #[derive(Clone, Debug)]
 pub struct Document {
-    name: String,
+    /// File name that diagnostics use.
+    pub name: String,
     /// Text and scene as read. Each change starts from a copy of them, so that undoing a removal
     /// restores its comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Warnings about the text of the scene file as read.
-    warnings: Vec<Diagnostic>,
+    /// Located [`Scene::warnings`] about the file as it was read.
+    pub warnings: Vec<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,
 }
@@ -39,12 +39,8 @@ impl Document {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 
-    /// Reads a regular file; other kinds are refused without blocking.
-    pub(super) fn read_regular(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        Self::read_opened(path, assets, open_regular)
-    }
-
-    fn read_opened(
+    /// Reads a scene file like [`Document::read`]. `open` opens the file.
+    pub(super) fn read_opened(
         path: &Path,
         assets: Arc<Assets>,
         open: impl Fn(&Path) -> io::Result<File>,
@@ -84,17 +80,6 @@ impl Document {
         self.scene = Arc::new(scene.clone());
     }
 
-    /// Returns the document with the file name `name` in diagnostics.
-    pub(super) fn renamed(mut self, name: &str) -> Self {
-        self.name = name.to_string();
-        self
-    }
-
-    /// Returns the file name that diagnostics use.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
     /// Returns the scene that the text describes.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -109,11 +94,6 @@ impl Document {
     /// Returns the text of the scene file.
     pub fn text(&self) -> &str {
         &self.text
-    }
-
-    /// Returns the located [`Scene::warnings`] about the file as it was read.
-    pub fn warnings(&self) -> &[Diagnostic] {
-        &self.warnings
     }
 }
 

@@ -13,7 +13,8 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     path: Option<PathBuf>,
-    document: Document,
+    /// Scene and its text, as last read or saved.
+    pub document: Document,
     /// Hash of the bytes that this program last read from or wrote to the file.
     fingerprint: u64,
 }
@@ -75,7 +76,7 @@ impl SceneFile {
 
     /// Reads a scene like [`SceneFile::open`], with a cache of the files that it refers to.
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        let document = Document::read_regular(path, assets)?;
+        let document = Document::read_opened(path, assets, open_regular)?;
         let fingerprint = fnv1a64(document.text().as_bytes());
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
@@ -123,11 +124,6 @@ impl SceneFile {
         self.path.as_deref()
     }
 
-    /// Returns the scene and its text, as last read or saved.
-    pub fn document(&self) -> &Document {
-        &self.document
-    }
-
     /// Compares the file with the bytes last read or written.
     pub fn on_disk(&self) -> DiskState {
         self.path.as_deref().map_or(DiskState::Unchanged, |path| self.state_of(&content(path)))
@@ -148,7 +144,7 @@ impl SceneFile {
         if let Ok(Some(found)) = content(&path) {
             self.fingerprint = found;
         }
-        *self = Self::open_with(&path, self.document.scene().resolver.assets())?;
+        *self = Self::open_with(&path, self.document.scene().resolver.assets.clone())?;
         Ok(())
     }
 
@@ -196,7 +192,8 @@ impl SceneFile {
                 what: format!("from there \"{file}\", which the scene names, would not be found"),
             });
         }
-        let mut document = self.document.clone().renamed(&path.display().to_string());
+        let mut document = self.document.clone();
+        document.name = path.display().to_string();
         document.apply(scene);
         self.write(document, path, overwrite)?;
         resolver.move_to(path);

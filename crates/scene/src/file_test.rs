@@ -16,7 +16,7 @@ fn opened(directory: &Path) -> (PathBuf, SceneFile) {
 
 /// Returns the scene of `file`, edited: its `max_depth` is `depth`.
 fn edited(file: &SceneFile, depth: u32) -> Scene {
-    let mut scene = file.document().scene().clone();
+    let mut scene = file.document.scene().clone();
     scene.trace.max_depth = depth;
     scene
 }
@@ -29,7 +29,7 @@ fn count(directory: &Path) -> usize {
 fn saving_and_undoing_gives_the_same_bytes() {
     let directory = tempfile::tempdir().unwrap();
     let (path, mut file) = opened(directory.path());
-    let start = file.document().scene().clone();
+    let start = file.document.scene().clone();
     file.save(&edited(&file, 3), false).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!(text, MIRROR_ROOM.to_string() + "\n[trace]\nmax_depth = 3\n");
@@ -50,10 +50,10 @@ fn changes_by_other_programs_are_detected() {
     assert_eq!(file.save(&scene, false), Err(SaveError::Changed(path.clone())));
     assert_eq!(fs::read_to_string(&path).unwrap(), theirs);
     file.save(&scene, true).unwrap();
-    assert_eq!(SceneFile::open(&path).unwrap().document().scene(), &scene);
+    assert_eq!(SceneFile::open(&path).unwrap().document.scene(), &scene);
     fs::write(&path, &theirs).unwrap();
     file.reload().unwrap();
-    assert_eq!(file.document().scene().film.size, [320, 240]);
+    assert_eq!(file.document.scene().film.size, [320, 240]);
     assert_eq!(file.on_disk(), DiskState::Unchanged);
     fs::remove_file(&path).unwrap();
     assert_eq!(file.on_disk(), DiskState::Missing);
@@ -68,7 +68,7 @@ fn broken_file_is_reported_once_and_document_stays() {
     fs::write(&path, MIRROR_ROOM.replace("radius = 0.5", "radius = -0.5")).unwrap();
     let errors = file.reload().unwrap_err();
     assert_eq!(errors.messages[0].subject, "object \"ball\"");
-    assert_eq!(file.document().text(), MIRROR_ROOM);
+    assert_eq!(file.document.text(), MIRROR_ROOM);
     assert_eq!(file.on_disk(), DiskState::Unchanged);
     fs::write(&path, MIRROR_ROOM).unwrap();
     assert_eq!(file.on_disk(), DiskState::Changed);
@@ -89,7 +89,7 @@ fn save_as_does_not_overwrite_unless_asked() {
     assert_eq!(file.path(), None);
     let new = directory.path().join("new.toml");
     file.save_as(&new, &scene, false).unwrap();
-    assert_eq!((file.path(), file.document().name()), (Some(&*new), &*new.display().to_string()));
+    assert_eq!((file.path(), &*file.document.name), (Some(&*new), &*new.display().to_string()));
     file.save_as(&other, &scene, true).unwrap();
     assert_eq!(fs::read(&other).unwrap(), fs::read(&new).unwrap());
     file.save(&edited(&file, 4), false).unwrap();
@@ -146,7 +146,7 @@ fn pipe_in_place_of_the_file_is_refused_without_blocking() {
     }
     assert!(file.reload().unwrap_err().to_string().contains("it is a pipe"));
     assert!(SceneFile::open(&path).is_err());
-    assert_eq!(file.document().text(), MIRROR_ROOM);
+    assert_eq!(file.document.text(), MIRROR_ROOM);
     let other = directory.path().join("other.toml");
     file.save_as(&other, &edited(&file, 3), false).unwrap();
 }

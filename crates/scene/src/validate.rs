@@ -104,7 +104,7 @@ impl Scene {
     /// Loads the files that the scene refers to and that are not loaded yet. Unreadable files are
     /// errors in the next validation.
     pub fn resolve(&mut self) {
-        let (resolver, assets) = (&self.resolver, self.resolver.assets());
+        let (resolver, assets) = (&self.resolver, &self.resolver.assets);
         for object in &mut self.objects {
             object.shape.resolve(|name| assets.mesh(&resolver.path(name)));
         }

@@ -28,7 +28,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Full-screen use of the terminal, which is restored when this value is dropped or any thread
 /// panics, and by a helper process if the process ends in another way.
 pub struct Screen {
-    tty: Arc<Tty>,
+    pub tty: Arc<Tty>,
     /// Notification that [`Tty::leave`] has restored the terminal, for example after a panic.
     pub left: Receiver<()>,
     restorer: Option<Restorer>,
@@ -111,10 +111,6 @@ impl Screen {
         }));
         screen.tty.write(ENTER.as_bytes())?;
         Ok(screen)
-    }
-
-    pub fn tty(&self) -> Arc<Tty> {
-        Arc::clone(&self.tty)
     }
 }
 
@@ -264,7 +260,7 @@ mod tests {
     #[test]
     fn screen_is_left_once() {
         let (screen, out, _turn) = screen();
-        let tty = screen.tty();
+        let tty = screen.tty.clone();
         tty.write(b"frame").unwrap();
         drop(screen);
         tty.leave();
@@ -275,7 +271,7 @@ mod tests {
     #[test]
     fn exit_sequence_is_sent_once_before_leaving() {
         let (screen, out, _turn) = screen();
-        let tty = screen.tty();
+        let tty = screen.tty.clone();
         tty.set_exit_sequence(b"old");
         tty.set_exit_sequence(b"the picture goes");
         tty.suspend();
@@ -287,7 +283,7 @@ mod tests {
     #[test]
     fn suspended_screen_is_resumed() {
         let (screen, out, _turn) = screen();
-        let tty = screen.tty();
+        let tty = screen.tty.clone();
         assert!(tty.suspend() && !tty.suspend());
         tty.write(b"a frame while suspended").unwrap();
         tty.resume().unwrap();
@@ -331,7 +327,7 @@ mod tests {
     #[test]
     fn terminal_that_does_not_read_does_not_delay_the_end() {
         let (screen, _, _turn) = screen();
-        let tty = screen.tty();
+        let tty = screen.tty.clone();
         let _busy = tty.out.lock().unwrap();
         let start = Instant::now();
         assert!(tty.lock_within(Duration::from_millis(20)).is_none());

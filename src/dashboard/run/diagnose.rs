@@ -27,8 +27,8 @@ pub fn diagnose(environment: Environment) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not know.
     let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
-    let tty = screen.tty();
-    handle_signals(signals, screen.tty(), Duration::ZERO)?;
+    let tty = screen.tty.clone();
+    handle_signals(signals, screen.tty.clone(), Duration::ZERO)?;
     let mut input = InputReader::new(&environment);
     let mut terminal = query_capabilities(&tty, &mut input, environment, &|| false)?;
     if terminal.passthrough.is_none() {

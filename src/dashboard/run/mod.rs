@@ -76,11 +76,11 @@ pub struct Ended {
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
     let (scene, file) = match file {
-        Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
+        Ok(file) => (Ok(Arc::new(file.document.scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
     };
     let (path, name) = match &file {
-        Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
+        Ok(file) => (file.path().map(PathBuf::from), file.document.name.clone()),
         Err(path) => (Some(path.clone()), String::new()),
     };
     let (results, done) = unbounded();
@@ -120,10 +120,10 @@ fn run_on_terminal(
     let TerminalSetup { colors, environment, bandwidth } = terminal;
     let signals = SignalQueue::of_terminal()?;
     let screen = Screen::enter()?;
-    let signals = handle_signals(signals, screen.tty(), PATIENCE)?;
+    let signals = handle_signals(signals, screen.tty.clone(), PATIENCE)?;
     let mut input = InputReader::new(&environment);
     let ending = || signals.caught().is_some();
-    let capabilities = query_capabilities(&screen.tty(), &mut input, environment, &ending);
+    let capabilities = query_capabilities(&screen.tty, &mut input, environment, &ending);
     let Ok((terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
     else {
         return Ok(Ended { signalled: Some(HUNG_UP), exported: Vec::new(), kept: Ok(None) });
@@ -131,14 +131,18 @@ fn run_on_terminal(
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
     let input = input::read(input)?;
-    let terminal_io =
-        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
+    let terminal_io = TerminalIo {
+        tty: screen.tty.clone(),
+        input,
+        signals: signals.events,
+        left: screen.left.clone(),
+    };
     let mut dashboard = Dashboard {
         model,
         effects,
         done,
         terminal_io,
-        frames: FramePipeline::new(screen.tty(), terminal, bandwidth)?,
+        frames: FramePipeline::new(screen.tty.clone(), terminal, bandwidth)?,
         latency: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,

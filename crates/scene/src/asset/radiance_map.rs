@@ -34,7 +34,8 @@ pub struct RadianceMap {
     /// Radiance (red, green, blue) of the image's pixels, row by row from the top.
     pixels: Vec<[f32; 3]>,
     distribution: PiecewiseConstant2D,
-    mean: [f64; 3],
+    /// Mean radiance over all directions, weighted by solid angle.
+    pub mean: [f64; 3],
 }
 
 /// Direction sampled by [`RadianceMap::sample`].
@@ -111,11 +112,6 @@ impl RadianceMap {
     /// Returns the memory of the pixels and the sampling distribution in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.pixels[..]) + self.distribution.bytes()
-    }
-
-    /// Returns the mean radiance of the image over all directions, weighted by solid angle.
-    pub fn mean(&self) -> [f64; 3] {
-        self.mean
     }
 
     /// Returns the largest value of a channel.
@@ -414,7 +410,7 @@ FORMAT=32-bit_rle_rgbe
         let mut pixels_of_image = vec![dark; SIZE[0] * SIZE[1]];
         pixels_of_image[5 * SIZE[0] + 9] = [1e6; 3];
         let map = RadianceMap::new(SIZE.map(|n| n as u32), pixels_of_image);
-        let [mean, ..] = map.mean();
+        let [mean, ..] = map.mean;
         for i in 0..200_000u32 {
             let v = (f64::from(i.reverse_bits()) + 0.5) / f64::from(u32::MAX);
             let DirectionSample { direction, density } =

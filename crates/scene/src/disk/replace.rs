@@ -63,7 +63,8 @@ pub struct Replacement {
     existing: Existing,
     /// `true` if the path named a file when the replacement began.
     exists: bool,
-    temporary: NamedTempFile,
+    /// File that gets the new content.
+    pub temporary: NamedTempFile,
 }
 
 impl Replacement {
@@ -112,11 +113,6 @@ impl Replacement {
             }
             Err(error) => Err(explain(path, &folder, exists, &error)),
         }
-    }
-
-    /// Returns the temporary file.
-    pub fn temporary(&mut self) -> &mut NamedTempFile {
-        &mut self.temporary
     }
 
     /// Converts an error of writing the temporary file to one with a remedy for the user.
@@ -175,7 +171,7 @@ pub fn replace_file(
     write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>,
 ) -> Result<(), WriteError> {
     let mut replacement = Replacement::begin(path, existing)?;
-    let written = write(replacement.temporary());
+    let written = write(&mut replacement.temporary);
     written.map_err(|error| replacement.explain(&error))?;
     replacement.commit()
 }
@@ -328,7 +324,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let begin = || {
             let mut replacement = Replacement::begin(&path, Existing::Replace).unwrap();
-            replacement.temporary().write_all(&[7; 100_000]).unwrap();
+            replacement.temporary.write_all(&[7; 100_000]).unwrap();
             replacement
         };
         let error = begin().explain(&ErrorKind::StorageFull.into()).to_string();

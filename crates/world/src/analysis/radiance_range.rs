@@ -346,7 +346,7 @@ impl<'a> SceneDistances<'a> {
     }
 
     fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
-        let mean = map.mean().into_iter().fold(0.0, f64::max);
+        let mean = map.mean.into_iter().fold(0.0, f64::max);
         let typical = if mean > 0.0 { mean } else { 1.0 };
         let range = self.range_of(typical, self.response());
         if !visible {

@@ -87,7 +87,7 @@ impl Exporter {
     /// has not read.
     fn stem(&self, source: &str) -> String {
         match self.file.as_ref().and_then(SharedFile::get) {
-            Some(file) => stem(file.path(), file.document().name()),
+            Some(file) => stem(file.path(), &file.document.name),
             None => stem(None, source),
         }
     }
@@ -96,9 +96,9 @@ impl Exporter {
     fn source(&self, scene: &Scene) -> (String, String) {
         match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => {
-                let mut document = file.document().clone();
+                let mut document = file.document.clone();
                 document.apply(scene);
-                (document.name().to_string(), document.text().to_string())
+                (document.name.clone(), document.text().to_string())
             }
             None => (self.stem(""), scene.to_text()),
         }

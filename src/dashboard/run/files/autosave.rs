@@ -213,7 +213,7 @@ fn scene(orphan: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, Scen
     match file {
         Ok(file) => file.parse(&orphan.text, &name),
         Err(path) => {
-            SceneFile::recovered(path, orphan.text.clone()).map(|f| f.document().scene().clone())
+            SceneFile::recovered(path, orphan.text.clone()).map(|f| f.document.scene().clone())
         }
     }
 }
@@ -315,7 +315,7 @@ mod tests {
             "{messages:?}"
         );
         let mut file = autosave.recover(Some(&path)).unwrap();
-        let scene = file.document().scene().clone();
+        let scene = file.document.scene().clone();
         file.save(&scene, false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), STARTER);
     }

@@ -127,7 +127,7 @@ impl FileWorker {
             (None, Some(path)) => self.file.insert(SceneFile::open(path)?),
             (None, None) => return Ok(Arc::default()),
         };
-        let scene = Arc::new(file.document().scene().clone());
+        let scene = Arc::new(file.document.scene().clone());
         self.shared.put(file);
         Ok(scene)
     }

@@ -57,7 +57,7 @@ impl Files {
         // A readable file gets no stamp yet, so that the first check compares its contents. The
         // errors of an unreadable one have been reported already.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(FileStamp::of);
-        let name = file.as_ref().map_or("", |file| file.document().name());
+        let name = file.as_ref().map_or("", |file| &file.document.name);
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
         let shared = SharedFile::new(autosave.recovery.elsewhere());
         file.iter().for_each(|file| shared.put(file));
@@ -203,7 +203,7 @@ mod tests {
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
-        assert_eq!(files.shared.get().unwrap().document().scene(), &scene);
+        assert_eq!(files.shared.get().unwrap().document.scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
         // A rename replaces the file at once, so the worker never reads an incomplete file.
