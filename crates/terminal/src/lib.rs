@@ -33,7 +33,7 @@ mod tests;
 
 use crate::event::{Key, Mouse};
 pub use capabilities::{Capabilities, Environment, Multiplexer};
-pub use capability_query::{cursor_request, query_capabilities, query_passthrough};
+pub use capability_query::{query_capabilities, query_passthrough};
 pub use clipboard::copied;
 pub use decode::Decoder;
 pub use input_reader::{InputReader, TimedEvent};

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo_terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
-use zerkalo_terminal::{Capabilities, Tty, copied, cursor_request};
+use zerkalo_terminal::{Capabilities, Tty, copied};
 
 /// Start and end of a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
@@ -134,7 +134,7 @@ impl FramePipeline {
         if upload.open {
             self.flow.sent_unasked(now, bytes.len());
         } else {
-            self.request_ack(&mut bytes);
+            bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
             self.flow.sent(now, bytes.len(), true, 0);
         }
         self.send(bytes, now);
@@ -236,16 +236,10 @@ impl FramePipeline {
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();
         bytes.extend(std::mem::take(&mut self.clipboard).as_bytes());
-        self.request_ack(&mut bytes);
+        bytes.extend(self.flow.ack_request().unwrap_or_default().as_bytes());
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.send(bytes, now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
-    }
-
-    fn request_ack(&self, bytes: &mut Vec<u8>) {
-        if let Some(through) = self.flow.ack_request() {
-            bytes.extend(cursor_request(through).as_bytes());
-        }
     }
 
     pub fn record_written(&mut self) {

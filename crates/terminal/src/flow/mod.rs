@@ -16,6 +16,7 @@ mod tcp_send_queue;
 mod tests;
 
 use crate::Multiplexer;
+use crate::capability_query::cursor_request;
 pub use initial::InitialLink;
 use send_queue_estimate::SendQueueEstimate;
 use std::collections::VecDeque;
@@ -31,6 +32,9 @@ const FRAME_SPAN: Duration = Duration::from_millis(100);
 /// Byte budgets of a frame: `[smallest, initial, largest]`. The initial one applies before the
 /// first measurement.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
+/// Smallest assumed rate in bytes per second. At it a frame of the smallest budget takes one second;
+/// at a rate near 0, after a pause of the connection, the next frame would not be due for minutes.
+const MIN_RATE: f64 = 2e3;
 /// Largest number of frames in flight, that is, not acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
 /// Largest sum of bytes of the frames in flight that contain only text.
@@ -201,11 +205,10 @@ impl FlowControl {
         self.active_until = now + ACTIVE_TIME;
     }
 
-    /// Returns the multiplexer, if there is one, through which the acknowledgement request after a
-    /// frame must pass. The outer `None` means no request.
-    pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
+    /// Returns the acknowledgement request to send after a frame, if there is one.
+    pub fn ack_request(&self) -> Option<&'static str> {
         match self.mode {
-            PacingMode::AckClocked(multiplexer) => Some(multiplexer),
+            PacingMode::AckClocked(multiplexer) => Some(cursor_request(multiplexer)),
             _ => None,
         }
     }
@@ -408,7 +411,7 @@ impl FlowControl {
             && (sample.is_full || rate > self.rate)
         {
             let rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
-            self.rate = rate.max(BUDGET[0]);
+            self.rate = rate.max(MIN_RATE);
         }
     }
 
@@ -418,7 +421,7 @@ impl FlowControl {
             return;
         }
         self.forget_frames();
-        self.rate = (self.rate / 2.0).max(BUDGET[0] / FRAME_SPAN.as_secs_f64());
+        self.rate = (self.rate / 2.0).max(MIN_RATE);
         self.losses += 1;
         if self.losses >= MAX_LOSSES {
             let fallback =
