@@ -74,8 +74,9 @@ impl Replacement {
     /// Fails if the file could not be replaced now.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
         let error = |kind, what: &str, remedy: &str| WriteError::new(path, kind, what, remedy);
+        let other_file = |e: io::Error| error(e.kind(), &e.to_string(), "name another file");
         let target = match existing {
-            Existing::Replace => follow(path).map_err(|e| of_link(path, &e))?,
+            Existing::Replace => follow(path).map_err(other_file)?,
             Existing::Refuse if path.symlink_metadata().is_ok() => return Err(exists(path)),
             Existing::Refuse => path.to_path_buf(),
         };
@@ -87,8 +88,7 @@ impl Replacement {
                 let kind = ErrorKind::IsADirectory;
                 return Err(error(kind, "it is a directory", "add a file name"));
             }
-            require_regular(old.file_type())
-                .map_err(|e| error(e.kind(), &e.to_string(), "name another file"))?;
+            require_regular(old.file_type()).map_err(other_file)?;
             if old.permissions().readonly() {
                 let what = "the existing file is read-only";
                 let remedy = "make it writable or name another file";
@@ -208,7 +208,8 @@ fn follow(path: &Path) -> io::Result<PathBuf> {
         let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
         let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
         let directory = fs::metadata(&folder)?;
-        if !may_follow(&Owner::of(&link), &Owner::of(&directory), geteuid().as_raw()) {
+        let user = geteuid().as_raw();
+        if !may_follow(link.uid(), directory.uid(), directory.mode(), user) {
             let why = format!(
                 "it is a symbolic link of user {} in a folder that everybody may write to",
                 user_name(link.uid())
@@ -216,40 +217,22 @@ fn follow(path: &Path) -> io::Result<PathBuf> {
             return Err(io::Error::new(ErrorKind::PermissionDenied, why));
         }
         if fs::canonicalize(&folder)?.starts_with("/proc") {
-            return Err(ErrorKind::Unsupported.into());
+            let why = "it is an open file of a process";
+            return Err(io::Error::new(ErrorKind::Unsupported, why));
         }
         path = folder.join(fs::read_link(&path)?);
     }
     Err(io::Error::other("too many symbolic links lead to it"))
 }
 
-/// Owner and permission bits of a file or folder.
-struct Owner {
-    user: u32,
-    mode: u32,
-}
-
-impl Owner {
-    fn of(metadata: &Metadata) -> Self {
-        Self { user: metadata.uid(), mode: metadata.mode() }
-    }
-}
-
-/// Returns `true` if the user with the id `user` may write through the symbolic link `link` in
-/// `folder`. In a sticky folder that everybody may write to, only links of `user` and of the folder's
-/// owner are followed, as by Linux's `fs.protected_symlinks` (proc_sys_fs(5)).
-fn may_follow(link: &Owner, folder: &Owner, user: u32) -> bool {
+/// Returns `true` if the user with the id `user` may write through a symbolic link with the owner
+/// `link_owner` in a folder with these permission bits. In a sticky folder that everybody may write
+/// to, only links of `user` and of the folder's owner are followed, as by Linux's
+/// `fs.protected_symlinks` (proc_sys_fs(5)).
+fn may_follow(link_owner: u32, folder_owner: u32, folder_mode: u32, user: u32) -> bool {
     const STICKY_AND_WRITABLE_BY_ALL: u32 = 0o1002;
-    let is_shared = folder.mode & STICKY_AND_WRITABLE_BY_ALL == STICKY_AND_WRITABLE_BY_ALL;
-    !is_shared || link.user == user || link.user == folder.user
-}
-
-fn of_link(path: &Path, error: &io::Error) -> WriteError {
-    let what = match error.kind() {
-        ErrorKind::Unsupported => "it is an open file of a process".to_string(),
-        _ => error.to_string(),
-    };
-    WriteError::new(path, error.kind(), what, "name another file")
+    let is_shared = folder_mode & STICKY_AND_WRITABLE_BY_ALL == STICKY_AND_WRITABLE_BY_ALL;
+    !is_shared || [user, folder_owner].contains(&link_owner)
 }
 
 fn exists(path: &Path) -> WriteError {
@@ -388,21 +371,19 @@ mod tests {
 
     #[test]
     fn links_are_followed_as_with_protected_symlinks() {
-        let owner = |user, mode| Owner { user, mode };
-        let link = |user| owner(user, 0o120_777);
-        for (link_user, folder, user, expected) in [
+        for (link_owner, folder_owner, folder_mode, user, expected) in [
             // The folder is sticky and everybody may write to it, like /tmp.
-            (1001, owner(0, 0o41_777), 1000, false),
-            (1001, owner(0, 0o41_777), 0, false),
-            (1001, owner(0, 0o41_777), 1001, true),
-            (0, owner(0, 0o41_777), 1000, true),
+            (1001, 0, 0o41_777, 1000, false),
+            (1001, 0, 0o41_777, 0, false),
+            (1001, 0, 0o41_777, 1001, true),
+            (0, 0, 0o41_777, 1000, true),
             // The folder is not sticky, or not everybody may write to it.
-            (1001, owner(0, 0o40_777), 1000, true),
-            (1001, owner(0, 0o41_775), 1000, true),
-            (1001, owner(0, 0o40_755), 1000, true),
+            (1001, 0, 0o40_777, 1000, true),
+            (1001, 0, 0o41_775, 1000, true),
+            (1001, 0, 0o40_755, 1000, true),
         ] {
-            let followed = may_follow(&link(link_user), &folder, user);
-            assert_eq!(followed, expected, "link of {link_user}, {:o}, {user}", folder.mode);
+            let followed = may_follow(link_owner, folder_owner, folder_mode, user);
+            assert_eq!(followed, expected, "link of {link_owner}, {folder_mode:o}, {user}");
         }
     }
 
