@@ -151,7 +151,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub precision: PrecisionArgs,
     /// Acceleration structure, instead of the scene's; every choice renders the same picture
-    #[arg(long, value_parser = acceleration())]
+    #[arg(long, value_parser = choice(Acceleration::ALL.map(|a| (a.name(), None, a))))]
     pub acceleration: Option<Acceleration>,
     /// Sampler: sobol spreads samples evenly, random is for comparison
     #[arg(long, value_parser = choice(SAMPLERS), default_value = "sobol")]
@@ -388,11 +388,6 @@ where
         let chosen = choices.iter().find(|(name, ..)| *name == given);
         chosen.expect("only these names are parsed").2.clone()
     })
-}
-
-fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
-    PossibleValuesParser::new(Acceleration::ALL.map(Acceleration::name))
-        .map(|given| Acceleration::from_name(&given).unwrap_or(Acceleration::Auto))
 }
 
 /// Parses a size such as `640x480`. The validation of the scene checks its range.

@@ -15,7 +15,6 @@ pub mod process_memory;
 pub mod shape;
 pub mod value;
 
-mod acceleration;
 mod asset_resolver;
 mod contents_hash;
 mod diagnostic;
@@ -33,7 +32,6 @@ mod validate;
 pub use crate::format::TomlText;
 pub use crate::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TransformOp};
-pub use acceleration::Acceleration;
 pub use asset_resolver::AssetResolver;
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
@@ -42,7 +40,8 @@ pub use history::History;
 pub use object::Object;
 pub use recovery::{Orphan, Recovery, RecoveryFile, remove_stale, state_folder};
 pub use settings::{
-    Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings, RayTypes,
+    Acceleration, Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings,
+    RayTypes,
 };
 pub use validate::Problem;
 
