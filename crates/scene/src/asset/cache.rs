@@ -69,12 +69,6 @@ type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 /// Files of one type, the most recently used first.
 struct Cache<T>(Vec<(Key, CacheEntry<T>)>);
 
-impl<T> Default for Cache<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
-
 impl<T> Cache<T> {
     /// Returns the entry for `key`, a new one if necessary. Removes other versions of the file.
     fn entry(&mut self, key: Key) -> CacheEntry<T> {
@@ -126,9 +120,9 @@ impl Assets {
     /// stage.
     pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
         Self {
-            meshes: Mutex::default(),
-            images: Mutex::default(),
-            radiance_maps: Mutex::default(),
+            meshes: Mutex::new(Cache(Vec::new())),
+            images: Mutex::new(Cache(Vec::new())),
+            radiance_maps: Mutex::new(Cache(Vec::new())),
             progress: Box::new(progress),
         }
     }
@@ -254,7 +248,7 @@ mod tests {
 
     #[test]
     fn unused_files_are_evicted_least_recent_first() {
-        let mut cache = Cache::<usize>::default();
+        let mut cache = Cache::<usize>(Vec::new());
         let key = |name: &str| Key { path: name.into(), modified: None, bytes: 0 };
         let put = |cache: &mut Cache<usize>, name| {
             let file = Arc::new(UNUSED_BYTES / 2);
