@@ -15,7 +15,7 @@ pub struct CheckpointWriter {
     interval: Duration,
     provenance: Provenance,
     due: Instant,
-    /// Channel of the result of a checkpoint that is encoded or written.
+    /// Channel for the result of the checkpoint in progress. `None` if none is in progress.
     written: Option<Receiver<Result<(), WriteError>>>,
 }
 
@@ -46,7 +46,8 @@ impl CheckpointWriter {
         }))
     }
 
-    /// Requests a checkpoint if one is due. Does not block.
+    /// Warns if a checkpoint could not be written, and requests the next one if it is due. Does not
+    /// block.
     pub fn poll(&mut self, session: &Session) {
         if let Some(Ok(written)) = self.written.as_ref().map(Receiver::try_recv) {
             self.written = None;
@@ -59,7 +60,8 @@ impl CheckpointWriter {
         }
     }
 
-    /// Requests a checkpoint, which is written in a thread of its own.
+    /// Requests a checkpoint, which is written in a thread of its own. Returns the channel for its
+    /// result.
     fn request(&self, session: &Session) -> Receiver<Result<(), WriteError>> {
         let (sender, written) = channel();
         let path = self.path.clone();
@@ -68,7 +70,7 @@ impl CheckpointWriter {
             let checkpoint = picture.and_then(|picture| picture.checkpoint(&provenance));
             std::thread::spawn(move || {
                 let written = checkpoint.map_or(Ok(()), |it| it.write(&path, Existing::Replace));
-                // After an error of the render, the channel is closed.
+                // The receiver has been dropped if the render has failed.
                 let _ = sender.send(written);
             });
         });

@@ -14,7 +14,7 @@ use zerkalo_terminal::{Capabilities, Environment, Multiplexer};
 
 /// Width of the report in columns.
 const COLUMNS: usize = 80;
-/// Width of the names at the start of lines.
+/// Width of the names at the start of lines, in columns.
 const NAME: usize = 17;
 
 pub fn run() -> Result<(), Failure> {
@@ -47,7 +47,7 @@ struct DoctorReport {
     environment: Environment,
     /// Reply of the terminal, or the reason why it was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
-    /// Environment variable that sets the character encoding, and its value.
+    /// Environment variable that sets the character encoding, and its value. `None` if none is set.
     locale: Option<(&'static str, String)>,
 }
 

@@ -67,7 +67,8 @@ const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
 const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
 /// Prints the results of a dashboard: names of written files on `out`, everything else on stderr.
-/// After a signal, the error has its exit status, even if the terminal is lost.
+/// After a signal, the returned error has the exit status of the signal, even if nothing could be
+/// printed.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
@@ -105,8 +106,8 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
     }
 }
 
-/// Opens the scene of a checkpoint: its scene file, if the samples are still valid for that,
-/// otherwise the scene stored in the checkpoint.
+/// Opens the scene of a checkpoint: its scene file if the samples are still valid for the scene in
+/// that file, otherwise the scene stored in the checkpoint.
 ///
 /// # Errors
 /// Fails if the stored scene is not valid.
@@ -139,8 +140,8 @@ fn open(
     }
 }
 
-/// Returns a note about unsaved edits of the unreadable scene file `path`, preferably of this user.
-/// Empty if there are none.
+/// Returns a note about unsaved edits of the unreadable scene file `path`; empty if there are none.
+/// Edits of this user take precedence over those of another user.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path, of: String| {

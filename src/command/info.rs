@@ -33,7 +33,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Returns what a plan says about its picture.
+/// Returns the entries to print for a plan.
 fn of_plan(plan: &Plan) -> FileMetadata {
     let settings = &plan.settings;
     let base = match settings.base_plan {
@@ -71,7 +71,7 @@ fn target(plan: &Plan) -> String {
     )
 }
 
-/// Compares `origin` with the scene file at `path`.
+/// Compares `origin` with the scene file at `path`, and prints the result if they agree.
 ///
 /// # Errors
 /// Fails if the file of `origin` shows another scene, or has no scene hash.

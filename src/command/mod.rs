@@ -167,7 +167,7 @@ fn warn_of_precision(scene: &Scene, options: &world::Options) {
     }
 }
 
-/// Escapes control characters in each line, such as those of file names.
+/// Escapes control characters in each line. File names may contain them.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

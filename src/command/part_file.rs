@@ -46,7 +46,7 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Writes the film of `state`, which holds the samples of `part`. Returns the report on it.
+/// Writes the film of `state`, which holds the samples of `part`. Returns the report on the film.
 pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Report, WriteError> {
     let settings = &part.plan.settings;
     let provenance = Provenance {

@@ -15,13 +15,14 @@ const OPTION: &str = "--memory";
 pub struct Division {
     /// `true` if all lights share one light group, to save memory.
     pub merge_lights: bool,
-    /// Regions; a picture that fits is one.
+    /// Regions of the picture; a single one if the whole picture fits.
     pub regions: Regions,
 }
 
 impl Division {
-    /// Divides the picture so that the process uses at most `cap` bytes. The first choice is a film
-    /// with all light groups, the second a film with one, the third a division.
+    /// Divides the picture so that the process uses at most `cap` bytes. The first choice is a
+    /// whole film with all light groups, the second a whole film with merged light groups, the
+    /// third a division into regions.
     ///
     /// # Errors
     /// Fails if the smallest regions do not fit, or if a checkpoint is requested or

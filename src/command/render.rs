@@ -37,7 +37,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let warnings = document.warnings.clone();
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
-    // Reported before the render starts.
+    // Faulty paths are reported before the render starts.
     check_outputs(args, &output)?;
     let checkpoint = read_checkpoint(args)?;
     for warning in warnings {
@@ -100,7 +100,7 @@ pub struct Rendered {
     /// Time from the start of the program to the compilation of the scene.
     pub set_after: Duration,
     pub write_seconds: f64,
-    /// Path of the last checkpoint, or the error of writing it.
+    /// Path of the last checkpoint, or the error of writing it. `None` without `--checkpoint`.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -119,7 +119,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         CheckpointWriter::new(path, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // The picture is written first.
+    // An error of the last checkpoint is returned only after the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
     let (depth, output) = (args.bits, output.clone());
@@ -174,7 +174,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     }
 }
 
-/// Shows the progress of the render until it ends.
+/// Shows the progress of the render and writes checkpoints, until it ends or a signal arrives.
 fn watch(
     session: &Session,
     signals: &Signals,
@@ -207,7 +207,7 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     Ok(path.map(|path| Checkpoint::read(path)).transpose()?)
 }
 
-/// Continues `checkpoint`. Prints a note if the lights differ.
+/// Continues `checkpoint`. Prints a note if its light weights differ from those of `scene`.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.header.weights.clone();
     session.continue_from(scene, checkpoint);
@@ -218,7 +218,7 @@ fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     }
 }
 
-/// Returns `scene` with the settings of the command line.
+/// Returns `scene` with the acceleration structure and the size of the command line.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;

@@ -84,6 +84,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Checks that the plan has `shard` to trace, and that the output is a film file.
 fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Result<(), Failure> {
     let last = plan.settings.shards;
     if shard > last {
@@ -111,8 +112,8 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Reads the film file of an earlier run of the same shard. Returns `None` if there is none, or it
-/// is damaged.
+/// Reads the film file of an earlier run of the same shard. Returns the film, its number of rays,
+/// and `true` if the shard is complete. Returns `None` if the file does not exist or is damaged.
 fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
     if !path.exists() {
         return Ok(None);
@@ -175,8 +176,9 @@ fn start(
     Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
-/// Traces samples until the shards of `part` are complete or a signal arrives, whose exit status it
-/// returns. Writes checkpoints to `output` if it is a film file.
+/// Traces samples until the shards of `part` are complete or a signal arrives. Returns the exit
+/// status of the signal, or `None` without a signal. Writes checkpoints to `output` if it is a film
+/// file.
 fn trace(
     render: &mut ShardRender,
     part: &mut Part,
@@ -206,7 +208,8 @@ fn trace(
     Ok(None)
 }
 
-/// Writes the samples so far. Returns the report on them.
+/// Writes the samples so far, in shards that are marked as `complete` or not. Returns the report on
+/// the film.
 fn write(
     render: &ShardRender,
     part: &mut Part,

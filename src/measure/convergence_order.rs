@@ -5,13 +5,13 @@
 pub struct Slope {
     /// d log(error) / d log(samples): -0.5 for independent random samples.
     pub value: f64,
-    /// Standard error, from the residuals of the line.
+    /// Standard error of `value`, from the residuals of the line.
     pub standard_error: f64,
 }
 
 impl Slope {
-    /// Fits a line to pairs (samples, error) that are positive. Returns `None` for fewer than
-    /// three, or if all have the same number of samples.
+    /// Fits a line to the pairs (samples, error) in which both numbers are positive. Returns `None`
+    /// for fewer than three such pairs, or if all have the same number of samples.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()

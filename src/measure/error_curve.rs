@@ -11,11 +11,11 @@ use zerkalo_render::SyncRender;
 pub struct Point {
     /// Number of calls of [`SyncRender::step`] before this point.
     pub step: usize,
-    /// Number of samples, over all pixels.
+    /// Number of samples until this point, over all pixels.
     pub samples: u64,
     /// Mean number of samples per pixel.
     pub spp: f64,
-    /// Seconds of tracing in each repetition.
+    /// Seconds of tracing until this point, in each repetition.
     pub seconds: Vec<f64>,
     /// Error in 8-bit levels that the render estimates from its replicates. `None` before the first
     /// estimate.
@@ -31,13 +31,13 @@ pub struct End {
     pub levels: f64,
     /// Time limit in seconds of tracing.
     pub seconds: f64,
-    /// `true` if the estimated error is compared with the target: the true error of biased settings
-    /// does not converge to 0.
+    /// `true` to compare the estimated error with the target, `false` to compare the true error.
+    /// The true error of biased settings does not converge to 0.
     pub use_estimate: bool,
 }
 
-/// Share to which the estimated error falls from one point to the next, about 2^(-1/4): four points
-/// while the error halves.
+/// Ratio of the estimated errors of consecutive points: about 2^(-1/4), so that a curve has four
+/// points for each halving of the error.
 const POINT_RATIO: f64 = 0.84;
 
 /// Renders with the settings of `variant` until `end`, or until further samples cannot change the
@@ -81,7 +81,7 @@ pub fn follow(
     Ok((points, render))
 }
 
-/// Renders with the settings of `variant` again, and adds the seconds to each point of its error
+/// Repeats the render of `variant`, and appends its seconds of tracing to each point of the error
 /// curve.
 pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<()> {
     let mut render = variant.start()?;

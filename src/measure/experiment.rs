@@ -19,7 +19,7 @@ pub struct Experiment {
     pub title: &'static str,
     /// `true` if the pictures of all variants differ in noise only.
     pub is_unbiased: bool,
-    /// Returns the variants of a render with default settings that differ from it.
+    /// Returns the variants of a render with default settings, except those that would equal it.
     vary: Vary,
 }
 
@@ -97,8 +97,8 @@ fn other_accelerations(base: &Variant) -> Vec<Variant> {
     others.map(|kind| base.with_scene(kind.name(), |s| s.trace.acceleration = kind)).collect()
 }
 
-/// Returns the variants with the cone lobe of glossy reflection in place of the square lobe, its
-/// cheap approximation, and the reverse.
+/// Returns a variant whose cone lobes are replaced by square lobes, their cheap approximation, and
+/// a variant with the reverse. Each exists only if the scene has glossy lobes to replace.
 fn other_lobes(base: &Variant) -> Vec<Variant> {
     let exchanges = [
         (Lobe::Cone, Lobe::Square, "square for cone"),
@@ -139,7 +139,8 @@ fn caps(base: &Variant) -> Vec<Variant> {
     if_reflecting(base, variants)
 }
 
-/// Collects `variants` of a setting that has an effect on reflections only.
+/// Collects `variants` of a setting that affects reflections only. Returns none if the scene has no
+/// reflections.
 fn if_reflecting(base: &Variant, variants: impl Iterator<Item = Variant>) -> Vec<Variant> {
     let Scene { trace, objects, materials, .. } = &*base.scene;
     let mut names = objects.iter().flat_map(|object| object.materials());
@@ -149,7 +150,7 @@ fn if_reflecting(base: &Variant, variants: impl Iterator<Item = Variant>) -> Vec
     if reflects { variants.collect() } else { Vec::new() }
 }
 
-/// One render of an experiment.
+/// Settings of one render of an experiment.
 #[derive(Clone)]
 pub struct Variant {
     pub experiment: &'static Experiment,
@@ -162,21 +163,22 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Creates a render of this variant, which ends by itself only when every tile is full. Returns
-    /// the error of the system if a thread cannot be started.
+    /// Creates a render of this variant without a target: it ends by itself only when every tile
+    /// has its largest number of samples. Returns the error of the system if a thread cannot be
+    /// started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
 
-    /// Creates the variant `name`, which `change` changes.
+    /// Returns a copy with the name `name` to which `change` is applied.
     fn with(&self, name: impl Into<String>, change: impl FnOnce(&mut Self)) -> Self {
         let mut variant = Self { name: name.into(), ..self.clone() };
         change(&mut variant);
         variant
     }
 
-    /// Creates the variant `name`, whose scene `change` changes.
+    /// Returns a copy with the name `name` to whose scene `change` is applied.
     fn with_scene(&self, name: impl Into<String>, change: impl FnOnce(&mut Scene)) -> Self {
         self.with(name, |variant| change(Arc::make_mut(&mut variant.scene)))
     }
@@ -198,8 +200,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Returns the default settings, then the changed settings of each experiment that differ from
-    /// the default in this scene.
+    /// Returns the variant with default settings, then the variants of each experiment that differ
+    /// from it in this scene.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let sampling = SampleSettings { seed: self.seed, kind: SamplerKind::Sobol };
         let base = Variant {

@@ -75,15 +75,15 @@ fn points(measured: &Measured) -> Vec<(f64, f64)> {
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// Returns the range of an axis that shows `values`.
+/// Returns the range of an axis that shows `values`; 0.1..10 without values.
 fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, 0f64), |(l, h), v| (l.min(v), h.max(v)));
     if low.is_finite() { low / MARGIN..high * MARGIN } else { 0.1..10.0 }
 }
 
 /// Returns the tick marks of a logarithmic axis: 1, 2 and 5 times each power of ten, or only the
-/// powers of ten if there are more than nine of these. The axes of `plotters` have none between two
-/// powers of ten.
+/// powers of ten if there are more than nine of these. `plotters` by itself marks only powers of
+/// ten.
 fn ticks(range: &Range<f64>) -> Vec<f64> {
     let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
     let multiples = |steps: &[f64]| -> Vec<f64> {

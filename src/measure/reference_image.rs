@@ -10,15 +10,18 @@ pub struct Reference {
     pub seconds: f64,
     /// Pixels in linear radiance, `[row][column]`.
     pixels: Vec<[f64; 3]>,
+    /// Pixels as displayed, in unrounded 8-bit levels.
     levels: Vec<[f64; 3]>,
     /// Half the difference between the replicates in each pixel, in 8-bit levels. Empty if the
     /// reference counts as exact.
     halves: Vec<[f64; 3]>,
+    /// Errors of the reference itself; 0 if it counts as exact.
     own: Squares,
     display: Display,
 }
 
-/// Mean squared errors over pixels and channels, and the variance of their mean.
+/// Mean squared errors over pixels and channels, in linear radiance and in 8-bit levels. `mean` is
+/// the variance of the mean linear radiance of all pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
@@ -33,18 +36,18 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative uncertainty of `rmse_levels`, 0..=1: its standard deviation over references as
-    /// noisy as this one.
+    /// Relative uncertainty of `rmse_levels`, 0..=1: its relative standard deviation over other
+    /// references with equal noise.
     pub spread: f64,
 }
 
 /// Difference between the expectation of a picture and that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
-    /// Difference between the mean brightnesses, divided by its standard error.
+    /// Difference between the mean radiances of the two pictures, divided by its standard error.
     pub z: f64,
-    /// Root mean square of the differences between the pixels, less that of the noise of both
-    /// pictures, in 8-bit levels.
+    /// RMS difference between the pixels in 8-bit levels, without the noise of both pictures, whose
+    /// mean squares are subtracted from the mean squared difference.
     pub levels: f64,
     /// Smallest significant value of [`Self::levels`]: its square is two standard errors of the
     /// mean squared difference.
@@ -52,16 +55,16 @@ pub struct Bias {
 }
 
 impl Bias {
-    /// Returns `true` if the pictures differ by more than noise can explain: by the mean brightness
-    /// by more than four standard errors, or in the pixels by more than [`Self::least_levels`].
+    /// Returns `true` if the pictures differ by more than noise can explain: in mean radiance by
+    /// more than four standard errors, or in the pixels by more than [`Self::least_levels`].
     pub fn is_seen(&self) -> bool {
         self.levels > self.least_levels || self.z.abs() > 4.0
     }
 }
 
-/// Returns the errors of the mean of two independent pictures. The linear error of a pixel is half
-/// their difference. Its squared error in levels is the mean of the squared distances from the
-/// displayed mean to the two displayed pictures.
+/// Estimates the errors of the mean of two independent pictures. The linear error of a pixel is
+/// half the difference between the pictures. Its squared error in levels is the mean of the squared
+/// distances from the displayed mean to the two displayed pictures.
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> Squares {
     let mut squares = Squares::default();
     for (a, b) in a.iter().zip(b) {
@@ -125,8 +128,8 @@ impl Reference {
         self.own.linear.sqrt()
     }
 
-    /// Returns the errors of `film`: its mean squared differences, less the mean squared error of
-    /// the reference.
+    /// Returns the errors of `film`: the roots of its mean squared differences from the reference,
+    /// less the mean squared error of the reference itself.
     pub fn errors(&self, film: &Film, weights: &LightWeights) -> Errors {
         self.errors_of(&pixels(film, Replicates::Both, weights))
     }

@@ -48,7 +48,7 @@ pub struct Measured {
     pub threads: usize,
     /// Error curve, in ascending order of sample count.
     pub points: Vec<Point>,
-    /// Bias at the end of the error curve, for settings that change the expectation of the picture.
+    /// Bias at the end of the error curve. `None` for experiments that are unbiased.
     pub bias: Option<Bias>,
 }
 
@@ -62,7 +62,7 @@ pub struct Measurement {
     /// Error of the reference itself, in linear radiance.
     pub reference_linear: f64,
     pub reference_seconds: f64,
-    /// Noise at which settings are compared, in 8-bit levels, which the default settings reached.
+    /// Noise at which all settings are compared, in 8-bit levels. The default settings reached it.
     pub compared_at: f64,
     /// Noise targets in 8-bit levels, in descending order.
     pub targets: Vec<f64>,
@@ -83,16 +83,16 @@ pub struct Steadiness {
     pub spread: f64,
 }
 
-/// Largest relative uncertainty of a measured error by the error of the reference. Points with a
-/// larger one are ignored.
+/// Largest relative uncertainty that the error of the reference may cause in a measured error.
+/// Points with a larger uncertainty are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Half-width of the confidence interval of a median by the sign test, in standard deviations of the
-/// rank, which are sqrt(n) / 2: 1.4 covers 84 %, and sqrt 2 widens it to the difference of two
-/// medians.
+/// Half-width of the confidence interval of a median by the sign test, in standard deviations of
+/// the rank. One standard deviation is sqrt(n) / 2 ranks. The factor 1.4 covers 84 %; sqrt 2 widens
+/// the interval to that of the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
-/// Returns the median of `values`, NaN without any.
+/// Returns the median of `values`, or NaN if there are none.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -109,7 +109,7 @@ pub fn median(values: &[f64]) -> f64 {
 /// It is half the width of the confidence interval of the median by the sign test (Conover,
 /// *Practical Nonparametric Statistics*), widened by sqrt 2 for the comparison of two medians, and
 /// divided by the median. For fewer than five values it is their range divided by the median; for
-/// fewer than two it is 0.
+/// fewer than two, or if the median is 0, it is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -124,9 +124,8 @@ pub fn spread(values: &[f64]) -> f64 {
 }
 
 impl Measured {
-    /// Returns the time at which the true error fell to `levels` 8-bit levels, interpolated in
-    /// log-log coordinates. Returns `None` if it stayed larger. Points with an uncertain error are
-    /// ignored.
+    /// Returns the time at which the true error fell to `levels` 8-bit levels. Returns `None` if it
+    /// stayed larger. Points with an uncertain error are ignored.
     pub fn time_to(&self, levels: f64) -> Option<TimeToTarget> {
         self.interpolated_time(levels, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
@@ -145,6 +144,7 @@ impl Measured {
         }
     }
 
+    /// Returns the time at which `error` fell to `levels`, interpolated in log-log coordinates.
     fn interpolated_time(
         &self,
         levels: f64,
@@ -180,8 +180,9 @@ impl Measured {
         Some(Median { value: median(&speeds), spread: spread(&speeds) })
     }
 
-    /// Returns the order of convergence of the linear RMSE. The first quarter of the points has too
-    /// few samples for a power law. Returns `None` if too few points remain.
+    /// Returns the order of convergence of the linear RMSE. The first quarter of the points is left
+    /// out, because it has too few samples for a power law. Returns `None` if too few points
+    /// remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =

@@ -23,7 +23,7 @@ const WARM_UP_SECONDS: f64 = 0.3;
 const REFERENCE_SHARE: f64 = 0.3;
 /// Largest duration of the reference, as a share of the whole measurement.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest duration of the first render, as a share of the whole measurement.
+/// Largest duration of the first render with default settings, as a share of the whole measurement.
 const DEFAULT_TIME: f64 = 0.12;
 /// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
@@ -32,8 +32,8 @@ const COMPARED_AT: f64 = 0.5;
 const MAX_SLOWDOWN: f64 = 5.0;
 /// Largest relative spread of steady times.
 const STEADY: f64 = 0.05;
-/// Largest number of rounds with steady times, unless the plan requests more. A round repeats the
-/// render of each variant once.
+/// Number of rounds after which steady times are not measured again, unless the plan requests more.
+/// A round repeats the render of each variant once.
 const MAX_STEADY_ROUNDS: usize = 7;
 /// Largest number of rounds, unless the plan requests more.
 const MAX_ROUNDS: usize = 31;
@@ -175,10 +175,10 @@ fn extrapolate(render: &SyncRender, levels: f64) -> Option<Expected> {
     Some(Expected { levels, seconds_low: seconds + low, seconds_high: seconds + high })
 }
 
-/// Returns the noise in 8-bit levels at which settings are compared: the smallest level that the
-/// default settings reached within `seconds`, or else the largest that they reached, or else their
-/// final error. Levels are the powers of two from 0.5 to 8, and the targets from [`COMPARED_AT`]
-/// on.
+/// Returns the noise in 8-bit levels at which settings are compared: the smallest candidate that
+/// the default settings reached within `seconds`, or else the largest that they reached, or else
+/// their final error. Candidates are the powers of two from 0.5 to 8, and the targets that are at
+/// least [`COMPARED_AT`].
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|level| *level >= COMPARED_AT);
@@ -190,8 +190,8 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     in_time.or_else(any).map_or_else(end, |c| c.levels)
 }
 
-/// Returns `true` if the times to the noise `levels`, or else to the end of the curve, have a
-/// relative spread of at most [`STEADY`].
+/// Returns `true` if the times to the noise `levels`, or to the end of a curve that does not reach
+/// it, have a relative spread of at most [`STEADY`].
 fn is_steady(measured: &Measured, levels: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&p.seconds));
     measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY

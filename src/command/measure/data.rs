@@ -50,7 +50,8 @@ fn variation(measured: &Measured, targets: &[f64]) -> Value {
         "samples_per_second_spread": speed.map(|s| s.spread),
         "slope": slope.map(|s| s.value),
         "slope_standard_error": slope.map(|s| s.standard_error),
-        // Null without noise: the z-score is infinite, which JSON cannot represent.
+        // Null for unbiased settings. Also null if both pictures are without noise: the z-score is
+        // then infinite, which JSON cannot represent.
         "bias_z": measured.bias.map(|b| b.z),
         "bias_levels": measured.bias.map(|b| b.levels),
         // Smallest bias that can be distinguished from noise.
@@ -74,7 +75,7 @@ pub fn json(report: &MeasureReport) -> String {
         "reference_linear": m.reference_linear,
         "reference_seconds": m.reference_seconds,
         "compared_at_levels": m.compared_at,
-        // Largest relative uncertainty of a measured error by the noise of the reference.
+        // Largest relative uncertainty that the noise of the reference causes in a measured error.
         "errors_spread": m.reference_uncertainty(),
         // Largest relative spread of a time over the repetitions of its render.
         "times_spread": m.steadiness().spread,

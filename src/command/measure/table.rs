@@ -30,7 +30,7 @@ impl MeasureReport<'_> {
     }
 }
 
-/// Formats seconds with three significant digits, such as `1.23 s` or `35.1 ms`.
+/// Formats a duration, such as `35.1 ms`, `1.23 s` or `2.5 min`.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 0.9995 => format!("{} ms", number(1e3 * s)),
@@ -123,6 +123,7 @@ impl MeasureReport<'_> {
         Ok(())
     }
 
+    /// Writes the times in which the default settings reached each noise target.
     fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
         let m = self.measurement;
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
@@ -172,6 +173,7 @@ impl MeasureReport<'_> {
         )
     }
 
+    /// Writes the line of one variant in the table of its experiment.
     fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
         let levels = self.measurement.compared_at;
         let default = self.measurement.measured[0].time_to(levels);
