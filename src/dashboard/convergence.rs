@@ -5,9 +5,9 @@ use zerkalo_render::session::Report;
 /// Point of the convergence plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Time spent on tracing rays.
+    /// Seconds of tracing.
     pub seconds: f64,
-    /// Estimated RMSE of the displayed picture, greater than 0.
+    /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
     pub noise_levels: f64,
 }
 
@@ -26,7 +26,7 @@ const MOST: usize = 400;
 impl Convergence {
     /// Returns the render time in seconds at which the noise last fell to `levels` 8-bit levels,
     /// interpolated between two reports by a power law. Returns `None` if the latest noise is above
-    /// `levels`, or no stored noise is.
+    /// `levels`, or if all stored noise is at or below it.
     pub fn seconds_at(&self, levels: f64) -> Option<f64> {
         // Only the last fall to `levels` counts, because switching on a light raises the noise
         // again.

@@ -23,7 +23,8 @@ impl Editor {
         self.input.value()
     }
 
-    /// Applies a key. Returns `false` if it does not edit, as Enter, Esc, Tab, Up and Down.
+    /// Applies a key. Returns `true` if the editor uses it, `false` for Enter, Esc, Tab, Up, Down
+    /// and other keys that it does not use.
     pub fn key(&mut self, key: Key) -> bool {
         let request = match (key.code, key.ctrl, key.alt) {
             (Code::Char(c), false, false) => return self.insert(c),

@@ -3,8 +3,8 @@
 use crate::dashboard::update::commands::{COMMANDS, Hint, HintLine};
 use crate::dashboard::{KeyContext, Model, Overlay};
 
-/// Returns the state that selects the hints. Returns `None` under an exported image, which leaves
-/// no room for a hint line.
+/// Returns the state that selects the hints. Returns `None` while an exported image covers the hint
+/// line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Pick(_) | Overlay::NoiseTargets(_) | Overlay::Question(_)) => HintLine::List,

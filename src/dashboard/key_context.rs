@@ -41,8 +41,8 @@ impl KeyContext {
         }
     }
 
-    /// Returns the contexts in which a key is looked up in this one. The first with a command for
-    /// the key determines the command.
+    /// Returns this context and the contexts in which a key is looked up next. The first one with a
+    /// command for the key determines the command.
     pub fn chain(self) -> impl Iterator<Item = Self> {
         successors(Some(self), |context| match context {
             Self::Anywhere | Self::Overlay => None,

@@ -25,7 +25,7 @@ pub enum Message {
     Snapshot(Box<Snapshot>),
     /// State of the files that `zerkalo watch` shows.
     Watched(Box<WatchReport>),
-    /// Result of [`Effect::Pin`], with its mean number of samples per pixel.
+    /// Result of [`Effect::Pin`]: the picture and its mean number of samples per pixel.
     Pinned(Arc<LinearImage>, f64),
     /// Result of [`Effect::Save`]: the path of the written file, or the error.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
@@ -56,7 +56,7 @@ pub struct OrphanedEdits {
     pub scene: Arc<Scene>,
     /// Age of the recovery file when the recovery is offered.
     pub age: Duration,
-    /// `true` if the scene file has changed since.
+    /// `true` if the scene file has changed since the edits were autosaved.
     pub changed: bool,
 }
 
@@ -127,8 +127,8 @@ impl DisplayChannel {
     }
 }
 
-/// Request from `update` to the event loop. If several effects of one kind are pending, only the
-/// last one is executed, except for saves and exports.
+/// Request from `update` to the event loop. If one update requests several effects of one kind,
+/// only the last one is executed, except for saves and exports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// Render this scene. Samples are kept if only lighting has changed.

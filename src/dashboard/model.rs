@@ -38,7 +38,7 @@ pub struct File {
     pub path: Option<PathBuf>,
     /// Last component of the path, with control characters escaped.
     pub name: String,
-    /// Scene as last read or written; without a file, that of the start.
+    /// Scene as last read or written; without a file, the scene at the start.
     pub saved: Arc<Scene>,
     /// Errors in the current contents of the file.
     pub broken: Option<SceneErrors>,
@@ -183,7 +183,7 @@ pub struct Model {
     pub quit_when_saved: bool,
     /// Unsaved edits of a crashed run, until they are recovered or discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
-    /// Scene that was last autosaved; `None` if there were no unsaved edits.
+    /// Scene of the last autosave; `None` if there were no unsaved edits at that time.
     pub autosaved: Option<Arc<Scene>>,
     /// Size of the pictures that were last requested, in half cells.
     pub raster: Option<[usize; 2]>,
@@ -288,7 +288,7 @@ impl Model {
     }
 
     /// Returns the time at which the model needs the next
-    /// [`Tick`](crate::dashboard::message::Message::Tick).
+    /// [`Tick`](crate::dashboard::message::Message::Tick); `None` if it needs none.
     pub fn next_timeout(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }

@@ -18,8 +18,8 @@ pub const LOOKS: [&str; QUALITIES.len()] = [
 /// Note below the list.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// Describes the render time that is needed to reach the noise target `QUALITIES[at]`, such as
-/// `3–5 s more`. The time of a target that the first report had reached is unknown.
+/// Describes the render time that is needed to reach the noise target `QUALITIES[at]`, such as `3–5
+/// s more`. The text has no time for a target that the first report had already reached.
 pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> String {
     let Some(report) = report else { return "not known yet".to_string() };
     if report.noise.is_some_and(|noise| noise.rmse_levels <= QUALITIES[at]) {

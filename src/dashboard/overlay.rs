@@ -49,7 +49,7 @@ pub struct Pick {
     pub entries: Vec<PickEntry>,
     /// Editor of the search text.
     pub editor: Editor,
-    /// Indices in `entries` of those that match the search text, best match first.
+    /// Indices of the `entries` that match the search text, best match first.
     pub found: Vec<usize>,
     /// Cursor in `found`.
     pub at: ListCursor,
@@ -72,7 +72,8 @@ impl From<Word> for PickEntry {
     }
 }
 
-/// Form for a new object or light, which the picture previews, confirmed or cancelled as a whole.
+/// Form for a new object or light, which the picture previews. The user confirms or cancels the
+/// form as a whole.
 #[derive(Clone, Debug)]
 pub struct Form {
     /// Title, such as `new sphere`.

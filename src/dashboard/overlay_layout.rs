@@ -6,7 +6,7 @@ use crate::dashboard::{BORDER, Form, Layout, Model, Overlay};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
-/// Areas of an overlay. Those that it does not use are empty.
+/// Areas of an overlay. Unused areas are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayLayout {
     /// Whole overlay with its border.
@@ -20,7 +20,7 @@ pub struct OverlayLayout {
 }
 
 impl Model {
-    /// Returns the layout of the open overlay.
+    /// Returns the layout of the open overlay; `None` without one, or if the terminal is too small.
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
@@ -88,8 +88,8 @@ impl Model {
         self.layout()?.outline.map(|area| area.inner(BORDER))
     }
 
-    /// Returns the areas of the rows of watched files and of details on the row under the cursor.
-    /// Returns `None` if the panel is hidden.
+    /// Returns the area of the rows of watched files, and the area of details on the row under the
+    /// cursor. Returns `None` if the panel is hidden.
     pub fn watch_rows(&self) -> Option<(Rect, Rect)> {
         let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
@@ -98,8 +98,8 @@ impl Model {
         Some(divided(below, below.height.saturating_sub(details)))
     }
 
-    /// Returns the areas of the inspector's lines and of help on the field under the cursor.
-    /// Returns `None` if the inspector is hidden.
+    /// Returns the area of the inspector's lines, and the area of help on the field under the
+    /// cursor. Returns `None` if the inspector is hidden.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
         let problem = self.inspector.problem().is_some();
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))

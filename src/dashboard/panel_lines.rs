@@ -16,8 +16,8 @@ pub struct ListCursor {
 }
 
 impl ListCursor {
-    /// Moves the cursor by `steps` within `len` entries, of which `rows` are visible, the one under
-    /// the cursor among them.
+    /// Moves the cursor by `steps` in a list of `len` entries, and scrolls so that the entry under
+    /// the cursor is among the `rows` visible ones.
     pub fn walk(&mut self, steps: isize, len: usize, rows: usize) {
         self.index = self.index.saturating_add_signed(steps).min(len.saturating_sub(1));
         self.scroll = scrolled(self.scroll, self.index, len, rows);
@@ -69,7 +69,7 @@ pub struct FieldLine {
     /// Value in the syntax of the text editor, with control characters escaped. Empty if the
     /// property is not set.
     pub value: String,
-    /// Linear colour of the swatch beside the value, on the first of a colour's three lines.
+    /// Linear colour of the swatch beside the value; `None` except on the first line of a colour.
     pub swatch: Option<[f64; 3]>,
 }
 
@@ -138,7 +138,8 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// Returns the lines of `property` of `subject`: one for each number of a list, otherwise one.
+/// Returns the lines of `property` of `subject`: one for each number if the value is a list of
+/// numbers, otherwise a single one.
 fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: &str| FieldLine {
         subject: subject.clone(),
@@ -173,8 +174,8 @@ impl Model {
     }
 }
 
-/// Returns the index of the first line with a property from `wanted` on, else of the last one
-/// before. Returns 0 if there is none.
+/// Returns the index of the first line from `wanted` on that has a property, otherwise of the last
+/// such line before it. Returns 0 if no line has a property.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].entry().is_some();
     (wanted..lines.len())
@@ -193,9 +194,9 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// Returns the index of the first visible line of `len`, of which `rows` are visible: the nearest
-/// to the present one, `scroll`, at which the line `cursor` is visible, and also the line above it
-/// if `rows` is greater than 2.
+/// Returns the index of the first visible line in a list of `len` lines, of which `rows` are
+/// visible. It is the index closest to the present one, `scroll`, at which the line `cursor` is
+/// visible, and also the line above it if `rows` is greater than 2.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

@@ -75,8 +75,8 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
-    /// Executes `effect`. Its results arrive as messages. Returns the generation of the picture that
-    /// it makes the renderer start.
+    /// Executes `effect`. Its results arrive as messages. Returns the generation of the new picture
+    /// if the effect makes the renderer start one.
     pub fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Option<u64> {
         match effect {
             Effect::Show(scene) => return Some(self.session.set_scene(scene)),
@@ -150,7 +150,7 @@ impl EffectRunner {
         });
     }
 
-    /// Returns a sender that an export drops at its end.
+    /// Returns a sender that the beginning export must drop at its end.
     fn begin_export(&mut self) -> Sender<()> {
         let (running, ended) = bounded(0);
         self.exporting = Some(ended);
@@ -189,8 +189,8 @@ impl EffectRunner {
     }
 
     /// Completes pending writes and ends the threads. Waits until `deadline` for the session and
-    /// for pictures that are being written, or without limit if it is `None`. Returns the path of
-    /// the recovery file, or `None` if there are no unsaved edits.
+    /// for pictures that are being written, or without limit if `deadline` is `None`. Returns the
+    /// path of the recovery file, or `None` if there are no unsaved edits.
     ///
     /// # Errors
     /// Fails with the reason if unsaved edits are lost.
@@ -204,8 +204,8 @@ impl EffectRunner {
             if let Some(resized) = resized {
                 resized.end();
             }
-            // The session runs exports in the order of their requests. If its thread panics, it
-            // drops the sender as at the end of an export.
+            // The session runs exports in the order of their requests, so that waiting for the last
+            // one suffices. A panic of its thread drops the sender, too.
             if let Some(last) = exporting {
                 let _ = last.recv();
             }

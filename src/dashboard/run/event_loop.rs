@@ -145,8 +145,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal, which the shell would read as input
-    /// otherwise.
+    /// Waits for outstanding replies of the terminal. Without the wait, the shell would read them
+    /// as input.
     pub fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -158,8 +158,8 @@ impl Dashboard {
         }
     }
 
-    /// Updates the model and executes the effects. Returns the generation of the picture that the
-    /// response to the message needs, if it needs a new one.
+    /// Updates the model and executes the effects. Returns the generation of the picture that
+    /// responds to the message; `None` if it needs no new picture.
     pub fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
@@ -169,8 +169,8 @@ impl Dashboard {
             self.quit |= effect == Effect::Quit;
             let is_edit = matches!(effect, Effect::Show(_));
             if let Some(generation) = self.effects.run(effect, &mut self.frames) {
-                // A change of lights alone needs none: the snapshot has one picture per light
-                // group.
+                // A change of lights alone needs no new picture: the snapshot has one picture per
+                // light group.
                 let snapshot = self.model.snapshot.as_deref();
                 let mix = snapshot.and_then(|s| s.mix_for(self.model.scene()));
                 if !is_edit || mix.is_none() {
@@ -273,7 +273,7 @@ impl Dashboard {
         }
     }
 
-    /// Pauses rendering on the user's request and while the terminal does not reply. Returns the
+    /// Pauses rendering while the user requests a pause or the terminal does not reply. Returns the
     /// time at which the terminal will count as silent unless a reply arrives before.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.flow.silent_at(self.frames.writing_since);

@@ -55,7 +55,7 @@ pub enum DrawOutcome {
     Deferred,
     /// No visible differences remain.
     Same,
-    /// A part of a viewed image was sent; the model was not drawn.
+    /// A part of a viewed image was sent instead of a frame.
     Slice,
     /// A frame without picture cells was sent.
     Text,
@@ -95,7 +95,8 @@ impl FramePipeline {
         self.give_up();
     }
 
-    /// Sends the image that the viewer of `model` shows, and stops sending any other.
+    /// Begins the upload of the image that the viewer of `model` shows, and gives up that of any
+    /// other.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -148,8 +149,8 @@ impl FramePipeline {
         self.writing_since = Some(now);
     }
 
-    /// Gives up overdue acknowledgements, and reads the length of the kernel's send queue if it is
-    /// time.
+    /// Gives up overdue acknowledgements, and reads the length of the kernel's send queue if a
+    /// reading is due.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
@@ -157,9 +158,9 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` until the
-    /// next event. `changed` is `true` if the model has changed since the last frame, and `answers`
-    /// if the frame would respond to user input.
+    /// Returns the time at which [`FramePipeline::draw`] must be called next; `None` until the next
+    /// event. `changed` is `true` if the model has changed since the last frame, `answers` is
+    /// `true` if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let pending = self.diff.pending;
         let text = changed || pending.text || !self.removal.is_empty();

@@ -19,11 +19,12 @@ pub const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
-/// Longest delay of changes of the terminal's size, from the first of several on.
+/// Longest time from the first of successive changes of the terminal's size until the last takes
+/// effect.
 const LONGEST: Duration = Duration::from_millis(400);
 /// Longest wait for the write of the recovery file before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait until a stop signal has stopped the process. Otherwise the program resumes.
+/// Longest wait for a stop signal to stop the process. After it, the program resumes.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Terminal, and the receivers of its events.
@@ -66,13 +67,13 @@ pub fn handle_signals(
     })
 }
 
-/// Stops this process by SIGTTIN, because SIGTSTP has a handler. It may still run for a moment. The
-/// kernel ignores SIGTTIN in orphaned process groups, which no shell could continue.
+/// Stops this process by SIGTTIN, because SIGTSTP has a handler. The process may still run for a
+/// moment. The kernel ignores SIGTTIN in orphaned process groups, which no shell could continue.
 pub fn stop_process() -> rustix::io::Result<()> {
     kill_process(getpid(), Signal::TTIN)
 }
 
-/// Stops the group of this process as [`stop_process`] does, and as Ctrl-Z in a shell.
+/// Stops the whole process group by the signal of [`stop_process`], as Ctrl-Z stops a group.
 pub fn stop_group() -> rustix::io::Result<()> {
     kill_current_process_group(Signal::TTIN)
 }

@@ -14,8 +14,8 @@ struct Awaiting {
     scene: u64,
 }
 
-/// Recorder of input latencies. It always knows the events that await a response, because the event
-/// loop sends such a frame at once; it stores latencies only on request.
+/// Recorder of input latencies. It always has the events that await a response, because the event
+/// loop sends a frame that responds at once. It stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,

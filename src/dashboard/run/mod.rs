@@ -68,7 +68,8 @@ pub struct Ended {
     pub signalled: Option<u8>,
     /// Exports that ended after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Path of the recovery file with unsaved edits, or the reason why unsaved edits are lost.
+    /// Path of the recovery file with unsaved edits, or the reason why they are lost. `None`
+    /// without unsaved edits.
     pub kept: Result<Option<PathBuf>, String>,
 }
 
@@ -101,7 +102,7 @@ pub fn watch(films: FilmFiles, threads: usize, terminal: TerminalSetup) -> io::R
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default());
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;
-    // The first frame shows the table of films.
+    // The table of films must be complete in the first frame.
     if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
         let _ = results.send(report);
     }

@@ -23,7 +23,7 @@ impl Worker {
     }
 
     /// Waits for the end of the thread, at most for `patience`, without limit for `Duration::MAX`.
-    /// Returns `true` if it has ended.
+    /// Returns `true` if it has ended, and propagates its panic.
     pub fn join_within(self, patience: Duration) -> bool {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
             return false;

@@ -104,7 +104,8 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Describes the adjustable values of a light, a material or the lens for a notice.
+/// Describes the adjustable values of a light, a material or the lens for a notice. Returns `None`
+/// for other parts of the scene.
 fn values(scene: &Scene, subject: &Target) -> Option<String> {
     let color = |color: [f64; 3]| format!("color {}", color.map(number).join(" "));
     let state = match subject {

@@ -15,14 +15,15 @@ const LOOK_DEGREES: f64 = 3.0;
 /// Length of one step of panning, as a fraction of the distance between the eye and the pivot, the
 /// point that the camera orbits.
 const PAN_SHARE: f64 = 0.05;
-/// Factor of the distance between eye and pivot for one step.
+/// Factor by which one step of dollying in multiplies the distance between eye and pivot.
 const DOLLY: f64 = 0.9;
-/// Factor of the width of the view for one step of zooming in.
+/// Factor by which one step of zooming in multiplies the width of the view.
 const ZOOM: f64 = 0.95;
 
 impl UpdateContext<'_> {
     /// Replaces the camera by the result of `f` for the camera and its distance from the pivot. All
-    /// camera moves have the same label, so that moves of different kinds can join.
+    /// camera moves have the same label, so that moves of different kinds can join into one undo
+    /// step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));
@@ -92,7 +93,7 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Single, |_, _| camera.clone());
     }
 
-    /// Goes to the stored camera of the digit that was typed, from 1 on.
+    /// Goes to the stored camera whose number, counted from 1, was typed.
     pub(super) fn recall_view(&mut self) {
         let Some(number) = self.typed.and_then(|c| c.to_digit(10)) else {
             self.say("Keys 1 to 9 go to viewpoints · n stores one");
@@ -141,8 +142,8 @@ impl UpdateContext<'_> {
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Returns the amount for a drag by one half cell, if `across` is that for the width of the
-    /// picture. Returns 0 if there is no room for a picture.
+    /// Returns the amount for a drag by one half cell if a drag across the whole picture has the
+    /// amount `across`. Returns 0 if there is no room for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

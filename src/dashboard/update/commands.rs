@@ -43,8 +43,8 @@ pub struct Command {
     pub keys: &'static [(KeyContext, &'static str)],
     /// Hints, which may also describe related commands.
     pub hints: &'static [Hint],
-    /// `true` if the command itself handles a value that is being typed, as those of Enter and Esc.
-    /// Otherwise the value is applied first.
+    /// `true` if the command itself handles a value that is being typed, as the commands of Enter
+    /// and Esc do. `false` if the value is applied before the command runs.
     pub(super) while_typing: bool,
     /// `true` if the command also runs in the viewer of exported images, which other keys close.
     pub(super) over_image: bool,
@@ -95,7 +95,7 @@ fn not_watching(model: &Model) -> bool {
     model.watch.is_none()
 }
 
-/// Returns `true` if there is a picture, or a list or question, which need none.
+/// Returns `true` if there is a picture, or if a list or question is open, which need no picture.
 fn viewing_or_choosing(model: &Model) -> bool {
     viewing(model) || matches!(model.overlay, Some(Overlay::Pick(_) | Overlay::Question(_)))
 }
@@ -282,8 +282,8 @@ impl Command {
         Self { over_image: true, ..self }
     }
 
-    /// Returns `true` if the command palette lists the command: if it can run in `zerkalo watch`, or
-    /// this is another dashboard.
+    /// Returns `true` if the command palette lists the command. In `zerkalo watch`, it lists only
+    /// commands that can run.
     pub fn is_listed(&self, model: &Model) -> bool {
         model.watch.is_none() || (self.available)(model)
     }
@@ -304,7 +304,7 @@ impl Command {
     }
 
     /// Formats the keys, grouped by context. `place` returns the text after the keys of a context,
-    /// or `None` to leave it out.
+    /// or `None` to leave the context out.
     fn formatted_keys(
         &self,
         key: impl Fn(&str) -> String,

@@ -74,7 +74,7 @@ impl UpdateContext<'_> {
         self.shift_probe(direction, [1; 2]);
     }
 
-    /// Moves the pixel probe by `step` pixels, 0 counting as 1, or begins to probe.
+    /// Moves the pixel probe by `step` pixels, at least by 1. If there is no probe yet, places one.
     fn shift_probe(&mut self, [right, up, _]: Direction, step: [usize; 2]) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
@@ -91,8 +91,8 @@ impl UpdateContext<'_> {
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Shows the pinned picture or its difference to the live one, or the live picture if `what` is
-    /// shown already.
+    /// Shows `what`, the pinned picture or its difference from the live one. If `what` is shown
+    /// already, shows the live picture.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

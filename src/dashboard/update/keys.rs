@@ -85,7 +85,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Inserts pasted text into the open text editor. As keys it would run commands.
+    /// Inserts pasted text into the open text editor. Pasted characters never run commands.
     pub(super) fn paste(&mut self, text: &str) {
         self.follow = true;
         self.model.first_time = false;

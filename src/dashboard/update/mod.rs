@@ -135,7 +135,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Adds an effect. It replaces an earlier one of the same kind, except for saves and exports.
+    /// Adds an effect. It replaces an effect of the same kind that this update has added before,
+    /// except for saves and exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));

@@ -18,7 +18,8 @@ fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
 
-/// Returns the index of the line under the mouse in a list that `scroll` lines are scrolled off.
+/// Returns the index of the line under the mouse in the list at `rows`, whose first visible line is
+/// `scroll`. Returns `None` outside of `rows`.
 pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
     is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }
@@ -35,6 +36,7 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Gives the focus to the panel under the mouse. Begins a drag, or selects or opens a line.
     fn press(&mut self, button: Button, mouse: Mouse) {
         self.model.drag = None;
         if self.model.file.unreadable {
@@ -122,6 +124,7 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Moves what the mode moves by the distance from the last position of the mouse.
     fn dragged(&mut self, mouse: Mouse) {
         let Some(drag) = &mut self.model.drag else { return };
         let [column, row] = drag.last;
@@ -163,6 +166,7 @@ impl UpdateContext<'_> {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
 
+    /// Probes, focuses the lens on, or selects what is visible under the mouse.
     fn click(&mut self, drag: Drag, mouse: Mouse) {
         if self.model.mode == Mode::Probe && drag.button == Button::Left && !drag.modified {
             self.probe_at(mouse);
@@ -194,6 +198,7 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Scrolls the list under the mouse, steps the field there, or dollies the camera.
     fn scrolled(&mut self, ticks: i32, mouse: Mouse) {
         let ticks = ticks.clamp(-100, 100);
         let lines = -(ticks * WHEEL_LINES) as isize;

@@ -5,9 +5,9 @@ use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
-/// Largest factor by which a drag multiplies the movement in depth. A drag is divided by the sine
-/// of the angle between view direction and ground, by which depth appears shortened. This is
-/// unbounded at grazing angles, and 4 at 14.5 degrees.
+/// Largest factor by which a drag in the ground plane is stretched in depth. The sine of the angle
+/// between view direction and ground is the factor by which depth appears shortened. The stretch is
+/// its inverse: 4 at 14.5 degrees, and unbounded at grazing angles.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane, positive or negative, nearest to `v`.
@@ -16,8 +16,8 @@ fn nearest_axis(v: DVec3) -> DVec3 {
 }
 
 impl UpdateContext<'_> {
-    /// Returns the axes in the ground plane that point most nearly to the right and away from the
-    /// eye. Along them, round coordinates stay round.
+    /// Returns the coordinate axes in the ground plane that point most nearly to the right and away
+    /// from the eye. Moves along coordinate axes keep round coordinates round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
@@ -36,15 +36,15 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule for edits by arrow keys and drags: in a drag or mode, all with the same
-    /// label form one undo step.
+    /// Returns the rule for edits by arrow keys and drags: in a drag or in a mode that moves or
+    /// rotates, all edits with the same label form one undo step.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
     /// Moves the selection by a drag in half cells, vertically if `upright` is `true`, otherwise in
-    /// the ground plane. It stays under the mouse as far as [`MOST_STRETCH`] allows.
+    /// the ground plane. The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();

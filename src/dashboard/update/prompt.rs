@@ -10,7 +10,7 @@ use zerkalo_scene::edit::{self, Target};
 use zerkalo_scene::value::{number, truncated};
 
 impl UpdateContext<'_> {
-    /// Opens a prompt with `text`, which is then passed to `apply`.
+    /// Opens a prompt with `text` in its editor. The edited text is passed to `apply`.
     fn prompt(
         &mut self,
         title: &str,
@@ -121,6 +121,7 @@ impl UpdateContext<'_> {
         Ok(())
     }
 
+    /// Starts the export that the text describes, such as `1920x1080 png`.
     fn export_sized(&mut self, text: &str) -> Result<(), String> {
         let mut words = text.split_whitespace();
         let size = words.next().ok_or("A size is needed, such as 1920x1080.")?;

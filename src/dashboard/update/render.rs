@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         self.say(format!("stops {when}"));
     }
 
-    /// Opens the list of noise targets with the cursor on the current one.
+    /// Opens the list of noise targets with the cursor on the current target.
     pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_levels.unwrap_or(0.5);
         let index = QUALITIES.iter().position(|levels| *levels <= wanted);

@@ -11,8 +11,8 @@ use zerkalo_scene::value::sanitized;
 use zerkalo_terminal::event::Mouse;
 
 impl UpdateContext<'_> {
-    /// Stores a report. The cursor follows its entry to the entry's new row, except from the first
-    /// row.
+    /// Stores a report. A cursor on the first row stays there; on another row it follows its entry
+    /// to the entry's new row.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {

@@ -15,7 +15,7 @@ pub struct Scale {
 
 impl Scale {
     /// Creates a scale from the smallest to the largest positive finite number of `values`, or from
-    /// 1 to 10 without any.
+    /// 1 to 10 if there is none.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = positive_range(values).unwrap_or((1.0, 10.0));
         Self { low, high, reversed: false }
@@ -79,7 +79,7 @@ pub fn object_color(id: u32) -> [u8; 3] {
 /// Colour of a pixel whose camera ray hits no object.
 pub const NO_HIT: [u8; 3] = [14, 14, 16];
 
-/// Returns the colour of a unit normal, by components.
+/// Returns the colour of a unit normal: components from -1 to 1 become channels from 0 to 255.
 pub fn normal_color(normal: [f32; 3]) -> [u8; 3] {
     normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
 }

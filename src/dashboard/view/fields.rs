@@ -23,7 +23,7 @@ pub fn inspector(model: &Model, layout: &Layout, painter: &mut Painter) -> Optio
     draw(model, areas, active, painter)
 }
 
-/// Draws the properties of the open form, or of the inspector, and help on the one under the
+/// Draws the properties of the open form, or of the inspector, and help on the property under the
 /// cursor. Returns the position of the text cursor.
 pub fn draw(
     model: &Model,

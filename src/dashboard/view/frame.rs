@@ -41,8 +41,8 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
 }
 
-/// Returns the channel or comparison, the exposure and the tone curve, unless they are the default,
-/// each with `true` if it is emphasised.
+/// Returns the texts in the upper border: the channel or comparison, the exposure and the tone
+/// curve, each unless it is the default. A text with `true` is emphasised.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {

@@ -7,6 +7,7 @@ use crate::dashboard::view::picture::paint;
 use ratatui::layout::Rect;
 use zerkalo_terminal::cells::{Raster, picture_cells};
 
+/// Width of the colour bar in columns.
 const BAR: usize = 12;
 
 /// Legend of a scale: the values at both ends, the unit and a colour bar.

@@ -33,7 +33,7 @@ pub fn broken(model: &Model, layout: &Layout, painter: &mut Painter) {
     painter.paragraphs(text_area(layout), &texts);
 }
 
-/// Formats location, problem and help.
+/// Formats location, problem and help of an error, one paragraph each.
 fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     if let Some((line, column)) = message.line_column {

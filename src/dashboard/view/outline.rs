@@ -17,7 +17,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     painter.panel(area, "outline", active);
     let inner = area.inner(BORDER);
     let lines = outline(model.scene());
-    // The picture then has the same colours.
+    // The picture then shows the objects in the colours of these marks.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     let (scroll, border) = (model.outline_scroll, theme.border(active));

@@ -89,7 +89,7 @@ impl OverlayPainter<'_, '_> {
             let room = to.left().saturating_sub(columns(&entry.name) + 3);
             to.put_right(" ", 0, key).put_right(&cut(&entry.keys, room), 0, key);
             to.put_wide(&entry.name, names, name).skip(2);
-            // A description may be truncated, a chapter beside long keys not.
+            // A description may be truncated. A chapter beside long keys is omitted instead.
             if entry.keys.is_empty() || columns(&entry.note) < to.left() {
                 to.put(&entry.note, note);
             }

@@ -29,8 +29,8 @@ pub struct ListRow<'a> {
 }
 
 impl Painter<'_> {
-    /// Starts row `row` of a list in `area`. `selected` is `None` unless the cursor is on the row,
-    /// and `true` if the list has the focus.
+    /// Starts row `row` of a list in `area`. `selected` is `None` unless the cursor is on the row.
+    /// Its value is `true` if the list has the focus.
     pub fn list_row(&mut self, area: Rect, row: u16, selected: Option<bool>) -> ListRow<'_> {
         let theme = self.theme;
         let mut to = self.row(area, row);
@@ -69,7 +69,7 @@ impl Painter<'_> {
         }
     }
 
-    /// Returns a writer of row `row` of a panel's border, without the outer two columns.
+    /// Returns a writer of row `row` of a panel's border, without two columns at each end.
     pub fn edge(&mut self, area: Rect, row: u16) -> Row<'_> {
         self.row(Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area }, row)
     }
@@ -81,7 +81,8 @@ impl Painter<'_> {
     }
 
     /// Draws the scroll bar of a list to the right of `area`, unless all `len` lines are visible.
-    /// Returns the lines from `scroll` on, or from a smaller index that fills `area`.
+    /// Returns the visible lines: from `scroll` on, or from a smaller index if too few lines would
+    /// remain to fill `area`.
     pub fn window(
         &mut self,
         area: Rect,
@@ -120,7 +121,7 @@ pub struct Row<'a> {
     pub theme: Theme,
     /// Column of the next text.
     pub x: u16,
-    /// First column to the right of the room that is left.
+    /// First column to the right of the free columns.
     pub end: u16,
     pub y: u16,
 }
@@ -140,7 +141,8 @@ impl Row<'_> {
         self
     }
 
-    /// Draws `text`, truncated or padded to `width` columns, if there are as many.
+    /// Draws `text`, truncated or padded to `width` columns, or to the columns left if they are
+    /// fewer.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);

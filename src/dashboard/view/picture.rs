@@ -54,6 +54,7 @@ impl PictureView {
         raster.unwrap_or_default()
     }
 
+    /// Returns the raster of a channel of the latest snapshot.
     fn live(&mut self, model: &Model, channel: DisplayChannel, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         match channel {
@@ -82,8 +83,8 @@ impl PictureView {
         }
     }
 
-    /// Returns one value for each tile of the film in false colour, on a logarithmic scale.
-    /// `values` are row by row.
+    /// Returns a raster of one value for each tile of the film, in false colour on a logarithmic
+    /// scale. `values` are row by row.
     fn tiles<T: Copy + Into<f64>>(
         &mut self,
         model: &Model,
@@ -123,8 +124,8 @@ impl PictureView {
         self.pinned.as_ref().map(|cached| &*cached.radiance)
     }
 
-    /// Returns the difference in luma, live minus pinned, in 8-bit levels. The scale ends at the
-    /// largest difference, rounded up by [`round_up`].
+    /// Returns a raster of the difference in luma, live minus pinned, in false colour. The scale
+    /// ends at the largest difference, rounded up by [`round_up`].
     fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
@@ -183,7 +184,8 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales an image without interpolation, until the session returns one of the new size.
+/// Scales an image without interpolation. The result is shown only until the session returns an
+/// image of the new size.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;

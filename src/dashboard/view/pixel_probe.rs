@@ -33,7 +33,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         }
         return;
     }
-    // The box is farthest from the mark.
+    // The box is in the corner that is farthest from the mark.
     let in_left = column < area.x + area.width / 2;
     let in_upper = row < area.y + area.height / 2;
     let x_box = if in_left { area.right() - WIDTH - 2 } else { area.x + 2 };

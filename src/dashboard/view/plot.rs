@@ -33,7 +33,7 @@ impl Axis {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Returns powers of ten, and on a short axis also two and five times these.
+    /// Returns the ticks: powers of ten, and on a short axis also two and five times these.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;

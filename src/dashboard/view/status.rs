@@ -41,6 +41,7 @@ pub fn draw(model: &Model, area: Rect, painter: &mut Painter) {
     }
 }
 
+/// Returns the parts of the status line, from left to right.
 fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     let part = |expendable, text| Part { expendable, text };
     let plain = |text: String| (text, theme.text());
@@ -176,8 +177,8 @@ pub fn hints_line(model: &Model, area: Rect, painter: &mut Painter) {
     }
 }
 
-/// Removes hints until the others fit: first those in the middle, then the last two, which lead to
-/// all commands.
+/// Removes hints until the others fit into `width` columns. The first one and the last two, which
+/// lead to all commands, stay longest.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

@@ -59,14 +59,14 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     }
 }
 
-/// Draws texts with their widths from right to left, each right-aligned.
+/// Draws texts from the right end of the row to the left, each right-aligned in its width.
 fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) {
     for (text, width) in texts {
         to.put_right(&format!("{text:>width$}"), 0, style);
     }
 }
 
-/// Draws path and state below the table.
+/// Draws path and state of the file under the cursor, below the table.
 fn explain(shard: &WatchedShards, area: Rect, painter: &mut Painter) {
     let theme = painter.theme;
     if area.height == 0 {
@@ -97,7 +97,7 @@ fn title(report: &WatchReport) -> String {
     }
 }
 
-/// Returns the numbers of the shards in the file, or else its name.
+/// Returns the numbers of the shards in the file, or the name of a file without shards.
 fn label(shard: &WatchedShards) -> String {
     match (&shard.path, shard.shards.as_str()) {
         (Some(path), "") => short_name(path),
@@ -126,7 +126,8 @@ fn share(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats the samples of a file and of its complete shards, such as `1.2/4.8M`.
+/// Formats the number of samples in a file, and the number in the complete file, such as
+/// `1.2/4.8M`.
 fn samples(shard: &WatchedShards) -> String {
     let most = shard.total.unwrap_or(shard.samples).max(1) as f64;
     let units = [(1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k")];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use zerkalo_terminal::image::ViewerImage;
 
 /// Largest number of bytes of a part. It bounds the latency of keys, because no frame can be sent
-/// meanwhile.
+/// during a part.
 const SLICE: usize = 1 << 18;
 /// String terminator (ST), which ends an incomplete escape sequence.
 const END: &[u8] = b"\x1b\\";
@@ -35,8 +35,8 @@ impl ImageUpload {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the next output may be a part of the image: if the upload has begun or the
-    /// preview is visible. `waits` is `true` if some cells of the screen have not been sent.
+    /// Returns `true` if the next output may be a part of the image: if the upload has begun, the
+    /// preview is visible, or no cells of the screen wait to be sent. `waits` is `true` if some do.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }
@@ -56,7 +56,7 @@ impl ImageUpload {
         (self.sent, self.open) = (range.end, open);
     }
 
-    /// Returns the escape sequence that removes the sent part.
+    /// Returns the escape sequence that removes the parts of the image that have been sent.
     pub fn removal(&self) -> Vec<u8> {
         let end = if self.open { END } else { b"" };
         [end, &self.image.transfer.remove].concat()

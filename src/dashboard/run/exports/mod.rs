@@ -83,8 +83,8 @@ impl Exporter {
         Ok(Exported { path, description: "checkpoint".to_string(), advice, size: None })
     }
 
-    /// Returns the beginning of file names. `source` is the name of a scene file that this process
-    /// has not read.
+    /// Returns the beginning of file names, from the scene file of this process, or from the file
+    /// name `source` if it has none.
     fn stem(&self, source: &str) -> String {
         match self.file.as_ref().and_then(SharedFile::get) {
             Some(file) => stem(file.path(), &file.document.name),

@@ -92,8 +92,8 @@ impl Autosave {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits as a save to `file` would. Returns a warning if this write fails,
-    /// unless the previous one failed, too.
+    /// Writes pending edits to the recovery file, or removes it if `file` already contains them.
+    /// Returns a warning if this write fails and the previous one did not.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -192,8 +192,8 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits. Returns a scene file with the recovered text if `path` is given,
-    /// the path of an unreadable scene file.
+    /// Adopts the offered edits. `path` is the path of an unreadable scene file; if it is given,
+    /// returns a scene file with the recovered text.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

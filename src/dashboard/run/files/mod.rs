@@ -25,9 +25,9 @@ use zerkalo_scene::{Recovery, Scene, SceneFile};
 
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the recovery file when the program ends, and then again for one in the state
-/// folder. Together with [`SAVED_WITHIN`], this is shorter than the grace period after a
-/// terminating signal.
+/// Longest wait for the write of the recovery file when the program ends. If it was in vain, the
+/// program waits as long again for a recovery file in the state folder. With [`SAVED_WITHIN`], both
+/// waits are shorter than the grace period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 /// Handle of the two threads.
@@ -107,8 +107,8 @@ impl Files {
     }
 
     /// Waits for pending writes, at most four seconds. Returns the path of the recovery file if
-    /// there are unsaved edits. If the disk of the scene file does not respond, they are kept in
-    /// the state folder.
+    /// there are unsaved edits. If the disk of the scene file does not respond, the edits are kept
+    /// in the state folder.
     ///
     /// # Errors
     /// Fails with a message for the user if there are unsaved edits that cannot be kept.

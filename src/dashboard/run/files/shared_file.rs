@@ -28,7 +28,8 @@ impl SharedFile {
         self.state().file = file;
     }
 
-    /// Returns the writer for use if the disk of the scene file does not respond.
+    /// Returns the writer of recovery files in the state folder, for use if the disk of the scene
+    /// file does not respond.
     pub fn elsewhere(&self) -> Recovery {
         self.state().elsewhere.elsewhere()
     }
