@@ -46,8 +46,7 @@ impl CheckpointWriter {
         }))
     }
 
-    /// Warns if a checkpoint could not be written, and requests the next one if it is due. Does not
-    /// block.
+    /// Requests a checkpoint if one is due, and warns if the last one failed. Does not block.
     pub fn poll(&mut self, session: &Session) {
         if let Some(Ok(written)) = self.written.as_ref().map(Receiver::try_recv) {
             self.written = None;
@@ -60,8 +59,7 @@ impl CheckpointWriter {
         }
     }
 
-    /// Requests a checkpoint, which is written in a thread of its own. Returns the channel for its
-    /// result.
+    /// Requests a checkpoint, written by a thread of its own. Returns the channel for its result.
     fn request(&self, session: &Session) -> Receiver<Result<(), WriteError>> {
         let (sender, written) = channel();
         let path = self.path.clone();

@@ -67,8 +67,7 @@ const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
 const OPENING_NAME: &str = "lamp-and-mirror.toml";
 
 /// Prints the results of a dashboard: names of written files on `out`, everything else on stderr.
-/// After a signal, the returned error has the exit status of the signal, even if nothing could be
-/// printed.
+/// After a signal, returns the signal's exit status as an error, even if printing failed.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {

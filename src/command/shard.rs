@@ -208,8 +208,7 @@ fn trace(
     Ok(None)
 }
 
-/// Writes the samples so far, in shards that are marked as `complete` or not. Returns the report on
-/// the film.
+/// Writes the film so far, with its shards marked as `complete` or not. Returns the report on it.
 fn write(
     render: &ShardRender,
     part: &mut Part,

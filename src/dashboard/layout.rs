@@ -28,7 +28,6 @@ pub struct Layout {
     /// Area of the outline, or of the table of watched files.
     pub outline: Option<Rect>,
     pub inspector: Option<Rect>,
-    /// Area of the convergence plot.
     pub plot: Option<Rect>,
     pub status: Rect,
     /// Row of key hints and notices.

@@ -21,7 +21,6 @@ pub enum Message {
     Paste(String),
     /// New columns and rows of the terminal.
     Resize([u16; 2]),
-    /// Latest snapshot of the session.
     Snapshot(Box<Snapshot>),
     /// State of the files that `zerkalo watch` shows.
     Watched(Box<WatchReport>),

@@ -40,7 +40,7 @@ pub struct File {
     pub name: String,
     /// Scene as last read or written; without a file, the scene at the start.
     pub saved: Arc<Scene>,
-    /// Errors in the current contents of the file.
+    /// Errors in the current contents of the file; `None` without errors.
     pub broken: Option<SceneErrors>,
     /// Path of the last save that was refused because a file exists there.
     pub occupied: Option<PathBuf>,
@@ -107,7 +107,6 @@ pub struct Notice {
     pub until: Option<Duration>,
 }
 
-/// Table of watched film files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchTable {
     pub report: WatchReport,
@@ -185,7 +184,7 @@ pub struct Model {
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene of the last autosave; `None` if there were no unsaved edits at that time.
     pub autosaved: Option<Arc<Scene>>,
-    /// Size of the pictures that were last requested, in half cells.
+    /// Columns and rows, in half cells, of the pictures that were last requested.
     pub raster: Option<[usize; 2]>,
     /// Counter that increases whenever the picture's cells may have become outdated.
     pub picture_version: u64,

@@ -20,7 +20,6 @@ pub struct Point {
     /// Error in 8-bit levels that the render estimates from its replicates. `None` before the first
     /// estimate.
     pub estimated_levels: Option<f64>,
-    /// Errors against the reference picture.
     pub errors: Errors,
 }
 

@@ -28,7 +28,6 @@ type Vary = fn(&Variant) -> Vec<Variant>;
 /// Default settings, an experiment without variants.
 pub static DEFAULT: Experiment = unbiased("default", "Default settings", |_| Vec::new());
 
-/// All experiments.
 pub static EXPERIMENTS: [Experiment; 10] = [
     unbiased("adaptivity", "Adaptive against uniform sampling", |base| {
         vec![base.with("uniform", |v| v.adaptive = false)]
@@ -163,9 +162,8 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Creates a render of this variant without a target: it ends by itself only when every tile
-    /// has its largest number of samples. Returns the error of the system if a thread cannot be
-    /// started.
+    /// Creates a render of this variant that ends by itself only when every tile has its largest
+    /// number of samples. Returns the error of the system if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)

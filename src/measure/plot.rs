@@ -82,8 +82,7 @@ fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
 }
 
 /// Returns the tick marks of a logarithmic axis: 1, 2 and 5 times each power of ten, or only the
-/// powers of ten if there are more than nine of these. `plotters` by itself marks only powers of
-/// ten.
+/// powers of ten if there are more than nine of these. `plotters` marks only powers of ten.
 fn ticks(range: &Range<f64>) -> Vec<f64> {
     let powers = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
     let multiples = |steps: &[f64]| -> Vec<f64> {

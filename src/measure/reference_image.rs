@@ -157,6 +157,7 @@ impl Reference {
         }
     }
 
+    /// Returns the bias of `film` and its significance.
     pub fn bias(&self, film: &Film, weights: &LightWeights) -> Bias {
         let [a, b] = [Replicates::A, Replicates::B].map(|r| pixels(film, r, weights));
         let own = own_error(&a, &b, &self.display);

@@ -180,9 +180,8 @@ impl Measured {
         Some(Median { value: median(&speeds), spread: spread(&speeds) })
     }
 
-    /// Returns the order of convergence of the linear RMSE. The first quarter of the points is left
-    /// out, because it has too few samples for a power law. Returns `None` if too few points
-    /// remain.
+    /// Returns the order of convergence of the linear RMSE, without the first quarter of the
+    /// points, which has too few samples for a power law. Returns `None` if too few points remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =

@@ -150,7 +150,7 @@ impl EffectRunner {
         });
     }
 
-    /// Returns a sender that the beginning export must drop at its end.
+    /// Records that an export runs until it drops the returned sender.
     fn begin_export(&mut self) -> Sender<()> {
         let (running, ended) = bounded(0);
         self.exporting = Some(ended);

@@ -95,8 +95,7 @@ impl FramePipeline {
         self.give_up();
     }
 
-    /// Begins the upload of the image that the viewer of `model` shows, and gives up that of any
-    /// other.
+    /// Begins the upload of the image that the viewer of `model` shows, and gives up any other.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -149,8 +148,7 @@ impl FramePipeline {
         self.writing_since = Some(now);
     }
 
-    /// Gives up overdue acknowledgements, and reads the length of the kernel's send queue if a
-    /// reading is due.
+    /// Gives up overdue acknowledgements, and reads the kernel's send queue if a reading is due.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {

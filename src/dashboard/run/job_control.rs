@@ -73,7 +73,7 @@ pub fn stop_process() -> rustix::io::Result<()> {
     kill_process(getpid(), Signal::TTIN)
 }
 
-/// Stops the whole process group by the signal of [`stop_process`], as Ctrl-Z stops a group.
+/// Stops the whole process group by the signal of [`stop_process`], as Ctrl-Z in a shell would.
 pub fn stop_group() -> rustix::io::Result<()> {
     kill_current_process_group(Signal::TTIN)
 }

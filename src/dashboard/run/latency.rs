@@ -15,7 +15,7 @@ struct Awaiting {
 }
 
 /// Recorder of input latencies. It always has the events that await a response, because the event
-/// loop sends a frame that responds at once. It stores latencies only on request.
+/// loop sends a frame at once if it responds to an event. It stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,

@@ -102,7 +102,7 @@ pub fn watch(films: FilmFiles, threads: usize, terminal: TerminalSetup) -> io::R
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default());
     let (results, done) = unbounded();
     let effects = EffectRunner::watching(films, threads, results.clone())?;
-    // The table of films must be complete in the first frame.
+    // The wait lets the first frame show the table of films.
     if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
         let _ = results.send(report);
     }

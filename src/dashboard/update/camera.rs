@@ -22,8 +22,7 @@ const ZOOM: f64 = 0.95;
 
 impl UpdateContext<'_> {
     /// Replaces the camera by the result of `f` for the camera and its distance from the pivot. All
-    /// camera moves have the same label, so that moves of different kinds can join into one undo
-    /// step.
+    /// camera moves have the same label, so that different moves can join into one undo step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));

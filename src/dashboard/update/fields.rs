@@ -91,6 +91,7 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Steps the value of the property under the cursor. In a question, moves the cursor.
     pub(super) fn step_field(&mut self, steps: f64) {
         if let Some(Overlay::Question(_)) = self.model.overlay {
             self.move_cursor(if steps > 0.0 { 1 } else { -1 });

@@ -177,8 +177,7 @@ impl UpdateContext<'_> {
             Ok(Exported { path, description, advice, size }) => {
                 let text = format!("{}  {description}  ·  {advice}", path.display());
                 if let Some(size) = size {
-                    // An image of the same size counts as the result of the export in the
-                    // background.
+                    // An image of this size counts as the result of the background export.
                     self.model.export.take_if(|e| e.size.map(|n| n as usize) == size);
                     self.model.last_export = Some(path);
                 }

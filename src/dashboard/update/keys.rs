@@ -24,7 +24,6 @@ impl Model {
         }
     }
 
-    /// Returns the state of the open form, or of the inspector.
     pub(super) fn field_list_mut(&mut self) -> &mut FieldList {
         match &mut self.overlay {
             Some(Overlay::Form(form)) => &mut form.fields,

@@ -18,8 +18,8 @@ fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
 
-/// Returns the index of the line under the mouse in the list at `rows`, whose first visible line is
-/// `scroll`. Returns `None` outside of `rows`.
+/// Returns the index of the line under the mouse in the list at `rows`, whose first visible line
+/// has the index `scroll`. Returns `None` outside of `rows`.
 pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
     is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }
@@ -36,7 +36,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Gives the focus to the panel under the mouse. Begins a drag, or selects or opens a line.
+    /// Gives the focus to the panel under the mouse. Begins a drag in the picture, or selects or
+    /// opens the line under the mouse in a list.
     fn press(&mut self, button: Button, mouse: Mouse) {
         self.model.drag = None;
         if self.model.file.unreadable {
@@ -77,6 +78,8 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Selects the part of the scene on the clicked line. If the outline has the focus and the part
+    /// is selected already, opens the inspector.
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
         // The change of focus below may change the layout.
         let lines = outline(self.scene());
@@ -124,7 +127,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves what the mode moves by the distance from the last position of the mouse.
+    /// Moves the camera, the selection or the probe by the mouse's movement, as the mode demands.
     fn dragged(&mut self, mouse: Mouse) {
         let Some(drag) = &mut self.model.drag else { return };
         let [column, row] = drag.last;

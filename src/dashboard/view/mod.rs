@@ -32,7 +32,7 @@ use zerkalo_terminal::cells::{Colors, picture_cells};
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Inputs of `picture`.
+    /// Version from which `picture` was made; `None` before the first.
     made_for: Option<Version>,
     picture: Buffer,
     /// Rectangle in which the picture was last drawn.

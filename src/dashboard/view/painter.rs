@@ -141,8 +141,7 @@ impl Row<'_> {
         self
     }
 
-    /// Draws `text`, truncated or padded to `width` columns, or to the columns left if they are
-    /// fewer.
+    /// Draws `text`, truncated or padded to `width` columns, or to the columns left if fewer.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);

@@ -20,6 +20,7 @@ struct Part {
     text: Vec<(String, Style)>,
 }
 
+/// Draws the status line. Parts that do not fit are omitted.
 pub fn draw(model: &Model, area: Rect, painter: &mut Painter) {
     let mut parts = parts(model, &painter.theme);
     let width = |parts: &[Part]| -> usize {

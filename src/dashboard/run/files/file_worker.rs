@@ -91,6 +91,7 @@ impl FileWorker {
         }
     }
 
+    /// Writes the scene file, and informs the other threads of its new contents.
     fn save(
         &mut self,
         scene: &Arc<Scene>,

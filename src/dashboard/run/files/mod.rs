@@ -25,9 +25,9 @@ use zerkalo_scene::{Recovery, Scene, SceneFile};
 
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the write of the recovery file when the program ends. If it was in vain, the
-/// program waits as long again for a recovery file in the state folder. With [`SAVED_WITHIN`], both
-/// waits are shorter than the grace period after a terminating signal.
+/// Longest wait for the write of the recovery file when the program ends. If it times out, the
+/// program waits as long again for a recovery file in the state folder. Both waits and
+/// [`SAVED_WITHIN`] together are shorter than the grace period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 /// Handle of the two threads.
