@@ -5,8 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// File names in a scene: the folder to which they are relative, and a cache of the files read so
-/// far. Scenes that are derived from one another share both.
+/// Resolver of the file names in a scene: the folder to which they are relative, and a cache of the
+/// files read so far. Scenes that are derived from one another share both.
 #[derive(Clone, Debug, Default)]
 pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
@@ -39,8 +39,8 @@ impl AssetResolver {
         self.folder.read().unwrap_or_else(PoisonError::into_inner).join(name)
     }
 
-    /// Returns `true` if `name` leads to a file, but to another one or none from the folder of
-    /// `scene`.
+    /// Returns `true` if `name` leads to a file now, but to another file or to none once the scene
+    /// has moved to the file `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.path(name))

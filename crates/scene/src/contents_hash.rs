@@ -7,8 +7,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Scene {
-    /// Returns the hash of the contents of the scene's files, as they were read; `None` if there
-    /// are none.
+    /// Returns the hash of the contents of the files that the scene names, as they were read;
+    /// `None` if none is loaded.
     pub fn contents_hash(&self) -> Option<u64> {
         // A new field that may name files has to be added here.
         let Self {
@@ -37,7 +37,8 @@ impl Scene {
     }
 }
 
-/// Adds the hash of each file's contents. A file that the scene names repeatedly is hashed once.
+/// Adds the hash of each file's contents to `hash`. The contents of a file that the scene names
+/// repeatedly are hashed only once.
 fn add_each<'a, T: 'a>(
     hash: &mut Fnv1a64,
     files: impl Iterator<Item = &'a Arc<T>>,

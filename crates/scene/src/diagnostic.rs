@@ -9,9 +9,10 @@ use std::fmt;
 pub struct Diagnostic {
     /// Name of the scene file as the user gave it.
     pub file: String,
-    /// Line and column in characters, counted from 1; `None` for the whole file.
+    /// Line and column in characters, counted from 1; `None` if the diagnostic is about the whole
+    /// file.
     pub line_column: Option<(usize, usize)>,
-    /// Table, such as `object "queen"`; empty for the whole scene.
+    /// Table that the diagnostic is about, such as `object "queen"`; empty for the whole scene.
     pub subject: String,
     /// Phrase that states the error, such as `radius is -1`.
     pub found: String,
@@ -102,7 +103,8 @@ impl FirstDiagnostics {
         self.found.is_empty()
     }
 
-    /// Returns the stored diagnostics, sorted and located in `text`, and the number of the others.
+    /// Returns the stored diagnostics, sorted, with file, line and column, and the number of
+    /// diagnostics that were only counted.
     pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);

@@ -34,7 +34,7 @@ impl Scene {
 }
 
 impl Document {
-    /// Reads and validates the scene file at `path`. Returns the errors of [`Scene::read`].
+    /// Reads and validates the scene file at `path`. Returns the same errors as [`Scene::read`].
     pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
@@ -50,8 +50,8 @@ impl Document {
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
-    /// Parses and validates a scene. `name` is the file name in diagnostics. Returns the errors of
-    /// [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics. Returns the same
+    /// errors as [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
@@ -85,7 +85,8 @@ impl Document {
         &self.scene
     }
 
-    /// Returns the scene that the text describes, without a copy.
+    /// Returns the scene that the text describes. It is copied only if a clone of the document
+    /// exists.
     pub fn into_scene(self) -> Scene {
         drop(self.origin);
         Arc::unwrap_or_clone(self.scene)
@@ -97,8 +98,9 @@ impl Document {
     }
 }
 
-/// Changes `text`, which describes `old`, to describe `new`. Uniform line endings are kept, as are
-/// a byte order mark and a missing line ending at the end; mixed line endings become LF.
+/// Returns `text`, which describes `old`, changed so that it describes `new`. Uniform line endings
+/// are kept, as are a byte order mark and a missing line ending at the end; mixed line endings
+/// become LF.
 fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),

@@ -19,7 +19,7 @@ pub struct SceneFile {
     fingerprint: u64,
 }
 
-/// State of the file on disk relative to the bytes last read or written.
+/// State of a scene file on disk, compared with the bytes that this program last read or wrote.
 #[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
@@ -69,7 +69,7 @@ impl fmt::Display for SaveError {
 impl std::error::Error for SaveError {}
 
 impl SceneFile {
-    /// Reads and validates the regular file at `path`. Returns the errors of [`Scene::read`].
+    /// Reads and validates the regular file at `path`. Returns the same errors as [`Scene::read`].
     pub fn open(path: &Path) -> Result<Self, SceneErrors> {
         Self::open_with(path, Arc::default())
     }
@@ -86,8 +86,8 @@ impl SceneFile {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
 
-    /// Creates a scene from the unsaved edits `text` of the file at `path`, which stays until they
-    /// are saved.
+    /// Creates a scene from `text`: unsaved edits of the scene file at `path`. The file stays as it
+    /// is until the scene is saved.
     pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
         let document = Document::parse(text, &path.display().to_string())?;
         let fingerprint = content(path).ok().flatten().unwrap_or_default();
@@ -99,12 +99,13 @@ impl SceneFile {
         Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
-    /// Returns the hash of the bytes last read or written; `None` without a file.
+    /// Returns the hash of the bytes last read or written; `None` if the scene has no file.
     pub fn fingerprint(&self) -> Option<u64> {
         self.path.as_ref().map(|_| self.fingerprint)
     }
 
-    /// Returns `true` if `text` was last read or written, or created a scene without a file.
+    /// Returns `true` if `text` is what was last read or written. In a scene without a file, this
+    /// is the text from which the scene was created.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
             Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
@@ -149,8 +150,8 @@ impl SceneFile {
     }
 
     /// Writes the valid `scene` to its file, which is replaced atomically; comments, a symbolic
-    /// link and permissions are kept. Fails without a file, if another program has written it
-    /// (unless `overwrite`), or if it is not a regular file.
+    /// link and permissions are kept. Fails if the scene has no file, if another program has
+    /// written the file (unless `overwrite`), or if it is not a regular file.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
         let found = content(&path);
@@ -168,9 +169,9 @@ impl SceneFile {
         self.write(document, &path, true)
     }
 
-    /// Writes the valid `scene` to another file, which becomes the scene's file. Fails if it exists
-    /// (unless `overwrite`), or if a file name in the scene would lead elsewhere from the new
-    /// folder.
+    /// Writes the valid `scene` to the file at `path`, which becomes the scene's file. Fails if
+    /// this file exists (unless `overwrite`), or if a file that the scene names would not be found
+    /// from the new folder.
     pub fn save_as(
         &mut self,
         path: &Path,
@@ -201,7 +202,8 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Replaces the content of the file at `path` atomically and durably.
+    /// Replaces the content of the file at `path` atomically and durably. Fails if the file exists,
+    /// unless `overwrite`.
     fn write(&mut self, document: Document, path: &Path, overwrite: bool) -> Result<(), SaveError> {
         let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
         let text = document.text().as_bytes();

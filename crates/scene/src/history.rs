@@ -19,13 +19,14 @@ pub struct History {
     /// Scenes to which undo returns, the oldest first.
     past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
-    /// Scenes to which redo returns; the next one is the last.
+    /// Scenes to which redo returns; the last entry comes next.
     future: Vec<HistoryEntry>,
-    /// `true` during a gesture: the next edit may be coalesced.
+    /// `true` during a gesture: the next edit may be coalesced with the last step.
     open: bool,
     saved: Arc<Scene>,
 }
 
+/// Scene before or after a step, label of the step, and estimated memory of the scene in bytes.
 #[derive(Clone, Debug)]
 struct HistoryEntry {
     scene: Arc<Scene>,
@@ -52,8 +53,8 @@ impl History {
         &self.now
     }
 
-    /// Makes `scene` the current scene. `held` is `true` during a gesture. Returns `false`, and
-    /// records nothing, if the scene has not changed.
+    /// Makes `scene` the current scene. `held` is `true` during a gesture. Returns `true` if the
+    /// scene has changed; if it has not, nothing is recorded.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;

@@ -1,7 +1,7 @@
 //! Scene as the user describes it: editable, in double precision, with validation.
 //!
-//! [`Document`] and [`edit::Edit`] are validated once. The fields of [`Scene`] are public: a render
-//! session validates the scene that it is given.
+//! The scene of a [`Document`] or an [`edit::Edit`] has been validated. Any other [`Scene`] may be
+//! invalid, because its fields are public: a render session validates the scene that it is given.
 
 #[cfg(not(unix))]
 compile_error!("zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX file locks.");

@@ -42,8 +42,8 @@ fn without_effect(key: &'static str, is_found: bool) -> Option<(&'static str, St
 }
 
 impl Scene {
-    /// Returns one warning for each kind of doubtful value: the first one, and the number of
-    /// others.
+    /// Returns one warning for each kind of doubtful value that the scene has. It describes the
+    /// first such value and gives the number of the others.
     pub fn warnings(&self) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut add = |help: &str, cases: &mut dyn Iterator<Item = Case>| {
@@ -96,9 +96,9 @@ impl Scene {
     }
 }
 
-/// Returns a warning if a material may reflect more light than it receives. A Cook-Torrance
-/// highlight and the key `reflection` stand for one physical reflection, of lights and of surfaces:
-/// only the larger weight counts.
+/// Returns a warning if a material may reflect more light than it receives. With a Cook-Torrance
+/// highlight, `specular` and `reflection` are weights of one physical reflection (of lights and of
+/// surfaces), so that only the larger one counts.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,

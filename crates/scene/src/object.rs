@@ -20,8 +20,8 @@ description! {
 }
 
 impl Object {
-    /// Returns the material of each part, in the order of [`Object::form`]. A shape that is no
-    /// compound has one part.
+    /// Returns the name of each part's material, in the order of the parts of [`Object::form`]. A
+    /// shape that is no compound has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)
     }
@@ -31,8 +31,8 @@ impl Object {
         self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
     }
 
-    /// Replaces the material name `old` of the object and its parts. An empty name means the
-    /// default material for an object, that of the whole for a part.
+    /// Replaces the material name `old` of the object and its parts by `new`. An empty name means
+    /// the default material for an object, and the object's material for a part.
     pub fn rename_material(&mut self, old: &str, new: &str) {
         let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
         for name in names.filter(|name| *name == old) {
@@ -45,7 +45,8 @@ impl Object {
         compose(&self.transform)
     }
 
-    /// Returns the canonical form in the scene's space. The object must be valid.
+    /// Returns the canonical form of the shape, transformed to the scene's space. The object must
+    /// be valid.
     pub fn form(&self) -> Form {
         match self.transform.is_empty() {
             true => self.shape.form(),
@@ -53,7 +54,7 @@ impl Object {
         }
     }
 
-    /// Returns the validation errors, except for the existence of the material.
+    /// Returns the validation errors of the object. It is not checked that its material exists.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator();
         let moved =

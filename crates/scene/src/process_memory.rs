@@ -73,8 +73,8 @@ pub fn megabytes(bytes: u64) -> String {
 /// Address space \[bytes\] that the allocator of glibc reserves for each thread: its memory arena.
 const ARENA: u64 = 64 << 20;
 
-/// Number of threads whose arenas are reserved at most: a tracing thread for each processor, up to
-/// eight, and six others.
+/// Returns the largest expected number of threads, each of which reserves an arena: a tracing
+/// thread for each processor, up to eight, and six others.
 fn expected_threads() -> u64 {
     let processors = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     processors.min(8) as u64 + 6

@@ -22,15 +22,16 @@ const MAX_FILES: u32 = 9;
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age from which an unlocked temporary file is that of a killed process, and is removed.
+/// Age from which an unlocked temporary file is taken for one of a killed process and removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Folder of the scene file, and name of the recovery file in it.
+    /// Folder of the scene file, and name of the recovery file in it; `None` without a scene file.
     beside: Option<(PathBuf, OsString)>,
-    /// Folder and name if the file cannot be written `beside` the scene file.
+    /// State folder, and name of the recovery file in it if it cannot be written `beside` the
+    /// scene.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
@@ -55,8 +56,8 @@ pub struct RecoveryFile {
     pub elsewhere: bool,
 }
 
-/// Unsaved edits of a killed process. The file stays locked, so that other processes do not offer
-/// it.
+/// Unsaved edits of a killed process. Its recovery file stays locked, so that other processes do
+/// not offer these edits.
 #[derive(Debug)]
 pub struct Orphan {
     kept: Saved,
@@ -70,7 +71,7 @@ pub struct Orphan {
 
 /// Returns the program's folder in the user's state folder (XDG Base Directory Specification), for
 /// scenes without a file or in a folder that is not writable. `variable` returns the value of an
-/// environment variable.
+/// environment variable. Returns `None` if neither `XDG_STATE_HOME` nor `HOME` is an absolute path.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -79,13 +80,13 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Creates the writer and finder for the scene at `path`, or for one without a file, called
-    /// `name`. `state` is the [`state_folder`].
+    /// Creates the writer and finder for the scene at `path`; without a path, for a scene that has
+    /// no file and is called `name`. `state` is the [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut beside = None;
         let stem = match path {
             Some(path) => {
-                // Every path to the same file gives the same name.
+                // Every path to the same scene file gives the same name of the recovery file.
                 let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
                 let canonical = canonical.unwrap_or_else(|_| path.to_path_buf());
                 let name = canonical.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
@@ -103,7 +104,8 @@ impl Recovery {
         Self { beside, state, saved: None }
     }
 
-    /// Returns folder and name of the places for the recovery file, the preferred one first.
+    /// Returns the possible places of the recovery file, each as folder and file name; the
+    /// preferred place first.
     fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
         self.beside.iter().chain(&self.state)
     }
@@ -118,8 +120,9 @@ impl Recovery {
         self.saved.as_ref().map(|saved| saved.path.as_path())
     }
 
-    /// Writes the recovery file: the text that saving would write, and the fingerprint of the file
-    /// that it would replace. If no folder is writable, the previous recovery file stays.
+    /// Writes the recovery file: the `text` that saving would write, and `base`, the fingerprint of
+    /// the scene file that saving would replace. If no folder is writable, the previous recovery
+    /// file stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -171,7 +174,8 @@ impl Recovery {
         found
     }
 
-    /// Takes over the recovery file of `lost`.
+    /// Makes the file of `lost` the recovery file of this process, in place of an earlier one,
+    /// which is removed.
     pub fn adopt(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -248,7 +252,8 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens the recovery file for writing, too, because some file systems lock only such files.
+/// Opens the recovery file for reading and writing: some file systems lock only files that are open
+/// for writing.
 fn open(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true).write(true), path)
 }
@@ -298,6 +303,7 @@ fn read_orphan(path: &Path) -> io::Result<Found> {
     Err(ErrorKind::WouldBlock.into())
 }
 
+/// Reads text, fingerprint and time of writing from the recovery file `kept`.
 fn read(kept: Saved) -> io::Result<Orphan> {
     let mut bytes = Vec::new();
     (&kept.file).take(MAX_BYTES + 1).read_to_end(&mut bytes)?;

@@ -13,7 +13,8 @@ use std::fmt;
 /// Problem of a scene (error or warning), without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Keys and list indices, such as `object`, `3`, `shape`, `sphere`.
+    /// Path to the value in question: keys and list indices, such as `object`, `3`, `shape`,
+    /// `sphere`.
     pub path: Vec<String>,
     /// Table that the problem is about, such as `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
@@ -33,8 +34,8 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Returns the name in diagnostics of the table at `path`: `object "queen"`, `light 2`. `name(list,
-/// index)` returns the name of an entry.
+/// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
+/// `name(list, index)` returns the name that the user gave to an entry of a list.
 pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
     match path {
         [list, index, ..] if list == "object" || list == "light" => {
@@ -60,7 +61,7 @@ struct Problems<'a> {
 }
 
 impl Problems<'_> {
-    /// Adds a problem of the value at `path`. `make` returns phrase and help.
+    /// Adds a problem of the value at `path`. `make` returns its fields `found` and `help`.
     fn report(&mut self, path: &[&str], make: impl FnOnce() -> (String, String)) {
         if self.found.len() < MAX_REPORTED {
             let (found, help) = make();
@@ -121,7 +122,7 @@ impl Scene {
         self.check().0
     }
 
-    /// Returns [`Scene::faults`] and the number of further ones.
+    /// Returns [`Scene::faults`] and the number of further errors.
     pub(super) fn check(&self) -> (Vec<Problem>, usize) {
         let mut problems = Problems { scene: self, found: Vec::new(), more: 0 };
         problems.add(&["film"], self.film.validator().errors());
@@ -191,6 +192,7 @@ impl Scene {
         }
     }
 
+    /// Adds a problem for each material that an object or a part names and that is not defined.
     fn missing_materials(&self, problems: &mut Problems) {
         let is_missing = |name: &str| !name.is_empty() && !self.materials.contains_key(name);
         for (i, object) in self.objects.iter().enumerate() {
@@ -221,6 +223,8 @@ impl Scene {
         (format!("material \"{}\" is not defined", truncated(name)), help + &meant)
     }
 
+    /// Adds a problem for each entry of the scene's list `list` that has the name of an earlier
+    /// entry.
     fn same_names<'a>(
         &self,
         list: &str,

@@ -12,7 +12,8 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 use zerkalo_kernel::primitive::Mesh;
 
-/// Largest memory in bytes for files that no scene uses any more, but an undo may bring back.
+/// Largest total memory in bytes of the cached files that no scene uses. They are kept because an
+/// undo may bring them back.
 const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
@@ -79,7 +80,8 @@ impl<T> Cache<T> {
         entry
     }
 
-    /// Evicts unused files, the least recently used first, down to [`UNUSED_BYTES`].
+    /// Evicts files that no scene uses, the least recently used first, until they take at most
+    /// [`UNUSED_BYTES`]. `bytes_of` returns the memory of a file in bytes.
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut sum = 0usize;
         self.0.retain(|(_, entry)| {
@@ -95,7 +97,7 @@ impl<T> Cache<T> {
 }
 
 /// Cache of all asset files that scenes name, shared by scenes and threads. A file is read again
-/// only if it changes on disk. Errors are cached as well.
+/// only if it has changed on disk or was evicted. Errors are cached as well.
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,
@@ -168,13 +170,14 @@ fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> 
     })
 }
 
-/// Locks a cache. It is valid even after a panic, because no method leaves it half changed.
+/// Locks a cache. It is valid even if a thread panicked with the lock, because no method leaves it
+/// half changed.
 fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the file at `path` from `cache`. If it is missing there, `read` reads it, while other
-/// threads can use the cache.
+/// Returns the file at `path` from `cache`. If it is missing there, `read` reads it; meanwhile
+/// other threads can use the cache.
 fn load<T>(
     cache: &Mutex<Cache<T>>,
     path: &Path,

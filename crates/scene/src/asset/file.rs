@@ -38,7 +38,7 @@ impl FileContents {
             let found = format!("there is no memory for its {}", megabytes(metadata.len()));
             return error(found, "a smaller file, or more free memory");
         }
-        // One byte more than the limit shows that the file has grown.
+        // Up to one byte more than `limit` is read, to notice that the file has grown beyond it.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
@@ -62,8 +62,9 @@ impl FileContents {
         self.error(FileLocation::Whole, found, expected)
     }
 
-    /// Resolves `name`, which occurs in this file, relative to its folder, by the rule in
-    /// docs/scene-format.md. `None` if it could name a file outside the folder.
+    /// Returns the path of the file `name`, to which this file refers, relative to the folder of
+    /// this file. Returns `None` if `name` is empty or could lead out of the folder. The rule is in
+    /// docs/scene-format.md.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)

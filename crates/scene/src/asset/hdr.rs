@@ -1,10 +1,11 @@
 //! Radiance HDR files: lines of text, then rows of pixels that consist of three mantissas and a
 //! common exponent (RGBE).
 //!
-//! A row has one of two encodings. The newer one has the runs of each of the four components one
-//! after the other. In the older one, the pixel (1, 1, 1, n) repeats the pixel before it; such
-//! pixels in sequence are the digits of the count, the lowest first. Source: G. Ward, "Real Pixels",
-//! Graphics Gems II, and the file `color.c` of Radiance.
+//! A row has one of two encodings. In the newer one, the four components follow one another, each
+//! as a sequence of runs. In the older one, a pixel (1, 1, 1, n) stands for n repetitions of the
+//! pixel before it; in a sequence of such pixels, the values n are the digits of the count to base
+//! 256, the lowest first. Source: G. Ward, "Real Pixels", Graphics Gems II, and the file `color.c`
+//! of Radiance.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -182,7 +183,7 @@ fn decode_component(
     Ok(())
 }
 
-/// Decodes the pixels of a row after the pixel `first` in the older encoding.
+/// Decodes a row in the older encoding, whose pixel `first` has been taken from `bytes` already.
 fn decode_pixels(
     bytes: &mut &[u8],
     row: &mut [[u8; 4]],

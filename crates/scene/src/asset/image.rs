@@ -22,9 +22,9 @@ pub const MAX_SIDE: u32 = 32_768;
 /// of memory after decoding, and at most 1.1 GB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of an image file, that of PNG: eight pixels per byte of
-/// uncompressed data, times 1032, the largest ratio of deflate. A JPEG has at most 512, a Radiance
-/// file in the old encoding 8192.
+/// Largest number of pixels per byte of a valid image file. PNG has the most: eight pixels per byte
+/// of uncompressed data, times 1032, the largest compression ratio of deflate. A JPEG has at most
+/// 512, a Radiance file in the old encoding 8192.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// Format of an image file.
@@ -37,7 +37,7 @@ pub(super) enum ImageFormat {
 }
 
 impl ImageFormat {
-    /// Determines the format by the first bytes of a file.
+    /// Determines the format by the first bytes of a file; `None` if it is none of these formats.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         let formats: [(&[u8], Self); 4] = [
             (b"\x89PNG\r\n\x1a\n", Self::Png),
@@ -49,7 +49,8 @@ impl ImageFormat {
     }
 }
 
-/// Levels with the bit depth of the file, one of a grey pixel, three of a coloured one.
+/// Levels of the pixels, row by row, with the bit depth of the file: one level per pixel of a grey
+/// image, three per pixel of a coloured one.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
@@ -95,7 +96,8 @@ impl Image {
         }
     }
 
-    /// Returns `image` upright, by the EXIF data of its file, and without alpha.
+    /// Converts `image` to a texture image without alpha, turned upright as the EXIF data `exif`
+    /// says.
     fn upright(mut image: DynamicImage, exif: Option<&[u8]>) -> Self {
         if let Some(orientation) = exif.and_then(Orientation::from_exif_chunk) {
             image.apply_orientation(orientation);
@@ -124,8 +126,8 @@ impl Image {
         }
     }
 
-    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y` from the top. Levels
-    /// are sRGB.
+    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y` from the top. The
+    /// levels of the file are taken as sRGB.
     ///
     /// # Panics
     /// Panics outside the image.
@@ -138,8 +140,8 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, of a pixel of a height map. Levels are linear; the height of a
-    /// coloured pixel is their mean.
+    /// Returns the height, 0..=1, of the pixel in column `x` and row `y` of a height map. Levels
+    /// are taken as linear; the height of a coloured pixel is the mean of its three levels.
     ///
     /// # Panics
     /// Panics outside the image.

@@ -20,7 +20,7 @@ impl<T> Default for Loaded<T> {
     }
 }
 
-/// Comparison of contents or errors. Contents in the same allocation are equal.
+/// Comparison of contents or errors, not of names. Contents in the same allocation are equal.
 impl<T: PartialEq> PartialEq for Loaded<T> {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -32,7 +32,7 @@ impl<T: PartialEq> PartialEq for Loaded<T> {
     }
 }
 
-/// State of loading, without the content.
+/// Output of the state of loading, without the content.
 impl<T> fmt::Debug for Loaded<T> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.0 {
@@ -44,7 +44,7 @@ impl<T> fmt::Debug for Loaded<T> {
 }
 
 impl<T> Loaded<T> {
-    /// Returns the content, if the file was read without error.
+    /// Returns the content; `None` if the file has not been read or reading it failed.
     pub fn content(&self) -> Option<&Arc<T>> {
         self.0.as_ref()?.1.as_ref().ok()
     }
@@ -57,7 +57,7 @@ impl<T> Loaded<T> {
         }
     }
 
-    /// Returns the error of reading the file as one of the key `file`.
+    /// Returns the error of reading the file, as a validation error of the key `file`.
     pub fn fault(&self) -> Option<ValidationError> {
         let error = self.0.as_ref()?.1.as_ref().err()?;
         Some(ValidationError::new("file", error.what(), error.expected.clone()))

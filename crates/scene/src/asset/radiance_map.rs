@@ -43,12 +43,12 @@ pub struct RadianceMap {
 pub struct DirectionSample {
     /// Unit vector of the direction.
     pub direction: [f64; 3],
-    /// Density with which it is sampled [1/sr].
+    /// Density with which the direction is sampled [1/sr].
     pub density: f64,
 }
 
 impl RadianceMap {
-    /// Creates the image of `pixels`, row by row from the top.
+    /// Creates an image from its width and height and its pixels, row by row from the top.
     ///
     /// # Panics
     /// Panics if the number of pixels is not the product of the sides, or is 0.
@@ -85,7 +85,8 @@ impl RadianceMap {
         }
     }
 
-    /// Creates the image of the pixels of the file `source`.
+    /// Creates the image of `pixels`, read from the file `source`. Negative values are replaced by
+    /// 0. Fails if a value is NaN or above [`MAX_RADIANCE`].
     fn of_pixels(
         source: &FileContents,
         size: [u32; 2],
@@ -158,7 +159,8 @@ impl RadianceMap {
         DirectionSample { direction: [-sin * sin_phi, cos, sin * cos_phi], density }
     }
 
-    /// Returns the density [1/sr] of [`RadianceMap::sample`].
+    /// Returns the density [1/sr] with which [`RadianceMap::sample`] samples the unit vector
+    /// `direction`.
     pub fn density(&self, direction: [f64; 3]) -> f64 {
         self.distribution.density(position(direction))
     }
@@ -183,7 +185,8 @@ fn decode_exr(source: &FileContents) -> Result<([u32; 2], Vec<[f32; 3]>), AssetE
         let size = [size.0, size.1].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS).map(|()| size)
     };
-    // The decoder allocates a block of rows of a layer before it reads the block.
+    // The sizes of all layers are checked first, because the decoder allocates a block of rows
+    // before it reads the block.
     for header in reader.headers() {
         check(header.layer_size)?;
     }

@@ -6,7 +6,7 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Opens the regular file at `path` for reading, without blocking as a plain open of a pipe does.
+/// Opens the regular file at `path` for reading. This never blocks, as opening a pipe may.
 ///
 /// # Errors
 /// Fails if the file cannot be opened or is not a regular file.

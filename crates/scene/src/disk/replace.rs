@@ -36,7 +36,7 @@ impl fmt::Display for WriteError {
 impl std::error::Error for WriteError {}
 
 impl WriteError {
-    /// Creates an error; the arguments become the fields of these names.
+    /// Creates an error whose fields are the arguments.
     pub fn new(path: &Path, kind: ErrorKind, what: impl Into<String>, remedy: &str) -> Self {
         Self { path: path.to_path_buf(), kind, what: what.into(), remedy: remedy.to_string() }
     }
@@ -61,7 +61,7 @@ pub struct Replacement {
     target: PathBuf,
     folder: PathBuf,
     existing: Existing,
-    /// `true` if the path named a file when the replacement began.
+    /// `true` if there was a file at `target` when the replacement began.
     exists: bool,
     /// File that gets the new content.
     pub temporary: NamedTempFile,
@@ -71,7 +71,7 @@ impl Replacement {
     /// Creates the temporary file for the new content of the file at `path`.
     ///
     /// # Errors
-    /// Fails if the file could not be replaced now.
+    /// Fails if the file may not be replaced or its folder cannot be written to.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
         let error = |kind, what: &str, remedy: &str| WriteError::new(path, kind, what, remedy);
         let other_file = |e: io::Error| error(e.kind(), &e.to_string(), "name another file");
@@ -120,7 +120,8 @@ impl Replacement {
         explain(&self.path, &self.folder, self.exists, error)
     }
 
-    /// Stores the content of the temporary file on the disk, then renames it.
+    /// Stores the content of the temporary file on the disk, then gives it the name of the file
+    /// that it replaces.
     ///
     /// # Errors
     /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is
@@ -192,7 +193,7 @@ fn is_stream(path: &Path) -> bool {
         || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
 }
 
-/// Returns the path at the end of the symbolic links at `path`. There need not be a file at it.
+/// Returns the path to which `path` leads through symbolic links. There may be no file at it.
 ///
 /// # Errors
 ///

@@ -30,7 +30,7 @@ pub fn light_kinds() -> Vec<Word> {
     words(LightKind::FIELDS)
 }
 
-/// Linear colours of new materials: the first that no other material has.
+/// Linear colours of new materials. A new material gets the first colour that no other one has.
 const PALETTE: [[f64; 3]; 6] = [
     [0.85, 0.16, 0.11],
     [0.13, 0.28, 0.8],
@@ -40,7 +40,8 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// Returns a material with the first free palette colour, or the next one in turn.
+/// Returns a material with the first colour of the palette that is free. If none is, the colours
+/// are taken in turn.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -50,8 +51,8 @@ fn fresh_material(scene: &Scene) -> Material {
 }
 
 /// Adds an object. It rests on a surface, as near as possible to the middle of the view, and is
-/// somewhat smaller than most others. A plane is put below all objects. Without `material` the
-/// object gets a new one. Fails if there is no such kind or material.
+/// somewhat smaller than most other objects. A plane is put below all objects. Without `material`
+/// the object gets a new material. Fails if there is no such kind or material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
@@ -103,9 +104,9 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object, rounded to one digit: 0.6 times the median length of the
-/// solids, limited to 0.01 R to R, where R is the radius of the scene. It is 0.15 R without solids,
-/// and 0.6 in an empty scene.
+/// Returns the length of a new object, rounded to one digit. It is 0.6 times the median length of
+/// the solids, a length that is first limited to 0.01 R to R, where R is the radius of the scene.
+/// It is 0.15 R without solids, and 0.6 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -123,8 +124,8 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Rotates a flat shape that is not level about the vertical, to a multiple of 5 degrees, so that
-/// its front faces the camera.
+/// Rotates `shape` about the vertical by a multiple of 5 degrees, so that its front faces the
+/// camera. Shapes that are not flat or are nearly level stay as they are.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
     let front = u.cross(v).normalize();

@@ -17,9 +17,10 @@ pub struct BoundingSphere {
 /// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// Returns a bounding sphere. That of a plane is centred on its position and has the radius R of
-/// [`scene_bounds`]. That of a light has the radius of the light, at least R / 10. That of a
-/// material contains all finite objects that use it. Other targets have none.
+/// Returns the bounding sphere of an object, light or material; `None` for other targets. An
+/// infinite object, such as a plane, has a sphere around its position, with the radius R of
+/// [`scene_bounds`]. A light has a sphere with its own radius, at least R / 10, and none without a
+/// position. The sphere of a material contains all finite objects that use it.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
         Target::Object(i) => {
@@ -78,9 +79,10 @@ pub fn step_length(scene: &Scene) -> f64 {
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
-/// Returns the distance from the eye to the pivot of camera movements, greater than 0: the target,
-/// or the point of the view axis closest to the centre of [`scene_bounds`]. If that is not well
-/// ahead, it is the radius of [`scene_bounds`].
+/// Returns the distance, greater than 0, from the eye to the pivot of camera movements. The pivot
+/// is the target or, without one, the point of the view axis closest to the centre of
+/// [`scene_bounds`]. If this point is not well ahead of the eye, the distance is the radius of
+/// [`scene_bounds`].
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

@@ -11,8 +11,8 @@ use crate::value::truncated;
 use glam::DVec3;
 
 /// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
-/// object is moved to a free place on the same level, a plane down, a light along x. Fails for
-/// targets of which a scene has exactly one, such as the camera.
+/// object is moved to a free place on the same level, or down if it is infinite. A light is moved
+/// along x. Fails for targets of which a scene has exactly one, such as the camera.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -71,9 +71,9 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
 }
 
-/// Deletes an object, a light, a stored camera or a material. Objects without their material get
-/// the default one, parts of compounds that of the whole; the note names them. Fails for targets
-/// that every scene has.
+/// Deletes an object, a light, a stored camera or a material. Objects whose material is deleted get
+/// the default material, parts of compounds get that of the whole; the note names these objects.
+/// Fails for targets that every scene has.
 pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -109,12 +109,14 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
 }
 
-/// Returns the name to select after `gone`: the next of the sorted `names`, or the last one.
+/// Returns the name to select after `gone` was deleted: the next of the sorted `names`, or the
+/// last.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Removes the material `name` from all objects and parts. Returns a note that names them.
+/// Removes the material `name` from all objects and parts. Returns a note that names these objects;
+/// `None` if there are none.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {

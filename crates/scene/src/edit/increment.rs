@@ -12,10 +12,10 @@ use crate::value::{
     rounded_to,
 };
 
-/// Changes the numbers of `key` by `steps` arrow steps. Whole numbers are coarse steps; otherwise
-/// `steps` counts fine steps in tenths. `component` is the index of the number to change; without
-/// it all change together, in a colour the brightness. A key without numbers changes to the next or
-/// previous choice ([`toggle`]).
+/// Changes the numbers of `key` by `steps` arrow steps. If `steps` is whole, it counts coarse
+/// steps; if not, its tenths count fine steps. `component` is the index of the number to change;
+/// without it, all numbers change together (of a colour, the brightness). A key without numbers
+/// changes to the next or previous choice ([`toggle`]).
 ///
 /// The scene stays unchanged at the end of a range, or if other keys forbid the new value; a note
 /// then states the reason. Fails if there is no such key or number, or no value to start from.
@@ -132,7 +132,7 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
     }
 }
 
-/// Number of arrow steps, negative for steps down. Fine ones are about a tenth as large.
+/// Number of arrow steps, negative for steps down. Fine steps are about a tenth of coarse steps.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -153,14 +153,14 @@ impl StepCount {
 /// Rule by which an arrow step changes a number.
 #[derive(Clone, Copy)]
 enum StepRule {
-    /// Geometric step along 1, 1.1, 1.2 ... 9 (times a power of ten): the rungs. Between 0 and
-    /// `floor` there are none.
+    /// Geometric step along the rungs: 1, 1.1, 1.2 ... 9, times any power of ten. There are no
+    /// rungs between 0 and `floor`.
     Rungs { floor: f64, range: NumberRange },
     /// Step by `unit`; a fine step is a tenth of it.
     Units { unit: f64, range: NumberRange },
     /// Step by 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// Step of a component by a twentieth of the power of ten of the largest component.
+    /// Step of a component by 0.05 P, where P is the power of ten just below the largest component.
     Direction,
     /// Geometric step: the magnitude moves along the rungs; the sign stays.
     Factor,
@@ -183,9 +183,9 @@ impl StepRule {
                     ("scale", _) => rungs(0.0),
                     _ if range == NumberRange::SIZE => rungs(0.0),
                     _ if range == NumberRange::COORDINATE => units(step_length(scene)),
-                    // Useful bumps are at most a hundredth of the size of the surface high.
+                    // The height of useful bumps is at most a hundredth of the size of the surface.
                     ("height", _) => units(0.005),
-                    // The blur of 0.001 is the smallest that is visible at the far end of a room.
+                    // The blur of roughness 0.001 is just visible at the far end of a room.
                     ("roughness" | "alpha", _) => rungs(0.001),
                     ("offset", _) => units(0.05),
                     _ if [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range) => {
@@ -244,7 +244,8 @@ impl StepRule {
     }
 }
 
-/// Returns `x + steps * unit`, rounded to a hundredth of a fine step.
+/// Returns `x + steps * unit`, rounded to a power of ten that is at most a hundredth of a fine
+/// step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
@@ -263,7 +264,7 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Returns `x` after doubling or halving it per coarse step, or a change by 1 per fine step.
+/// Returns `x`, doubled or halved for each coarse step, or changed by 1 for each fine step.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
@@ -334,8 +335,8 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
-/// Returns a picture size with about the same aspect ratio. A fine step changes the width by 16
-/// pixels.
+/// Returns the picture size after `count` steps, with about the same aspect ratio. A coarse step
+/// doubles or halves it; a fine step changes the width by 16 pixels.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

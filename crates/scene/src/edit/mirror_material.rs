@@ -9,7 +9,7 @@ use crate::shape::Shape;
 
 /// Returns the name of the material that the mirror commands change: the first of the following.
 ///
-/// - The selected material, or that of the selected object, if it reflects or transmits.
+/// - The selected material or the material of the selected object, if it reflects or transmits.
 /// - The most reflecting material of the selected object and its parts.
 /// - The most reflecting material of the first rectangle that reflects.
 /// - The most reflecting material of all objects and parts.

@@ -57,8 +57,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<KeyValue, EditError> {
     }
 }
 
-/// Returns the index of the word that equals `text`, or else of the only one that starts with it.
-/// Case is ignored.
+/// Returns the index of the word that equals `text`, or else of the only word that starts with it;
+/// `None` if there is no such word. Case is ignored.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -89,7 +89,7 @@ pub(super) fn word<'a>(
     })
 }
 
-/// Returns `text` as a name, if it is printable. `what` is the key in the error.
+/// Returns the name `text`; an error about the key `what` if it is too long or not printable.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";

@@ -14,7 +14,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Returns the keys of which at most one may be given.
+/// Returns the keys of `subject` of which at most one may be given.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
@@ -45,13 +45,14 @@ pub(super) fn part_mut<'a>(
     part.ok_or_else(|| EditError::gone(subject))
 }
 
-/// Returns the given one of the [`exclusive_keys`].
+/// Returns the one of the [`exclusive_keys`] that is given; `None` if none is.
 pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static str> {
     let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
     exclusive_keys(subject).iter().find(is_given).copied()
 }
 
-/// Returns the description of the dotted key `key`; its parts are keys and list indices.
+/// Returns the field of the dotted `key`, which consists of keys and list indices; `None` if there
+/// is no such key.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),

@@ -12,8 +12,8 @@ use glam::{DVec2, DVec3};
 use zerkalo_kernel::primitive::Form;
 
 /// Lowers an object onto the highest surface below its centre and its lowest corners, or raises it
-/// to the lowest surface above. Fails for targets other than objects, for planes, and without such
-/// a surface.
+/// to the lowest surface above if there is none below. Fails for targets other than objects, for
+/// infinite objects, and if there is no surface at all.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
@@ -48,7 +48,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
-    // Later passes remove the gap that rounding leaves after the first.
+    // Later passes remove the gap that rounding leaves after the first pass.
     for _ in 0..3 {
         let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
         lift(dropped, support_height - lowest);
@@ -71,7 +71,7 @@ fn lift(object: &mut Object, by: f64) {
     }
 }
 
-/// Returns the points (x, z) that may be supported: the middle and the lowest corners.
+/// Returns the points (x, z) where an object may be supported: its middle and its lowest corners.
 fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
@@ -136,7 +136,7 @@ fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the highest of `floors` below `at`, or else of the lowest above.
+/// Returns the height of the highest of `floors` below `at`, or else of the lowest one above it.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
@@ -144,7 +144,8 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if the flat object `form` intersects the inside of a box.
+/// Returns `true` if the flat object `form` intersects a diagonal of a box (as every plane through
+/// its inside does), which is shrunk slightly.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);

@@ -66,8 +66,8 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject` in the order of the manual, without those of an object's
-/// material.
+/// Returns the properties of `subject` in the order of the manual, without the properties of an
+/// object's material.
 pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
     let part = part(scene, subject)?;
     let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
@@ -107,6 +107,7 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
     Ok(walk.rows)
 }
 
+/// Collector of the rows of one edit target.
 struct PropertyWalker<'a> {
     scene: &'a Scene,
     subject: &'a Target,
@@ -114,6 +115,7 @@ struct PropertyWalker<'a> {
 }
 
 impl PropertyWalker<'_> {
+    /// Adds the rows of the key `key`, whose value is `node`.
     fn field(&mut self, field: &'static Field, node: &dyn KeyNode, key: String, depth: usize) {
         match field.takes {
             ValueType::Table(inner) if !node.is_absent() => {
@@ -135,6 +137,7 @@ impl PropertyWalker<'_> {
         }
     }
 
+    /// Adds a row for a list of transform steps, then the rows of each step.
     fn steps(
         &mut self,
         field: &'static Field,
@@ -177,6 +180,7 @@ impl PropertyWalker<'_> {
         self.rows.push(row);
     }
 
+    /// Adds the row of a key with a single value.
     fn leaf(&mut self, field: &'static Field, node: &dyn KeyNode, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
         let value = node.value();

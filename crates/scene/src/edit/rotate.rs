@@ -7,12 +7,12 @@ use crate::value::{floor_log10, rotated_y, rounded_to, sin_cos_degrees};
 use crate::{Object, Scene, TransformOp};
 use glam::DVec3;
 
-/// Rotates an object about its own centre, or a light about that of the scene, by `degrees` about
-/// the vertical, counter-clockwise seen from above.
+/// Rotates an object or a light by `degrees` about a vertical axis, counter-clockwise seen from
+/// above. The axis goes through the centre of the object or, for a light, of the scene.
 ///
 /// An object with a transform, or with a shape that has no keys for the rotation, gets a rotation
-/// and a translation at the end of its transform, which later rotations change. Fails for other
-/// targets.
+/// and a translation at the end of its transform; later rotations change these two steps. Fails for
+/// targets other than objects and lights.
 pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("the angle is not a finite number", ""));
@@ -49,8 +49,8 @@ pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, Edi
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Rotates the object by the steps `rotate_y` and `translate` at the end of its transform, which
-/// are replaced. Steps without effect are removed.
+/// Rotates the object by `degrees`: replaces or adds the steps `rotate_y` and `translate` at the
+/// end of its transform. Steps without effect are left out.
 fn rotate_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),

@@ -92,7 +92,7 @@ impl Target {
         part(scene, self).is_ok()
     }
 
-    /// Returns the path in a scene file: keys and list indices, such as `object`, `3`.
+    /// Returns the path of the target in a scene: keys and list indices, such as `object`, `3`.
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
@@ -131,8 +131,8 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns this target if it is a material, or the material of this object. Returns `None` if
-    /// the scene does not have it.
+    /// Returns this target if it is a material, or the material of this object. Returns `None` for
+    /// other targets, and if the scene does not have the material.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         let name = match self {
             Self::Material(name) => name,

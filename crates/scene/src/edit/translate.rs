@@ -9,8 +9,8 @@ use glam::DVec3;
 
 /// Moves an object, a light or a camera by a vector in scene units. An object with a transform, or
 /// without coordinates in its shape, gets a translation as the last step. A directional light is
-/// treated as a lamp that moves by `by` and stays aimed at the origin, from three radii of the
-/// scene. Fails for other targets, and for coordinates out of range.
+/// treated as a lamp, three radii of the scene from the origin, that moves by `by` and stays aimed
+/// at the origin. Fails for other targets, and for coordinates out of range.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("the distance is not a finite number", ""));
@@ -43,7 +43,7 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Returns `at + by`, where changes are rounded to a thousandth of their power of ten.
+/// Returns `at + by`. A coordinate that changes is rounded to about a thousandth of the change.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],

@@ -2,8 +2,8 @@
 
 use crate::Scene;
 
-/// Returns `wanted` if it is free, otherwise with the smallest free number from 2: `cube 2`. A
-/// number at its end is replaced.
+/// Returns `wanted` if this name is free. If not, returns it with the smallest number from 2 that
+/// makes it free: `cube 2`. A number at the end of `wanted` is replaced.
 pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     if !wanted.is_empty() && !taken(wanted) {
         return wanted.to_string();

@@ -1,18 +1,18 @@
 //! Order of the tables in scene files, and comments above removed tables. An empty line below a
-//! comment means that it belongs to the file, not to the table.
+//! comment means that the comment belongs to the file, not to the table below it.
 
 use crate::value::sort_by_number;
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Comments of the file above removed tables.
+/// Comments above removed tables that belong to the file and therefore stay.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// Position of each removed table, and its comment.
+    /// Position of the removed table below each comment, and the text of the comment.
     comments: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
-    /// Records the comments that stay when `item` is removed.
+    /// Records the comments that stay when `item`, with all tables in it, is removed.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -33,8 +33,8 @@ impl CommentKeeper {
         }
     }
 
-    /// Restores each comment above the first table that remains after the removed one, or at the
-    /// end.
+    /// Restores each comment above the first remaining table that comes after the removed one, or
+    /// at the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         sort_by_number(&mut comments, |(position, _)| -*position as i64);
@@ -81,7 +81,7 @@ fn prefix(table: &Table) -> &str {
     table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
 }
 
-/// Splits the text above a table into the comments of the file and those of the table.
+/// Splits the text above a table into the comments of the file and the comments of the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;
@@ -101,8 +101,9 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Lets the file have `tables` in the order of the slice. `from` has their indices before the edit,
-/// `None` for new ones. Nothing changes if the old order is kept and new tables come last.
+/// Sets the positions of `tables` so that the file has them in the order of the slice. `from` has
+/// the index of each table before the edit, `None` for a new table. Nothing changes if the old
+/// order is kept and new tables come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);

@@ -4,7 +4,8 @@ use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, InlineTable, Item, Table};
 
-/// Returns the item for a new `value`. Tables may have `[headers]` if `headers` is `true`.
+/// Returns the TOML item for a new `value` of the type `takes`. Tables may have `[headers]` if
+/// `headers` is `true`; if it is `false`, they are inline.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     let item = |table: Table| match headers {
         true => Item::Table(table),
@@ -40,13 +41,13 @@ fn inline_list(fields: &'static [Field], list: &[Value]) -> Item {
     Item::Value(toml_edit::Value::Array(entries.collect::<Array>()))
 }
 
-/// Returns a colour as a list, or as `#rrggbb` if that is exact and the numbers are not whole.
+/// Returns a colour as a list, or as `#rrggbb` if that is exact and not all numbers are whole.
 fn color_leaf(value: &Value) -> toml_edit::Value {
     let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
     code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
 }
 
-/// Returns a value of three numbers as a colour.
+/// Converts a list of three numbers to a colour; `None` for other values.
 pub(crate) fn color(value: &Value) -> Option<Color> {
     let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
     channels.try_into().ok().map(Color)
@@ -84,7 +85,7 @@ fn is_default(field: &Field, value: &Value) -> bool {
     }
 }
 
-/// Returns `value`, which is not a table, in the layout `[1.0, 2.0]`.
+/// Converts `value` to an inline value, in the layout `[1.0, 2.0]`.
 pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     match value {
         Value::String(text) => text.as_str().into(),
@@ -103,7 +104,8 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// Returns the shortest digits that are read back exactly, with an exponent if it saves zeros.
+/// Converts a number to the shortest digits that are read back exactly, with an exponent if this
+/// saves zeros.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

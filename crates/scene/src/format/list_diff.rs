@@ -10,7 +10,8 @@ use toml::Value;
 ///
 /// - an old entry of the same name,
 /// - an old entry that is equal,
-/// - the first old entry, between the origins of the neighbours, that differs only in the name, or
+/// - the first old entry, between the origins of the neighbours, that differs only in the name or,
+/// like the new entry,
 ///   that has no name either.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let all = 0..old.len();
@@ -20,7 +21,7 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     for (origin, entry) in from.iter_mut().zip(&new).filter(|(origin, _)| origin.is_none()) {
         *origin = free.take(&[entry.nameless_content()], &all);
     }
-    // Origin of the first later entry that has one, or the length of `old`.
+    // For each entry, the origin of the first later entry that has one, or the length of `old`.
     let mut next = vec![old.len(); new.len()];
     for j in (1..new.len()).rev() {
         next[j - 1] = from[j].unwrap_or(next[j]);
@@ -41,7 +42,7 @@ struct Entry {
     content: u64,
 }
 
-/// Property by which an origin is found.
+/// Property that an entry and its origin have in common.
 #[derive(PartialEq, Eq, Hash)]
 enum Property {
     Name(String),
@@ -99,7 +100,8 @@ impl Free {
         Self { entries, indices }
     }
 
-    /// Takes the first old entry in `range` that has one of the properties.
+    /// Takes the first old entry in `range` that has one of the properties `wanted`, and returns
+    /// its index; `None` if there is none.
     fn take(&mut self, wanted: &[Option<Property>], range: &Range<usize>) -> Option<usize> {
         let sets = wanted.iter().flatten().filter_map(|property| self.indices.get(property));
         let first = sets.filter_map(|set| set.range(range.clone()).next().copied()).min()?;

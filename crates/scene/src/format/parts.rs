@@ -41,7 +41,8 @@ impl Part {
         }
     }
 
-    /// Returns the index of this part's first entry of the list at `path` in the whole file.
+    /// Returns the index, in the whole file, of the first entry that this part has of the list at
+    /// `path`.
     pub fn first_index(&self, path: &[String]) -> usize {
         match path {
             [list] if list == "object" => self.first_object,
@@ -61,9 +62,10 @@ impl Part {
     }
 }
 
-/// Divides a file into parts: everything except the objects, then consecutive objects of at least
-/// `part_bytes` bytes. A file has a single part if it is short, if a table of an object follows a
-/// section of another kind, or if a line may only look like the beginning of a section.
+/// Divides a file into parts. The first has everything except the objects. Each of the others has
+/// consecutive objects, up to the one with which it reaches `part_bytes` bytes. A file has a single
+/// part if it is short, if it has no objects, if a table of an object follows a section of another
+/// kind, or if a line may only look like the beginning of a section.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text).unwrap_or_default();
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();

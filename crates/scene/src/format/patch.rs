@@ -73,7 +73,8 @@ fn patch_table(
             _ => {}
         }
     }
-    // A new key takes over the comments of a single removed one, such as the kind of a shape.
+    // If a single key is removed, the first new key takes over its comments, as when the kind of a
+    // shape changes.
     let successor = added.first().filter(|_| removed.len() == 1);
     for key in removed {
         let decor = table.key(&key).map(|k| k.leaf_decor().clone());
@@ -99,6 +100,7 @@ fn patch_table(
     }
 }
 
+/// Changes `item`, which describes a value `old` of the type `takes`, to describe `new`.
 fn patch_item(
     keeper: &mut CommentKeeper,
     item: &mut Item,
@@ -129,6 +131,8 @@ fn patch_item(
     }
 }
 
+/// Changes the list of tables `item`, which describes `old`, to describe `new`. The entries that
+/// remain keep their text and comments.
 fn patch_list(
     keeper: &mut CommentKeeper,
     item: &mut Item,
@@ -189,8 +193,8 @@ fn patch_list(
     }
 }
 
-/// Renames the inner tables of `table` that have equal values under a name only in `old` and one
-/// only in `new`. Returns `old` with the new names.
+/// Renames the inner tables of `table` whose value has one name only in `old` and another name only
+/// in `new`, so that their text is kept. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -211,7 +215,8 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes and returns the comment after the last comma of `list`, if an entry follows.
+/// Removes the comment after the last comma of `list` and returns it. Returns an empty string, and
+/// removes nothing, if there is none or `followed` is `false`.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {
@@ -233,7 +238,8 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// Replaces the value of `item`, which is not a table; in a list, only the numbers that differ.
+/// Replaces the value of `item`, which is not a table. In a list of unchanged length, it replaces
+/// only the numbers that differ.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
         *item = Item::Value(leaf(new));

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use toml::de::DeTable;
 use toml::{Table, Value};
 
-/// Size of the largest scene file [bytes]: about four million objects.
+/// Largest size of a scene file [bytes], which suffices for about four million objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 /// Estimated peak memory per byte of a scene file, while its objects are converted for rendering. A
@@ -28,8 +28,8 @@ impl Scene {
         Document::read(path, Arc::default()).map(Document::into_scene)
     }
 
-    /// Parses and validates a scene. `name` is the file name in diagnostics, to whose folder file
-    /// names are relative. Returns the errors of [`Scene::read`].
+    /// Parses and validates a scene. `name` is the file name in diagnostics. The file names in the
+    /// scene are relative to its folder. Returns the same errors as [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
@@ -67,7 +67,8 @@ impl<'a> SourceScene<'a> {
     ) -> Result<Self, SceneErrors> {
         let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
-            // The other objects belong to the same list: the file is parsed again as a whole.
+            // Objects outside `[[object]]` sections belong to the same list: the file is parsed
+            // again as a whole.
             return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
@@ -82,8 +83,8 @@ impl<'a> SourceScene<'a> {
         Err(SceneErrors::new(errors.located((name, text))))
     }
 
-    /// Reads the parts and checks keys and types. Returns `false` if the file has objects outside
-    /// `[[object]]` sections and must be read as a whole.
+    /// Reads the parts and checks keys and types. Returns `true` if all parts were read, `false` if
+    /// the file has objects outside `[[object]]` sections and must be read as a whole.
     fn read_parts(&mut self) -> Result<bool, SceneErrors> {
         let (name, text) = (self.name, self.text);
         let mut errors = FirstDiagnostics::default();
@@ -190,7 +191,8 @@ pub(crate) fn read_text(
         return Err(fail(&format!("the scene {missing}"), help));
     }
     let mut bytes = Vec::new();
-    // The byte above the limit shows that a file is too large, or an endless device.
+    // Up to one byte above the limit is read, to notice a file that is too large or an endless
+    // device.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(

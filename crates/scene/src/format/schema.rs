@@ -63,7 +63,8 @@ const fn optional(
 }
 
 /// Reads `root`, the parsed `part` of the file, into `node`, which has default values and the type
-/// `takes`. Adds its schema errors; a node with an error keeps its default value.
+/// `takes`. Adds the schema errors of `root` to `errors`. A node whose value has an error keeps its
+/// default.
 pub(crate) fn read(
     root: &Spanned<DeTable>,
     takes: ValueType,
@@ -98,6 +99,7 @@ fn phrase(keys: &[String]) -> String {
     }
 }
 
+/// Reader of one part of a scene file. `path` leads to the value that it is reading.
 struct SchemaReader<'a> {
     part: &'a Part,
     root: &'a DeTable<'a>,
@@ -125,7 +127,7 @@ impl SchemaReader<'_> {
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
-    /// Returns ` in ` with [`Self::inner`], unless it is empty.
+    /// Returns ` in ` followed by [`Self::inner`]; an empty string if that is empty.
     fn place(&self) -> String {
         match self.inner() {
             inner if inner.is_empty() => inner,
@@ -145,7 +147,8 @@ impl SchemaReader<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key, and returns the most similar name in `fields`.
+    /// Adds an error about an unknown key, and returns the name in `fields` that was probably
+    /// meant; `None` if none is similar.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -161,6 +164,7 @@ impl SchemaReader<'_> {
         nearest(key.get_ref(), known())
     }
 
+    /// Reads a table with the keys `fields`, whose byte range is `span`, into `node`.
     fn table(
         &mut self,
         table: &DeTable,
@@ -184,6 +188,7 @@ impl SchemaReader<'_> {
         }
     }
 
+    /// Reads a table that must have exactly one of the keys `fields` into `node`.
     fn one_of(
         &mut self,
         table: &DeTable,
@@ -234,12 +239,13 @@ impl SchemaReader<'_> {
                 );
                 self.add(span, "the light has no kind".to_string(), help);
             }
-            // Without a kind, an unknown key may be a mistyped one, which has an error already.
+            // If no kind is given, an unknown key may be a mistyped kind, and it has an error
+            // already.
             [_] | [] => {}
         }
     }
 
-    /// Reads the value of a key into the child of `parent`.
+    /// Reads `value`, the value of the key `field`, into the child of `parent` for this key.
     fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>, parent: &mut dyn KeyNode) {
         if let Some(node) = parent.make_child(field.name) {
             self.path.push(field.name.to_string());
@@ -248,7 +254,8 @@ impl SchemaReader<'_> {
         }
     }
 
-    /// Reads an entry of a list, or a named table. It is a table of the type `takes`.
+    /// Reads a table of the type `takes`, an entry of a list or a named table, into the child `key`
+    /// of `list`.
     fn entry(
         &mut self,
         key: String,
@@ -281,6 +288,7 @@ impl SchemaReader<'_> {
         }
     }
 
+    /// Reads the value `spanned` of the key `field` into `node`.
     fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>, node: &mut dyn KeyNode) {
         let (value, span) = (spanned.get_ref(), spanned.span());
         match (field.takes, value) {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Returns line and column of the byte offset `at`, counted from 1 in characters.
+/// Returns the line and the column [characters] of the byte offset `at`, both counted from 1.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     LineCounter::new(text).line_column(at)
 }
@@ -41,7 +41,8 @@ impl<'a> LineCounter<'a> {
     }
 }
 
-/// Returns the byte range of the value at `path`, or of its nearest ancestor.
+/// Returns the byte range of the value at `path`, or of its nearest ancestor that is in `root`;
+/// `0..0` if there is none.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let mut keys = path.iter();
     let Some(mut value) = keys.next().and_then(|key| root.get(key.as_str())) else { return 0..0 };
@@ -57,7 +58,8 @@ fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     value.span()
 }
 
-/// Adds diagnostics for `problems`. The parts that contain them are parsed again.
+/// Adds diagnostics for `problems` to `found`. The parts of the file in which the problems are, are
+/// parsed again to locate them.
 pub(crate) fn locate(
     text: &str,
     parts: &[Part],
@@ -92,8 +94,8 @@ pub(crate) fn locate(
     }
 }
 
-/// Returns the name of the table at `path` in diagnostics. `root` is a part of the file, whose
-/// objects begin with `first_object`.
+/// Returns the name that diagnostics use for the table at `path`. `root` is a parsed part of the
+/// file; the index of its first object is `first_object`.
 pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
     subject(path, |list, index| {
         let index = if list == "object" { index.checked_sub(first_object)? } else { index };

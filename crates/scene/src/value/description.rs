@@ -3,8 +3,8 @@
 
 use crate::value::{Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, ValueType};
 
-/// Table of a scene file: the keys that it has and the checks of their values. Its `Default` has the
-/// declared defaults; required keys are 0, empty, or of the first kind.
+/// Table of a scene file: the keys that it has and the checks of their values. In its `Default`,
+/// keys have their declared defaults; required keys are 0, empty, or of the first kind.
 pub trait Description: KeyNode + Default {
     /// Help text of the table, for the dashboard and the documentation.
     const DOC: &'static str;
@@ -16,7 +16,7 @@ pub trait Description: KeyNode + Default {
 
 /// Rust type to which the values of keys in scene files are converted.
 pub trait FieldValue: KeyNode + Default {
-    /// Type of the values in scene files, without the range of a declaration.
+    /// Type of the values in scene files. A declaration may give it a narrower range.
     const TYPE: ValueType;
 
     /// Returns the validation errors of the value. Their keys begin with `field.name`.
@@ -28,7 +28,7 @@ pub trait FieldValue: KeyNode + Default {
     }
 }
 
-/// Conversion of a default in a declaration, such as `[f64; 3]` for a colour.
+/// Conversion of a default from the type that declarations write, such as `[f64; 3]` for a colour.
 pub trait FromWritten<W> {
     /// Converts a default. Panics if the declaration is wrong.
     fn from_written(written: W) -> Self;
@@ -57,7 +57,7 @@ pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements the traits of values for types by their conversions to and from [`KeyValue`].
+/// Implements `FieldValue` and `KeyNode` for types by their conversions to and from [`KeyValue`].
 macro_rules! single_value {
     ($(
         $type:ty: $value_type:expr, $to:expr, $from:expr
@@ -313,8 +313,8 @@ macro_rules! description {
 }
 pub(crate) use description;
 
-/// Defines `child` and `child_mut` of a struct by the field of each key. The other keys are those of
-/// the field after the semicolon.
+/// Defines `child` and `child_mut` of a struct, given the field of each key. All other keys are
+/// looked up in the field after the semicolon, if there is one.
 macro_rules! children {
     ($($key:pat => $field:ident),+ $(; $flat:ident: $flat_type:ty)?) => {
         fn child(&self, key: &str) -> Option<&dyn $crate::value::KeyNode> {

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-/// Largest component below which a vector is scaled up, because squares could underflow. Above the
-/// reciprocal it is scaled down.
+/// Magnitude of a vector's largest component below which the vector is scaled up, because squares
+/// could underflow. Above the reciprocal of this magnitude it is scaled down.
 const MIN_EXACT: f64 = 1e-100;
 
 /// Scale factor, a power of two (2^600), so that scaling is exact.

@@ -133,13 +133,13 @@ impl ValueType {
         }
     }
 
-    /// Returns `other`, which a declaration gives instead of the type of the Rust type.
+    /// Returns `other`, the value type that a declaration gives instead of that of its Rust type.
     pub(crate) const fn replaced(self, other: Self) -> Self {
         other
     }
 }
 
-/// Returns the fields `own` with the fields `inner` after the first `position` of them.
+/// Returns the fields `own`, with the fields `inner` inserted after the first `position` of `own`.
 pub(crate) const fn inserted<const N: usize>(
     own: &[Field],
     inner: &[Field],

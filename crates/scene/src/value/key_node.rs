@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// Value of a key as edits read and write it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyValue {
-    /// One number, or those of a list or a colour.
+    /// One number, or the numbers of a list or a colour.
     Numbers(Vec<f64>),
     /// Switch: `true` or `false`.
     Switch(bool),
@@ -45,7 +45,8 @@ pub trait KeyNode {
         None
     }
 
-    /// Sets the value, without a check of ranges. Returns `false` if the node cannot have it.
+    /// Sets the value, without a check of ranges. Returns `true` if it was set, `false` if the node
+    /// cannot have a value of this type.
     fn set_value(&mut self, _: KeyValue) -> bool {
         false
     }
@@ -58,7 +59,8 @@ pub trait KeyNode {
     /// Makes an optional value absent.
     fn make_absent(&mut self) {}
 
-    /// Returns the node of `key`: a key of a table, the kind of a value, or an index from 0.
+    /// Returns the child node `key`: a key of a table, the kind of a value, or an index from 0.
+    /// Returns `None` if there is none.
     fn child(&self, _key: &str) -> Option<&dyn KeyNode> {
         None
     }
@@ -68,8 +70,8 @@ pub trait KeyNode {
         None
     }
 
-    /// Returns [`KeyNode::child_mut`], which is created if it does not exist: the kind `key`, a new
-    /// entry of a list, or a table with this name.
+    /// Returns the child node `key` as a mutable reference. If it does not exist, it is created:
+    /// the kind `key`, a new entry at the end of a list, or a table with this name.
     fn make_child(&mut self, key: &str) -> Option<&mut dyn KeyNode> {
         self.child_mut(key)
     }
@@ -79,7 +81,7 @@ pub trait KeyNode {
         Validator::new(&[])
     }
 
-    /// Returns the names of named tables.
+    /// Returns the names of the tables in a map of named tables; nothing for other nodes.
     fn names(&self) -> Vec<&str> {
         Vec::new()
     }
@@ -167,7 +169,7 @@ impl<T: KeyNode + Default> KeyNode for BTreeMap<String, T> {
     }
 }
 
-/// Returns the node at the dotted `path` below `root`.
+/// Returns the node at the dotted `path` below `root`; `None` if there is none.
 pub fn node_at<'a>(root: &'a dyn KeyNode, path: &str) -> Option<&'a dyn KeyNode> {
     path.split('.').try_fold(root, |node, key| node.child(key))
 }

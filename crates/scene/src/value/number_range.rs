@@ -29,7 +29,7 @@ impl NumberRange {
     /// Range of fractions: from 0 to 1.
     pub const SHARE: Self = Self::closed(0.0, 1.0);
 
-    /// Coefficients and channels of surface colours, which may exceed 1.
+    /// Range of coefficients and of channels of surface colours: from 0 to 1e6.
     pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
     /// Range of amounts of light, such as radiance: from 0 to 1e15.
     pub const LIGHT: Self = Self::closed(0.0, 1e15);
@@ -79,7 +79,8 @@ impl fmt::Display for NumberRange {
     }
 }
 
-/// Formats a number in short form: `0.5`, `-3`, `NaN`, below 1e-4 and from 1e6 on `1e9`.
+/// Formats a number in short form, such as `0.5`, `-3` or `NaN`. It has an exponent, as in `1e9`,
+/// if its magnitude is below 1e-4 or at least 1e6.
 pub fn number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-4..1e6).contains(&x.abs());
     if plain { format!("{x}") } else { format!("{x:e}") }

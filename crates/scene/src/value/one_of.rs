@@ -15,7 +15,8 @@
 /// }
 /// ```
 ///
-/// The short form implements only the access by key, for an enum whose variants are tables.
+/// The short form, without types, implements only the access by key, for an enum that [`kinds!`]
+/// declares.
 macro_rules! one_of {
     (
         $(#[$attribute:meta])+
@@ -49,7 +50,8 @@ macro_rules! one_of {
                 ),
             )+];
 
-            /// Returns the validation errors of the value, with the key of the variant.
+            /// Returns the validation errors of the value. Their keys begin with the key of the
+            /// variant.
             pub fn faults(&self) -> Vec<$crate::value::ValidationError> {
                 let checks = $crate::value::Validator::new(Self::FIELDS);
                 match self {
@@ -127,9 +129,9 @@ macro_rules! one_of {
 }
 pub(crate) use one_of;
 
-/// Declares an enum of descriptions, each with its key in scene files. It dereferences to the trait
-/// that all of them implement, which has the method `faults`. The help text of a key is that of the
-/// description.
+/// Declares an enum whose variants are descriptions, each with its key in scene files. The enum
+/// dereferences to the trait after the colon, which all the descriptions implement and which has
+/// the method `faults`. The help text of a key is that of its description.
 ///
 /// ```ignore
 /// kinds! {
@@ -172,7 +174,8 @@ macro_rules! kinds {
         )+];
 
         impl $name {
-            /// Every kind, with its key, its fields and its help text. Exactly one is given.
+            /// Every kind, with its key, its fields and its help text. Scene files give exactly one
+            /// of them.
             pub const FIELDS: &[$crate::value::Field] = &KIND_TABLE;
 
             /// Keys of all kinds.

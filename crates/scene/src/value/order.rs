@@ -1,5 +1,5 @@
-//! Stable sorting of numbers with little machine code: those of the standard library are compiled
-//! for each type, into 8 KB each.
+//! Stable sorting of numbers with little machine code. The sorting functions of the standard
+//! library are compiled for each type of items, into 8 KB each.
 
 /// Sorts `items` by ascending keys. Items with equal keys keep their order.
 pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
@@ -8,7 +8,8 @@ pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
     items.extend(order.into_iter().filter_map(|i| unsorted[i].take()));
 }
 
-/// Returns the indices of `keys` in ascending order; those of equal keys are ascending.
+/// Returns the indices of `keys`, ordered by ascending keys. Indices of equal keys are in ascending
+/// order.
 pub fn ascending(keys: Vec<i64>) -> Vec<usize> {
     let mut order: Vec<(i64, usize)> = keys.into_iter().zip(0..).collect();
     order.sort_unstable();

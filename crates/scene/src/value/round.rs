@@ -1,6 +1,7 @@
 //! Rounding of computed numbers to short decimals.
 
-/// Rounds `x` to the number nearest to a multiple of 10^`exponent`, never `-0`.
+/// Rounds `x` to a multiple of 10^`exponent`, as exactly as a double can represent it, but never
+/// `-0`. Infinities and NaN are returned as they are.
 pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     if !x.is_finite() {
         return x;
@@ -20,7 +21,8 @@ pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
-/// Returns the exponent of the largest power of ten up to |`x`|; 0 if `x` is 0 or not finite.
+/// Returns the exponent of the largest power of ten that is at most |`x`|; 0 if `x` is 0 or not
+/// finite.
 pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
@@ -29,13 +31,13 @@ pub fn floor_log10(x: f64) -> i32 {
     format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// Rounds `x` to a multiple of 10^-4 of the power of ten of `scale`, the size of the object or
-/// scene.
+/// Rounds `x` to a multiple of 10^-4 P, where P is the largest power of ten that is at most
+/// `scale`, the size of the object or scene.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }
 
-/// Rounds `x` to a multiple of a power of ten, which is about a millionth of `scale`.
+/// Rounds `x` like [`round_nice`], but to a multiple of 10^-6 P.
 pub fn round_fine(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 6)
 }

@@ -59,7 +59,8 @@ fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// Returns the table, list or value of the type `takes` at `node`. Absent keys are left out.
+/// Converts `node`, whose type is `takes`, to a TOML table, list or value. Optional keys that are
+/// absent are left out.
 pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     let list = |entry: ValueType| {
         let entries = (0..).map_while(|i: usize| node.child(&i.to_string()));
@@ -87,6 +88,7 @@ pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     }
 }
 
+/// Converts a single value of the type `takes` to TOML; `None` becomes an empty table.
 fn write_value(takes: ValueType, value: Option<KeyValue>) -> Value {
     let one = |x: f64| match takes {
         ValueType::Whole(_) | ValueType::Wholes(..) => Value::Integer(x as i64),

@@ -26,8 +26,8 @@ impl ValidationError {
         self
     }
 
-    /// Returns the error with `outer.` before its key, and before its phrase if the key is not in an
-    /// inner table: `focus.distance is -1`.
+    /// Returns the error with `outer.` before its key. Unless this key is in an inner table,
+    /// `outer.` is also put before the phrase, as in `focus.distance is -1`.
     pub fn inside(mut self, outer: &str) -> Self {
         if !self.key.contains('.') {
             self.found = format!("{outer}.{}", self.found);
@@ -65,8 +65,8 @@ impl Validator {
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
-    /// Checks by [`Validator::ratio`] the values of `table` whose ranges are those of sizes and of
-    /// coordinates.
+    /// Applies the check of [`Validator::ratio`] to the numbers of `table` with the range
+    /// [`NumberRange::SIZE`] or [`NumberRange::COORDINATE`].
     pub fn lengths(self, table: &(impl KeyNode + ?Sized)) -> Self {
         let (mut sizes, mut coordinates) = (Vec::new(), Vec::new());
         for field in self.fields {
@@ -112,7 +112,7 @@ impl Validator {
         self
     }
 
-    /// Adds the validation errors of `value`, whose keys are keys of this table.
+    /// Adds the validation errors of `value`: a table whose keys stand directly in this table.
     pub fn flattened(mut self, value: &impl FieldValue) -> Self {
         self.errors.extend(value.errors(&Field::required("", ValueType::Text, "", "")));
         self

@@ -33,9 +33,10 @@ pub struct Builder<'a> {
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
-    /// Index of the colour of each triangle; 0 for those before the first call of
-    /// [`Builder::color`].
+    /// Index in `colors` of the colour of each triangle; 0 for triangles added before the first
+    /// call of [`Builder::color`].
     color_of: Vec<u16>,
+    /// Index in `colors` of the colour of the triangles added next.
     color: u16,
     notes: Vec<String>,
 }
@@ -84,7 +85,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Records a note for the user about a part of the file that was omitted or replaced.
+    /// Records a note for the user about a part of the file that was omitted or replaced. A note
+    /// that is recorded again is ignored.
     pub fn note(&mut self, note: String) {
         if !self.notes.contains(&note) {
             self.notes.push(note);

@@ -161,8 +161,8 @@ fn buffers<'a>(
     Ok(all)
 }
 
-/// Returns the corners of each triangle of a list, strip or fan with `corners` corners, in the other
-/// sense of rotation if the part is `mirrored`.
+/// Returns the triangles of a list, strip or fan with `corners` corners, each as the indices of its
+/// three corners. The sense of rotation is reversed if the part is `mirrored`.
 fn faces(mode: Mode, corners: usize, mirrored: bool) -> impl ExactSizeIterator<Item = [usize; 3]> {
     let count = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
     (0..count).map(move |i| {
@@ -185,6 +185,8 @@ struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
+    /// Adds vertices, colour and triangles of this part to `builder`. Points and lines are left
+    /// out.
     fn add(&self, builder: &mut Builder) -> Result<(), AssetError> {
         let mode = self.primitive.mode();
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
@@ -244,6 +246,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
+    /// Makes the base colour of this part the colour of the triangles that are added next.
     fn add_color(&self, builder: &mut Builder) -> Result<(), AssetError> {
         let [r, g, b, _] = self.primitive.material().pbr_metallic_roughness().base_color_factor();
         if ![r, g, b].iter().all(|x| (0.0..=1e6).contains(x)) {
@@ -304,8 +307,8 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside the accessor's
-/// buffer.
+/// Elements of a glTF accessor: `count` of `size` bytes each, which begin every `stride` bytes.
+/// [`Part::slice`] has checked that they are inside the accessor's buffer.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
     bytes: &'a [u8],

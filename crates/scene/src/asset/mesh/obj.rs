@@ -41,6 +41,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
 /// Indices of the position, the texture coordinates and the normal of a vertex.
 type Corner = (usize, Option<usize>, Option<usize>);
 
+/// Parser of one OBJ file, with what it has read so far.
 struct Parser<'a> {
     source: &'a FileContents,
     /// Number of the present line, counted from 1.
@@ -49,17 +50,18 @@ struct Parser<'a> {
     positions: Vec<[f64; 3]>,
     uvs: Vec<[f64; 2]>,
     normals: Vec<[f64; 3]>,
-    /// Vertices of the present object, group and material.
+    /// Index in the mesh of each vertex of the present object, group and material.
     vertices: HashMap<Corner, u32>,
     /// MTL files that have been read.
     libraries: Vec<PathBuf>,
     /// Diffuse colours of the materials, by name.
     colors: HashMap<String, [f32; 3]>,
-    /// Name of the present material, if its MTL file has been read.
+    /// Name of the present material; `None` if no MTL file that has been read defines it.
     material: Option<String>,
 }
 
 impl Parser<'_> {
+    /// Parses a line and adds its content. Lines with unknown keywords are ignored.
     fn parse_line(&mut self, line: &str) -> Result<(), AssetError> {
         let (keyword, rest) = keyword(line);
         match keyword {
@@ -124,8 +126,9 @@ impl Parser<'_> {
         self.builder.polygon(&corners, || FileLocation::Line(self.line))
     }
 
-    /// Parses the index of one of the `count` entries so far: from 1, or from -1 backwards. Returns
-    /// `None` if `word` is empty, or if there are none of these entries.
+    /// Parses the index of one of the `count` entries of the kind `what` so far: from 1, or from -1
+    /// backwards. Returns the index from 0. Returns `None` if `word` is empty, or if there are no
+    /// texture coordinates or normals to which it could refer.
     fn index(&self, word: &str, what: &str, count: usize) -> Result<Option<usize>, AssetError> {
         if word.is_empty() || count == 0 && what != "vertex" {
             return Ok(None);
@@ -142,7 +145,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Returns the index of a vertex of the mesh, which is added if it is new.
+    /// Returns the index of the vertex `corner` in the mesh. Adds the vertex if it is new.
     fn vertex(&mut self, corner: Corner) -> u32 {
         *self.vertices.entry(corner).or_insert_with(|| {
             let (position, uv, normal) = corner;
@@ -152,8 +155,8 @@ impl Parser<'_> {
         })
     }
 
-    /// Reads the diffuse colours of the MTL file `name`. If the file cannot be read, this is noted.
-    /// Fails if the name leads out of the folder.
+    /// Reads the diffuse colours of the MTL file `name`. Records a note if the file cannot be read.
+    /// Fails if the name could lead out of the folder of the OBJ file.
     fn read_library(&mut self, name: &str) -> Result<(), AssetError> {
         let Some(path) = self.source.resolve_relative(name) else {
             return Err(self.error(
@@ -172,6 +175,7 @@ impl Parser<'_> {
         Ok(())
     }
 
+    /// Adds the diffuse colours (`Kd`) in the MTL text `library`. Invalid colours are ignored.
     fn add_colors(&mut self, library: &str) {
         let mut name = "";
         for line in library.lines() {
@@ -201,14 +205,14 @@ fn keyword(line: &str) -> (&str, &str) {
     (keyword, rest.trim())
 }
 
-/// Parses the first `N` words as numbers.
+/// Parses the first `N` words as numbers; `None` if there are fewer words or one is not a number.
 fn numbers<const N: usize>(words: &str) -> Option<[f64; N]> {
     let numbers = words.split_whitespace().take(N).map(|word| word.parse().ok());
     numbers.collect::<Option<Vec<_>>>()?.try_into().ok()
 }
 
-/// Parses three coordinates, which are divided by the weight of the vertex if one follows. Further
-/// numbers are a colour, which is ignored.
+/// Parses three coordinates. If exactly one more number follows, it is the weight of the vertex, by
+/// which they are divided. If several follow, they are a colour, which is ignored.
 fn position(words: &str) -> Option<[f64; 3]> {
     let position: [f64; 3] = numbers(words)?;
     let weight = match words.split_whitespace().count() {

@@ -42,11 +42,12 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
 struct Parser<'a> {
     source: &'a FileContents,
     builder: Builder<'a>,
-    /// Vertices by the bits of their coordinates.
+    /// Index in the mesh of each vertex, by the bits of its coordinates.
     known: HashMap<[u32; 3], u32>,
 }
 
 impl Parser<'_> {
+    /// Adds the triangles of an ASCII file. Normals and names are ignored.
     fn parse_text(&mut self) -> Result<(), AssetError> {
         let mut corners: Vec<[f32; 3]> = Vec::new();
         for (line, number) in self.source.bytes.split(|byte| *byte == b'\n').zip(1..) {
@@ -91,6 +92,7 @@ impl Parser<'_> {
         Ok(())
     }
 
+    /// Adds a triangle. A corner becomes the vertex with its position, or a new vertex.
     fn add(
         &mut self,
         corners: [[f32; 3]; 3],
