@@ -64,9 +64,9 @@ impl Camera {
     }
 
     /// Returns the distance of the plane in focus from the eye along the view direction, greater
-    /// than 0. Without `focus` it is that of the target. A point behind the eye counts as in front
-    /// of it. The result is at least a millionth of the lens radius and of the distance of the
-    /// point.
+    /// than 0. Without `focus`, the plane goes through the target. A point behind the eye counts as
+    /// in front of it. The result is at least a millionth of the lens radius and of the distance of
+    /// the point.
     pub fn focus_depth(&self) -> f64 {
         let point = match (self.focus, self.target) {
             (Some(Focus::Distance(distance)), _) => Err(distance),

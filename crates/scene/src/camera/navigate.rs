@@ -46,7 +46,7 @@ impl Camera {
         self.placed(pivot - forward * distance, forward, distance)
     }
 
-    /// Moves across the view direction by fractions of the distance to the pivot.
+    /// Moves the eye and the target to the right and up, by fractions of the distance to the pivot.
     pub fn pan(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         let [x, y, _] = self.frame();
@@ -145,7 +145,8 @@ impl Camera {
         if distance > 0.0 && distance.is_finite() { distance } else { 1.0 }
     }
 
-    /// Returns the rotated view direction; `None` if an angle is not finite.
+    /// Returns the view direction, rotated by `right` and `up` degrees; `None` if one is not
+    /// finite.
     fn rotated(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;
@@ -168,7 +169,7 @@ impl Camera {
         self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    /// Returns [`Camera::placed`] without a check that it is valid.
+    /// Returns the camera of [`Camera::placed`] without a check that it is valid.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| round_fine(x, distance)).to_array();

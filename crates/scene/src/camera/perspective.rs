@@ -17,7 +17,7 @@ pub struct PerspectiveCamera {
     /// Vectors to the next pixel to the right and below, on the picture plane at unit distance.
     dx_axis: DVec3,
     dy_axis: DVec3,
-    /// Vector from the eye to the picture's upper left corner, on that plane.
+    /// Vector from the eye to the picture's upper left corner, on the picture plane.
     raster_corner: DVec3,
     near: f64,
     /// Thin lens of the camera; `None` for a pinhole.
@@ -139,12 +139,13 @@ impl PerspectiveCamera {
         Ray { origin, direction: direction.normalize() }
     }
 
-    /// Returns the rays through the points `(x, y)` of the lens, in the unit disk, to the right and
-    /// upward. The other arguments are those of [`PerspectiveCamera::rays`].
+    /// Returns the rays through points of the lens, whose coordinates `(x, y)`, to the right and
+    /// upward, are in the unit disk. `base` and `(dx, dy)` are as for [`PerspectiveCamera::rays`].
     ///
     /// The ray starts at eye + o, where o is the vector to the point of the lens, in the direction
-    /// d - o / f. It crosses the ray through the eye in the plane in focus (Cook, Porter and
-    /// Carpenter 1984, *Distributed Ray Tracing*, section 4.2).
+    /// d - o / f. Here d is the direction through the eye, with a component of 1 along the view,
+    /// and f is the distance of the plane in focus. The ray crosses the ray through the eye in the
+    /// plane in focus (Cook, Porter and Carpenter 1984, *Distributed Ray Tracing*, section 4.2).
     #[inline(never)]
     pub fn lens_rays<L: SimdFloat>(
         &self,

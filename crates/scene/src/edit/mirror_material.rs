@@ -13,8 +13,8 @@ use crate::shape::Shape;
 /// - The most reflecting material of the selected object and its parts.
 /// - The most reflecting material of the first rectangle that reflects.
 /// - The most reflecting material of all objects and parts.
-/// - The selected material, or that of the first rectangle, so that a reflection can be increased
-///   from 0.
+/// - The selected material, or the material of the first rectangle, so that a reflection can be
+///   increased from 0.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| {

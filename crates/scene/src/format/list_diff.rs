@@ -11,8 +11,7 @@ use toml::Value;
 /// - an old entry of the same name,
 /// - an old entry that is equal,
 /// - the first old entry, between the origins of the neighbours, that differs only in the name or,
-/// like the new entry,
-///   that has no name either.
+///   like the new entry, has no name.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let all = 0..old.len();
     let mut free = Free::of(old);

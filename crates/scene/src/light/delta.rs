@@ -9,15 +9,15 @@ use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 pub enum DeltaLight<S> {
     /// Point or spot light.
     Point {
-        /// Relative to the scene's centre.
+        /// Position relative to the scene's centre.
         position: [S; 3],
         /// `true` if the irradiance at normal incidence is 1 / d^2 at the distance d; `false` if it
         /// is pi at every distance, so that a white diffuse surface has the radiance 1.
         inverse_square: bool,
-        /// `None` for a point light.
+        /// Cone of a spot light; `None` for a point light.
         cone: Option<SpotCone<S>>,
     },
-    /// The irradiance at normal incidence is pi.
+    /// Directional light, whose irradiance at normal incidence is pi.
     Directional {
         /// Unit vector towards the distant light.
         wi: [S; 3],
@@ -25,7 +25,7 @@ pub enum DeltaLight<S> {
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Returns the position of a point or spot light.
+    /// Returns the position of a point or spot light; `None` for a directional light.
     pub fn position(&self) -> Option<DVec3> {
         match self {
             Self::Point { position, .. } => Some(DVec3::from(position.map(S::to_f64))),

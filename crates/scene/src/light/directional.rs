@@ -8,8 +8,8 @@ use crate::light::{Handles, LightDesc, LightForm, Placement};
 use crate::value::{KeyNode, ValidationError, description, number, unit};
 use glam::DVec3;
 
-/// Smallest angular diameter of a sun \[degrees\]. Rounding of directions to single precision then
-/// changes its solid angle by 0.2 %.
+/// Smallest angular diameter of a sun \[degrees\]. Rounding of directions to single precision
+/// changes the solid angle of such a sun by 0.2 %.
 const MIN_ANGLE: f64 = 0.01;
 
 description! {

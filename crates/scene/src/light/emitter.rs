@@ -105,7 +105,7 @@ impl<S: Float> Sides<S> {
 pub(super) struct PointSample<L: SimdFloat> {
     pub wi: Vec3<L>,
     pub distance: L,
-    /// Density [1/sr] with which any triangle is sampled in this direction, for multiple importance
+    /// Density [1/sr] of this direction over all triangles of the emitter, for multiple importance
     /// sampling.
     pub density: L,
     /// Density [1/sr] by which the radiance is divided; zero if no light arrives.
@@ -246,8 +246,8 @@ impl<S: Float> Emitter<S> {
     /// in [0, 1).
     ///
     /// A sphere or distant disk is sampled by the cone that it subtends, a rectangle by solid
-    /// angle, a disk by area. Of at most 32 triangles, one is chosen in proportion to its solid
-    /// angle, of more in proportion to its area. The chosen triangle is sampled by solid angle.
+    /// angle, a disk by area. One triangle is chosen: in proportion to its solid angle if there are
+    /// at most 32, to its area if there are more. The chosen triangle is sampled by solid angle.
     /// Rectangles and triangles whose solid angle is too small for this are sampled by area.
     #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
@@ -300,6 +300,7 @@ impl<S: Float> Emitter<S> {
         LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
     }
 
+    /// Samples a point of a sphere by the cone that the sphere subtends.
     #[inline(always)]
     fn sample_sphere<L: SimdFloat<Scalar = S>>(
         &self,

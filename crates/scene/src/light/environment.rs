@@ -77,6 +77,7 @@ impl LightDesc for Environment {
 /// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
+    /// Sine and cosine of the angle of rotation.
     rotation: (f64, f64),
 }
 
@@ -94,7 +95,7 @@ impl EnvironmentLight {
         &self.map
     }
 
-    /// Rotates a direction from scene coordinates into those of the image.
+    /// Returns the direction in a lane, rotated from scene coordinates to coordinates of the image.
     fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
         let (sin, cos) = self.rotation;
         let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);

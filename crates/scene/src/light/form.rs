@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 pub enum LightForm<'a> {
     Point {
         position: DVec3,
-        /// `None` for light in all directions.
+        /// Cone that limits the light; `None` for light in all directions.
         cone: Option<&'a Spot>,
     },
     /// Light from infinitely far away.
@@ -108,8 +108,8 @@ impl EmissiveSurface {
         }
     }
 
-    /// Returns the size of the surface's details: the shorter side of a rectangle, or the square
-    /// root of the total area of triangles.
+    /// Returns a length in proportion to the surface's details: the radius of a sphere or disk, the
+    /// shorter side of a rectangle, or the square root of the total area of triangles.
     pub fn thickness(&self) -> f64 {
         match self {
             Self::Sphere { radius, .. } | Self::Disk { radius, .. } => *radius,
@@ -119,7 +119,7 @@ impl EmissiveSurface {
     }
 }
 
-/// Returns the normal of a triangle, with twice its area as the length.
+/// Returns the normal of a triangle; its length is twice the triangle's area.
 pub(super) fn doubled_normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }

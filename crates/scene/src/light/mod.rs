@@ -95,7 +95,7 @@ impl Light {
         self.kind.form()
     }
 
-    /// Returns the surface of a light with a size.
+    /// Returns the surface of a sphere, rectangle or disk light; `None` for other lights.
     pub fn surface(&self) -> Option<EmissiveSurface> {
         match self.form() {
             LightForm::Surface(surface) => Some(surface),
@@ -103,7 +103,7 @@ impl Light {
         }
     }
 
-    /// Returns the position of a point or spot light.
+    /// Returns the position of a point or spot light; `None` for other lights.
     pub fn apex(&self) -> Option<DVec3> {
         match self.form() {
             LightForm::Point { position, .. } => Some(position),
@@ -111,7 +111,7 @@ impl Light {
         }
     }
 
-    /// Returns `true` if the camera and mirrors can see the light, unless `visible` is `false`.
+    /// Returns `true` if the camera and mirrors can see the light while `visible` is `true`.
     pub fn has_radiance(&self) -> bool {
         self.form().is_visible()
     }
@@ -151,7 +151,7 @@ impl Light {
     }
 
     /// Returns the direction in which a directional light travels, the axis of a spot light, or the
-    /// normal of a rectangle or disk.
+    /// normal of a rectangle or disk; `None` for other lights.
     pub fn direction(&self) -> Option<[f64; 3]> {
         self.kind.clone().handles().direction.copied()
     }

@@ -19,11 +19,12 @@ pub trait LightDesc: KeyNode {
     /// Returns the values that edits of position and direction change.
     fn handles(&mut self) -> Handles<'_>;
 
-    /// Sets those values of `placement` for which the kind has keys, and a usual size.
+    /// Sets the position, direction and size of the light by `placement`, as far as it has keys for
+    /// them.
     fn place(&mut self, _: &Placement) {}
 }
 
-/// Values of a light that determine its position and direction.
+/// Values that determine position and direction of a light; `None` where its kind has no such key.
 #[derive(Debug, Default)]
 pub struct Handles<'a> {
     /// Position of the light, or centre of its surface.
@@ -69,8 +70,8 @@ impl LightKind {
     }
 }
 
-/// Returns `center`, rounded to multiples of a power of ten that is at most 1e-4 x `radius`, and
-/// `radius`, rounded to two significant digits.
+/// Returns the position of `placement`, rounded to multiples of a power of ten that is at most 1e-4
+/// of the radius, and the radius, rounded to two significant digits.
 pub(super) fn rounded_ball(placement: &Placement) -> ([f64; 3], f64) {
     let Placement { position, radius, .. } = *placement;
     let center = DVec3::from(position).map(|x| round_nice(x, radius)).to_array();

@@ -4,15 +4,15 @@
 use std::f64::consts::TAU;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 
-/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle,
-/// otherwise by area, in rounding errors of the number type. There, rounding moves the sampled
-/// points by 1e-5 of the surface's size.
+/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle, not by
+/// area, in rounding errors of the number type. At this solid angle, rounding moves sampled points
+/// by 1e-5 of the surface's size.
 const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Returns the density [1/sr] of the directions to a flat surface on which points are sampled
 /// uniformly: distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the
-/// surface along its normal, relative to the receiver: negative if the receiver is in front of it;
-/// otherwise the density is zero.
+/// surface along its normal, relative to the receiver. It is negative for receivers in front of the
+/// surface; for others, the density is zero.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
@@ -57,7 +57,7 @@ impl<L: SimdFloat> Cone<L> {
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Interval of coordinates along the width, relative to the receiver.
+    /// Intervals of the coordinates across (`x`) and up (`y`), relative to the receiver.
     x: [L; 2],
     y: [L; 2],
     /// Coordinate of the plane along the normal, relative to the receiver; negative if the receiver
@@ -127,7 +127,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
 
 /// Returns the solid angle of a rectangle as the sum of two triangles. The formula of Van Oosterom
 /// and Strackee (1983) for a triangle is an arc tangent, which has no cancellation at small angles.
-/// The parameters are those of [`SphericalRectangle`].
+/// The parameters are fields of [`SphericalRectangle`]; `z` is its `height`.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {

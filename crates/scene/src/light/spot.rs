@@ -57,7 +57,8 @@ impl LightDesc for Spot {
     }
 }
 
-/// Largest value of [`SpotCone::scale`], of a cone without a soft edge; finite in single precision.
+/// Largest value of [`SpotCone::scale`]: for a cone without a soft edge. Finite in single
+/// precision.
 const SHARP: f64 = 1e30;
 
 /// Cone of a spot light. It gives the factor, 0..=1, by which the light's intensity is multiplied

@@ -13,7 +13,7 @@ pub(super) const MAX_FACES: usize = 32;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Triangle<S> {
     corner: [S; 3],
-    /// From the first corner of the triangle to the two others.
+    /// Vectors from the first corner of the triangle to the two others.
     edges: [[S; 3]; 2],
     normal: [S; 3],
     area: S,
@@ -24,7 +24,7 @@ pub(super) struct Triangle<S> {
 }
 
 impl<S: Float> Triangle<S> {
-    /// Compiles triangles with the given corners, which are sorted by the ends of their ranges.
+    /// Compiles triangles with the given corners. In this order, their ranges follow one another.
     pub fn list(all: &[[DVec3; 3]]) -> Vec<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let area_of = |corners: &[DVec3; 3]| 0.5 * doubled_normal(corners).length();
@@ -47,7 +47,8 @@ impl<S: Float> Triangle<S> {
         all.iter().map(compile).collect()
     }
 
-    /// Returns the index of the triangle whose range contains `u`.
+    /// Returns the index of the triangle whose range contains `u`; the number of triangles if none
+    /// does.
     pub fn index_of(triangles: &[Self], u: S) -> usize {
         triangles.partition_point(|triangle| triangle.end <= u)
     }
@@ -96,7 +97,8 @@ pub(super) struct FacesSeen<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> FacesSeen<'a, L> {
-    /// `convex` is `true` if the triangles enclose a convex solid.
+    /// Creates the view of receivers at `origin`. `convex` is `true` if the triangles enclose a
+    /// convex solid.
     #[inline(always)]
     pub fn new(
         triangles: &'a [Triangle<L::Scalar>],

@@ -47,7 +47,8 @@ pub enum ReflectionLobe<S> {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
     },
-    /// Directions through uniform points of a square, perpendicular to the axis at unit distance.
+    /// Directions through uniform points of a square that is perpendicular to the axis, at distance
+    /// 1.
     Square {
         /// Side length of the square.
         side: S,
@@ -102,7 +103,8 @@ fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material`. Without `reflects`, the BSDF has no reflection and no transmission.
+    /// Compiles `material`. If `reflects` is `false`, the BSDF has no reflection and no
+    /// transmission.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
         let normals = match material.lobe {
@@ -168,8 +170,8 @@ pub struct BsdfQuery<L> {
     pub incident: Vec3<L>,
     /// Unit normal on the side of the incident rays.
     pub normal: Vec3<L>,
-    /// `true` mirrors directions of a cone or square on the wrong side of the surface to the right
-    /// side; `false` absorbs them.
+    /// Treatment of sampled directions of a cone or square that point below the surface: `true`
+    /// mirrors them at the surface; `false` absorbs them.
     pub fold: bool,
 }
 
@@ -193,9 +195,9 @@ pub struct BsdfValue<L> {
     pub density: L,
 }
 
-/// Returns the component of `h`, of any length, along the unit vector `n`, and the squared tangent of
-/// the angle between them. The tangent is computed from the part of `h` perpendicular to `n`, which
-/// keeps full precision at small angles. It is at most 1e15, so that terms of it are finite.
+/// Returns the component of `h`, of any length, along the unit vector `n`, and the squared tangent
+/// of the angle between them. The tangent is computed from the part of `h` perpendicular to `n`,
+/// which keeps full precision at small angles. It is at most 1e15, so that formulas stay finite.
 #[inline(always)]
 pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
@@ -265,15 +267,15 @@ impl<S: Float> Bsdf<S> {
         matches!(self.lobe, ReflectionLobe::Mirror)
     }
 
-    /// Returns k_r.
+    /// Returns the reflection coefficient k_r, or 0.
     #[inline(always)]
     pub(super) fn strength<L: SimdFloat<Scalar = S>>(&self) -> L {
         L::splat(self.reflection.unwrap_or_default())
     }
 
     /// Returns the highlight [1/sr] of a light in the unit direction `light`: the radiance that is
-    /// reflected divided by the irradiance at normal incidence. In the microfacet model it includes
-    /// the cosine of the angle of incidence; Phong's model has no such factor.
+    /// reflected divided by the irradiance at normal incidence. The value includes the cosine of
+    /// the angle of incidence in the microfacet model; Phong's model has no such factor.
     #[inline(always)]
     pub fn highlight<L: SimdFloat<Scalar = S>>(
         &self,
@@ -338,8 +340,8 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // Half the length of the sum of both directions is the cosine of the angle to the normal
-        // half-way between them, without cancellation at grazing angles.
+        // The cosine of the angle between either direction and the normal half-way between both is
+        // half the length of their sum, without cancellation at grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
@@ -369,7 +371,8 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`; 0 for a mirror. If
-    /// the query has no `fold`, it includes directions below the surface, whose weight is 0.
+    /// the query's `fold` is `false`, directions below the surface, whose weight is 0, have a
+    /// density, too.
     #[inline(always)]
     pub fn pdf<L: SimdFloat<Scalar = S>>(&self, query: &BsdfQuery<L>, direction: Vec3<L>) -> L {
         let density = self.unfolded_pdf(query, direction);
@@ -384,6 +387,7 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
+    /// Returns the density [1/sr] before directions below the surface are mirrored.
     #[inline(always)]
     fn unfolded_pdf<L: SimdFloat<Scalar = S>>(
         &self,

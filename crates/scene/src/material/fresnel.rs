@@ -25,7 +25,7 @@ pub struct Reflectance<S> {
     f0: [S; 3],
     /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
-    /// Channels with an infinite index of refraction (F0 = 1).
+    /// `true` for channels with an infinite index of refraction (F0 = 1).
     total: [bool; 3],
 }
 

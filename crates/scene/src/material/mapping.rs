@@ -49,8 +49,8 @@ pub struct TextureMapping<S> {
     input_error: S,
 }
 
-/// Returns the rotation from texture space to the coordinates of the formula, which projects along z
-/// or around y. `axis` replaces this axis.
+/// Returns the rotation from texture space to the coordinates of the projection's formula, which
+/// projects along z or around y. The rotation turns `axis`, if given, to this z or y axis.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -115,8 +115,8 @@ impl<S: Float> TextureMapping<S> {
         self.projection == Projection::Uv
     }
 
-    /// Maps a normal of any length by the transpose of the inverse matrix: `columns` are those of the
-    /// matrix that maps points in the opposite direction.
+    /// Maps a normal of any length by the transpose of the matrix with the given `columns`, which
+    /// maps points in the opposite direction.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
@@ -162,8 +162,8 @@ impl<S: Float> TextureMapping<S> {
     }
 
     /// Returns the texture coordinates u and v, moved off edges at which the colour of the texture
-    /// jumps. `coordinates` are those of a point with the outer normal `normal`, and `rounding` is
-    /// the rounding error of its largest coordinate.
+    /// jumps. `coordinates` belong to a point with the outer normal `normal`; `rounding` is the
+    /// rounding error of the point's largest coordinate.
     ///
     /// A flat face may lie exactly on an edge of the texture, such as the lid of a box whose height
     /// is a whole number of squares. One coordinate is constant there, and rounding would decide
@@ -202,7 +202,7 @@ impl<S: Float> TextureMapping<S> {
 
     /// Returns the unit normal perturbed by a bump map, whose height has the gradient `gradient` in
     /// texture space; bumps are thus transformed with their object. `outward` is 1 if `normal` is
-    /// the outer normal, along which heights rise, and -1 otherwise.
+    /// the outer normal, along which heights rise, and -1 if it is the inner normal.
     pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
         normal: Vec3<L>,
@@ -266,8 +266,8 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     }
 }
 
-/// Returns the planar projection on the side of a box that `normal` points out of, from the lower
-/// left corner of this side as seen from outside.
+/// Returns the planar projection onto that side of a box whose outer normal is nearest to `normal`,
+/// measured from the lower left corner of this side as seen from outside.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);

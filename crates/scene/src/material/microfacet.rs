@@ -119,7 +119,7 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 
     /// Returns G_1, the fraction of the microfacets with normal H that are visible from the viewer,
-    /// for the cosines of [`masking`](Self::masking).
+    /// given the cosines that [`masking`](Self::masking) takes.
     #[inline(always)]
     pub fn visibility<L: SimdFloat<Scalar = S>>(&self, nh: L, nv: L, vh: L) -> L {
         match self.masking {
@@ -129,7 +129,7 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 
     /// Returns G / G_1 in [0, 1], the weight of a reflected ray if visible normals are sampled and
-    /// the reflectance is 1, for the cosines of [`masking`](Self::masking).
+    /// the reflectance is 1, given the cosines that [`masking`](Self::masking) takes.
     #[inline(always)]
     pub fn shadowing<L: SimdFloat<Scalar = S>>(&self, nh: L, nv: L, nl: L, vh: L) -> L {
         match self.masking {
@@ -146,8 +146,9 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 
     /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side: the weight of a
-    /// transmitted ray if visible normals are sampled and the transmittance is 1. The first cosines
-    /// are N.H, N.V and V.H. The second are positive: those of the transmitted ray with -N and -H.
+    /// transmitted ray if visible normals are sampled and the transmittance is 1. `nh`, `nv` and
+    /// `vh` are the cosines N.H, N.V and V.H; `nt` and `lh` are the positive cosines of the
+    /// transmitted ray with -N and with -H.
     ///
     /// Let G_1' be the G_1 of the transmitted ray. The result is G_1' for Smith's masking (Walter et
     /// al. 2007, eq. 23). For V-cavities G is G_1 + G_1' - 1, because the sides of a groove that are
@@ -190,9 +191,9 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 }
 
-/// Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
-/// `tan2` is the squared tangent of the angle to the surface normal, with 1 / cos^2 = 1 + tan2.
-/// `inverse_alpha2` is 1 / alpha^2.
+/// Returns the Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi
+/// alpha^2 cos^4). `tan2` is the squared tangent of the angle to the surface normal, with 1 / cos^2
+/// = 1 + tan2. `inverse_alpha2` is 1 / alpha^2.
 #[inline(always)]
 fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let secant2 = tan2 + L::one();
@@ -201,8 +202,8 @@ fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
         * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }
 
-/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2), with the parameters of
-/// [`beckmann_d`].
+/// Returns the GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2), with the
+/// parameters of [`beckmann_d`].
 #[inline(always)]
 fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());

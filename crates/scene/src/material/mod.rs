@@ -170,8 +170,8 @@ impl Metal {
 }
 
 impl Material {
-    /// Returns the reflectance at normal incidence: that of `metal`, `f0`, or the index of refraction
-    /// of a dielectric; otherwise white.
+    /// Returns the reflectance at normal incidence: that of `metal`, or `f0`, or that of a
+    /// dielectric with the index `ior`; white if none of these is given.
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
@@ -180,7 +180,7 @@ impl Material {
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
-    /// Returns the key `fresnel`, or its default.
+    /// Returns the value of the key `fresnel`, or its default.
     pub fn fresnel_mode(&self) -> Fresnel {
         let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
         self.fresnel.unwrap_or(default)

@@ -91,11 +91,11 @@ impl<L: SimdFloat> Interface<L> {
         s / (L::one() + s) + p / (L::one() + p)
     }
 
-    /// Returns the weights at a boundary. `outer` selects the rays from outside of a solid, and `thin`
-    /// the surfaces of thin panes, which do not refract.
+    /// Returns the factors of the radiance. `outer` has the lanes whose rays come from outside of a
+    /// solid, and `thin` the lanes of thin panes, which do not refract.
     ///
-    /// Without Fresnel's equations a solid reflects only on its outer side, which prevents endless
-    /// reflections between its inner walls, and in total internal reflection.
+    /// Without Fresnel's equations, a solid reflects only on its outer side and in total internal
+    /// reflection. This prevents endless reflections between its inner walls.
     #[inline(always)]
     pub fn split(
         &self,

@@ -60,11 +60,11 @@ impl<L: SimdFloat> InterfaceQuery<L> {
 pub struct InterfaceSample<L> {
     /// Unit direction of the reflected ray.
     pub reflected: Vec3<L>,
-    /// Factor of the radiance from there.
+    /// Factor of the radiance that arrives from `reflected`.
     pub reflected_weight: Vec3<L>,
     /// Unit direction of the transmitted ray.
     pub transmitted: Vec3<L>,
-    /// Factor of the radiance from there.
+    /// Factor of the radiance that arrives from `transmitted`.
     pub transmitted_weight: L,
 }
 
@@ -123,8 +123,8 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples both rays of a cone or square. They can give a reflected ray behind the surface, or a
-    /// transmitted ray in front of it.
+    /// Samples both rays by a cone or square. A ray on the wrong side of the surface is mirrored to
+    /// the right side, or gets the weight 0 if the query's `fold` is `false`.
     #[inline(always)]
     fn sample_spread_interface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -206,6 +206,7 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
+    /// Returns the value and the density of [`Bsdf::eval_interface`] for microfacets.
     #[inline(always)]
     fn eval_facet_interface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -236,6 +237,7 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
+    /// Returns the value and the density of [`Bsdf::eval_interface`] for the other lobes.
     #[inline(always)]
     fn eval_spread_interface<L: SimdFloat<Scalar = S>>(
         &self,

@@ -115,7 +115,7 @@ impl CsgOperand {
     }
 }
 
-/// Combines the parts of a compound; `join` creates its tree from those of the parts.
+/// Combines the parts of a compound; `join` creates its tree from the trees of the parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -158,8 +158,8 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the validation errors of the parts of a compound. Its `depth` is 1 if it is no part of
-/// another.
+/// Returns the validation errors of the parts of a compound. `depth` is 1 for a compound that is no
+/// part of another one.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -204,7 +204,7 @@ pub type Named<'a> = (String, &'a str);
 
 impl Shape {
     /// Returns the material of each solid in the shape, in the order of [`CsgSolid::parts`]: its
-    /// own, or that of the innermost compound that has one, or `whole`.
+    /// own material, or that of the innermost compound around it that has one, or `whole`.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match self.parts() {
             None => vec![whole],
@@ -218,7 +218,7 @@ impl Shape {
         }
     }
 
-    /// Returns the material names of all parts, which may be empty.
+    /// Returns the material names of all parts, nested ones too. Names may be empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in self.parts_mut() {
@@ -228,7 +228,7 @@ impl Shape {
         names
     }
 
-    /// Returns the materials that nested parts name.
+    /// Returns the materials that the parts of the shape, nested ones too, name.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in self.parts().into_iter().flatten().enumerate() {

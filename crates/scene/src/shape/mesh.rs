@@ -43,7 +43,8 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // The edges have the squared length 4; other pairs of corners are farther apart than 10.
+    // The edges have the squared length 4; all other pairs of corners have squared distances above
+    // 10.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -97,7 +98,7 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Reads the mesh file that the shape names by `load`, unless it is loaded already.
+    /// Reads, by `load`, the mesh file that the shape names, unless it is loaded already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self {
             mesh.content.resolve(&mesh.file, load);
@@ -111,7 +112,7 @@ impl Shape {
         Some(mesh.file.as_str()).filter(|file| !file.is_empty())
     }
 
-    /// Returns the mesh that was read from the file.
+    /// Returns the mesh that was read from the file; `None` if there is only a placeholder.
     pub fn mesh(&self) -> Option<&Arc<Mesh>> {
         let Self::MeshDesc(mesh) = self else { return None };
         mesh.content.content()

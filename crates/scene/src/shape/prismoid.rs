@@ -30,7 +30,7 @@ pub(super) use by_corner_and_rotation;
 /// Returns the convex solid over a horizontal polygon: a prism, a pyramid or a frustum.
 ///
 /// `base` has the polygon's corners in order, as (x, z) offsets from `corner`. `top_over_base` is
-/// the ratio of the side lengths, from 0 (an apex) to 1. `rotation` is about the base's centroid,
+/// the ratio of their side lengths, from 0 (an apex) to 1. `rotation` is about the base's centroid,
 /// in degrees, counter-clockwise seen from above.
 ///
 /// Normals are computed from the base and the height, not from differences of corners, so that they
@@ -45,7 +45,7 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let rotated = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // Relative to `corner`, (b - c) + c is exact without a rotation, and a cube keeps its corners.
+    // For offsets from `corner`, (b - c) + c is exact, so that an unrotated cube keeps its corners.
     let corner_at = |scale: f64, b: DVec2, y: f64| {
         let offset = centroid + rotated(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)

@@ -19,18 +19,19 @@ pub trait ShapeDesc: KeyNode {
         self.validator().lengths(self).errors()
     }
 
-    /// Makes the shape upright, so that it roughly fills a box. `base` is the centre of its lower
-    /// side.
+    /// Makes the shape upright, so that it roughly fills a box of the given size. `base` is the
+    /// centre of the box's lower side.
     fn fit(&mut self, _base: DVec3, _size: DVec3) {}
 
     /// Returns the points that move the shape if a vector is added to all of them; empty if only a
-    /// transform can.
+    /// transform can move it.
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         Vec::new()
     }
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
-    /// from above. Returns `false`, without a change, if its keys cannot express that.
+    /// from above. Returns `true` if it is rotated; `false`, without a change, if its keys cannot
+    /// express the rotation.
     fn rotate_y(&mut self, _degrees: f64) -> bool {
         false
     }
@@ -40,7 +41,7 @@ pub trait ShapeDesc: KeyNode {
         0.0
     }
 
-    /// Returns the step that makes the kind stand upright, if its axis is not y.
+    /// Returns the transform step that makes the kind stand upright; `None` if it does without.
     fn upright(&self) -> Option<TransformOp> {
         None
     }

@@ -9,7 +9,7 @@ use zerkalo_kernel::primitive::Projection;
 /// front or along the normal, in scene units before the object's transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
-    /// Map to the space of the shape, or of the whole compound.
+    /// Map from texture space to the space of the shape, or of the whole compound.
     pub shape_from_texture: DAffine3,
     /// Corners of the shape's bounding box in texture space; for a plane, its `point`.
     pub corners: [DVec3; 2],
@@ -64,8 +64,8 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// Returns orthonormal axes with the unit normal `z`, and y as far up as possible: on level planes
-/// away from the viewer if they face up, otherwise towards the viewer.
+/// Returns orthonormal axes with the unit normal `z`, and y as far up as possible. On level planes,
+/// y is along -z if they face up, along +z if they face down.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();

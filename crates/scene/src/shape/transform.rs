@@ -54,7 +54,7 @@ single_value! {
 }
 
 impl TransformOp {
-    /// Steps of every kind that change nothing.
+    /// One step of every kind, which changes nothing.
     pub const IDENTITIES: [Self; Self::FIELDS.len()] = [
         Self::Translate([0.0; 3]),
         Self::RotateX(0.0),
