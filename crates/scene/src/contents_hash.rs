@@ -37,8 +37,7 @@ impl Scene {
     }
 }
 
-/// Adds the hash of each file's contents to `hash`. The contents of a file that the scene names
-/// repeatedly are hashed only once.
+/// Adds the hash of each file's contents to `hash`. The contents of each file are hashed only once.
 fn add_each<'a, T: 'a>(
     hash: &mut Fnv1a64,
     files: impl Iterator<Item = &'a Arc<T>>,

@@ -9,8 +9,7 @@ use std::fmt;
 pub struct Diagnostic {
     /// Name of the scene file as the user gave it.
     pub file: String,
-    /// Line and column in characters, counted from 1; `None` if the diagnostic is about the whole
-    /// file.
+    /// Line and column in characters, counted from 1; `None` if it concerns the whole file.
     pub line_column: Option<(usize, usize)>,
     /// Table that the diagnostic is about, such as `object "queen"`; empty for the whole scene.
     pub subject: String,
@@ -65,8 +64,7 @@ pub(super) struct FirstDiagnostics {
 }
 
 impl FirstDiagnostics {
-    /// Adds the diagnostic that `make` returns, without file, line and column, at the byte offset
-    /// `at`.
+    /// Adds the diagnostic that `make` returns without file, line and column, at byte offset `at`.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -121,8 +119,7 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors of a file from the result of [`FirstDiagnostics::located`], without
-    /// repetitions.
+    /// Creates the errors of a file from [`FirstDiagnostics::located`], without repetitions.
     pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.dedup();

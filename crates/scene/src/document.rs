@@ -85,8 +85,7 @@ impl Document {
         &self.scene
     }
 
-    /// Returns the scene that the text describes. It is copied only if a clone of the document
-    /// exists.
+    /// Returns the scene that the text describes. It is copied only if the document has a clone.
     pub fn into_scene(self) -> Scene {
         drop(self.origin);
         Arc::unwrap_or_clone(self.scene)
@@ -98,9 +97,8 @@ impl Document {
     }
 }
 
-/// Returns `text`, which describes `old`, changed so that it describes `new`. Uniform line endings
-/// are kept, as are a byte order mark and a missing line ending at the end; mixed line endings
-/// become LF.
+/// Changes `text`, which describes `old`, so that it describes `new`. Uniform line endings, a byte
+/// order mark and a missing line ending at the end are kept; mixed line endings become LF.
 fn new_text(text: String, old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),

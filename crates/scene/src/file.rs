@@ -202,8 +202,7 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Replaces the content of the file at `path` atomically and durably. Fails if the file exists,
-    /// unless `overwrite`.
+    /// Replaces the file at `path` atomically and durably. Fails if it exists, unless `overwrite`.
     fn write(&mut self, document: Document, path: &Path, overwrite: bool) -> Result<(), SaveError> {
         let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
         let text = document.text().as_bytes();

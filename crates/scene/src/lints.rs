@@ -106,8 +106,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
-        // A dielectric reflects the share F and transmits 1 - F: the larger weight is an upper
-        // bound.
+        // A dielectric reflects the share F and transmits 1 - F: the larger weight bounds the sum.
         Fresnel::Dielectric => mirrored.max(m.transmission),
         Fresnel::Constant | Fresnel::Schlick | Fresnel::Exact => mirrored * f0 + m.transmission,
     };

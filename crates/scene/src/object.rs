@@ -45,8 +45,7 @@ impl Object {
         compose(&self.transform)
     }
 
-    /// Returns the canonical form of the shape, transformed to the scene's space. The object must
-    /// be valid.
+    /// Returns the canonical form of the valid object's shape, transformed to the scene's space.
     pub fn form(&self) -> Form {
         match self.transform.is_empty() {
             true => self.shape.form(),

@@ -30,8 +30,7 @@ const STALE_AFTER: Duration = Duration::from_secs(60);
 pub struct Recovery {
     /// Folder of the scene file, and name of the recovery file in it; `None` without a scene file.
     beside: Option<(PathBuf, OsString)>,
-    /// State folder, and name of the recovery file in it if it cannot be written `beside` the
-    /// scene.
+    /// State folder, and name of the file in it if it cannot be written `beside` the scene.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
@@ -104,8 +103,7 @@ impl Recovery {
         Self { beside, state, saved: None }
     }
 
-    /// Returns the possible places of the recovery file, each as folder and file name; the
-    /// preferred place first.
+    /// Returns folder and file name of each place for the recovery file, the preferred place first.
     fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
         self.beside.iter().chain(&self.state)
     }
@@ -121,8 +119,7 @@ impl Recovery {
     }
 
     /// Writes the recovery file: the `text` that saving would write, and `base`, the fingerprint of
-    /// the scene file that saving would replace. If no folder is writable, the previous recovery
-    /// file stays.
+    /// the scene file that saving would replace. If no folder is writable, the previous one stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -174,8 +171,7 @@ impl Recovery {
         found
     }
 
-    /// Makes the file of `lost` the recovery file of this process, in place of an earlier one,
-    /// which is removed.
+    /// Makes the file of `lost` the recovery file of this process; an earlier one is removed.
     pub fn adopt(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -252,8 +248,7 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens the recovery file for reading and writing: some file systems lock only files that are open
-/// for writing.
+/// Opens the recovery file. Some file systems lock only files that are open for writing.
 fn open(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true).write(true), path)
 }

@@ -13,8 +13,7 @@ use std::fmt;
 /// Problem of a scene (error or warning), without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Path to the value in question: keys and list indices, such as `object`, `3`, `shape`,
-    /// `sphere`.
+    /// Path to the value: keys and list indices, such as `object`, `3`, `shape`, `sphere`.
     pub path: Vec<String>,
     /// Table that the problem is about, such as `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
@@ -223,8 +222,7 @@ impl Scene {
         (format!("material \"{}\" is not defined", truncated(name)), help + &meant)
     }
 
-    /// Adds a problem for each entry of the scene's list `list` that has the name of an earlier
-    /// entry.
+    /// Adds a problem for each entry of the list `list` that has the name of an earlier entry.
     fn same_names<'a>(
         &self,
         list: &str,

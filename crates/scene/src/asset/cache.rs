@@ -12,8 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 use zerkalo_kernel::primitive::Mesh;
 
-/// Largest total memory in bytes of the cached files that no scene uses. They are kept because an
-/// undo may bring them back.
+/// Largest total memory in bytes of the cached files that no scene uses. An undo may need them.
 const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
@@ -170,8 +169,7 @@ fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> 
     })
 }
 
-/// Locks a cache. It is valid even if a thread panicked with the lock, because no method leaves it
-/// half changed.
+/// Locks a cache. It is valid even after a panic, because no method leaves it half changed.
 fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -62,8 +62,8 @@ impl FileContents {
         self.error(FileLocation::Whole, found, expected)
     }
 
-    /// Returns the path of the file `name`, to which this file refers, relative to the folder of
-    /// this file. Returns `None` if `name` is empty or could lead out of the folder. The rule is in
+    /// Returns the path of the file `name` to which this file refers, relative to its own folder;
+    /// `None` if `name` is empty or could lead out of the folder. The rule is in
     /// docs/scene-format.md.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");

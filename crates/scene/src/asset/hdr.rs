@@ -2,10 +2,9 @@
 //! common exponent (RGBE).
 //!
 //! A row has one of two encodings. In the newer one, the four components follow one another, each
-//! as a sequence of runs. In the older one, a pixel (1, 1, 1, n) stands for n repetitions of the
-//! pixel before it; in a sequence of such pixels, the values n are the digits of the count to base
-//! 256, the lowest first. Source: G. Ward, "Real Pixels", Graphics Gems II, and the file `color.c`
-//! of Radiance.
+//! as a sequence of runs. In the older one, a pixel (1, 1, 1, n) repeats the pixel before it n
+//! times; in a sequence of such pixels, the n are the digits of the count to base 256, lowest
+//! first. Source: G. Ward, "Real Pixels", Graphics Gems II, and the file `color.c` of Radiance.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;

@@ -96,8 +96,7 @@ impl Image {
         }
     }
 
-    /// Converts `image` to a texture image without alpha, turned upright as the EXIF data `exif`
-    /// says.
+    /// Converts `image` to a texture image without alpha, turned upright by its EXIF data.
     fn upright(mut image: DynamicImage, exif: Option<&[u8]>) -> Self {
         if let Some(orientation) = exif.and_then(Orientation::from_exif_chunk) {
             image.apply_orientation(orientation);

@@ -85,8 +85,8 @@ impl RadianceMap {
         }
     }
 
-    /// Creates the image of `pixels`, read from the file `source`. Negative values are replaced by
-    /// 0. Fails if a value is NaN or above [`MAX_RADIANCE`].
+    /// Creates the image of `pixels`, read from the file `source`. Negative values become zero.
+    /// Fails if a value is NaN or above [`MAX_RADIANCE`].
     fn of_pixels(
         source: &FileContents,
         size: [u32; 2],
@@ -159,8 +159,7 @@ impl RadianceMap {
         DirectionSample { direction: [-sin * sin_phi, cos, sin * cos_phi], density }
     }
 
-    /// Returns the density [1/sr] with which [`RadianceMap::sample`] samples the unit vector
-    /// `direction`.
+    /// Returns the density [1/sr] with which [`RadianceMap::sample`] draws `direction`.
     pub fn density(&self, direction: [f64; 3]) -> f64 {
         self.distribution.density(position(direction))
     }
@@ -185,8 +184,7 @@ fn decode_exr(source: &FileContents) -> Result<([u32; 2], Vec<[f32; 3]>), AssetE
         let size = [size.0, size.1].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS).map(|()| size)
     };
-    // The sizes of all layers are checked first, because the decoder allocates a block of rows
-    // before it reads the block.
+    // All sizes are checked first: the decoder allocates a block of rows before it reads it.
     for header in reader.headers() {
         check(header.layer_size)?;
     }

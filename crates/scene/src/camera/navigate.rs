@@ -145,8 +145,7 @@ impl Camera {
         if distance > 0.0 && distance.is_finite() { distance } else { 1.0 }
     }
 
-    /// Returns the view direction, rotated by `right` and `up` degrees; `None` if one is not
-    /// finite.
+    /// Returns the view direction rotated by angles in degrees; `None` if an angle is not finite.
     fn rotated(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;

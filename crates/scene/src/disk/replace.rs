@@ -120,8 +120,7 @@ impl Replacement {
         explain(&self.path, &self.folder, self.exists, error)
     }
 
-    /// Stores the content of the temporary file on the disk, then gives it the name of the file
-    /// that it replaces.
+    /// Stores the content of the temporary file on the disk, then renames it to the requested file.
     ///
     /// # Errors
     /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is

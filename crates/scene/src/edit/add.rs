@@ -40,7 +40,7 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// Returns a material with the first colour of the palette that is free. If none is, the colours
+/// Returns a material with the first free colour of the palette. If no colour is free, the colours
 /// are taken in turn.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);

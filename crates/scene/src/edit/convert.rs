@@ -208,8 +208,7 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts the value of `key`, such as `target` to `direction`. The picture stays the same, except
-/// for rounding.
+/// Converts the value of `key`, such as `target` to `direction`. Only rounding changes the picture.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);

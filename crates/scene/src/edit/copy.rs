@@ -109,14 +109,12 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
 }
 
-/// Returns the name to select after `gone` was deleted: the next of the sorted `names`, or the
-/// last.
+/// Returns the name to select once `gone` is deleted: the next of the sorted `names`, or the last.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Removes the material `name` from all objects and parts. Returns a note that names these objects;
-/// `None` if there are none.
+/// Removes the material `name` from all objects and parts. Returns a note that names them, if any.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {

@@ -1,5 +1,4 @@
-//! Steps by arrow keys: a number changes to the next round number, any other value to the next
-//! choice.
+//! Steps by arrow keys: numbers change to the next round number, other values to the next choice.
 
 use crate::Scene;
 use crate::edit::bounds::step_length;
@@ -116,8 +115,7 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
     }
 }
 
-/// Returns the value from which steps of an absent `alpha` or `f0` start: the one that follows from
-/// other keys.
+/// Returns the value, given by other keys, from which steps of an absent `alpha` or `f0` start.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -244,8 +242,7 @@ impl StepRule {
     }
 }
 
-/// Returns `x + steps * unit`, rounded to a power of ten that is at most a hundredth of a fine
-/// step.
+/// Returns `x + steps * unit`, rounded to at most a hundredth of a fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)

@@ -32,8 +32,7 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 
 /// Opens the lens by `stops`; negative stops close it. One stop doubles the area of the lens. A
 /// pinhole opens to a radius of a fiftieth of the distance of the plane in focus; a camera without
-/// such a plane gets one. A lens that is given by its radius becomes a pinhole if it is closed far
-/// enough.
+/// one gets it. A lens that is given by its radius becomes a pinhole if it is closed far enough.
 pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     if camera.focus.is_none() && camera.target.is_none() {

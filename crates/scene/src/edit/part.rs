@@ -51,8 +51,7 @@ pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static
     exclusive_keys(subject).iter().find(is_given).copied()
 }
 
-/// Returns the field of the dotted `key`, which consists of keys and list indices; `None` if there
-/// is no such key.
+/// Returns the field of the dotted path `key` (keys, list indices); `None` if there is none.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),

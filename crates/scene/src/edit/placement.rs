@@ -1,5 +1,4 @@
-//! Placement of objects: on the surfaces that support them, and at positions that are free of other
-//! objects.
+//! Placement of objects: on surfaces that support them, and at positions free of other objects.
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 

@@ -104,8 +104,8 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// Converts a number to the shortest digits that are read back exactly, with an exponent if this
-/// saves zeros.
+/// Converts a number to the shortest digits that are read back exactly, with an exponent if
+/// shorter.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

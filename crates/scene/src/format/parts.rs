@@ -41,8 +41,7 @@ impl Part {
         }
     }
 
-    /// Returns the index, in the whole file, of the first entry that this part has of the list at
-    /// `path`.
+    /// Returns the index in the whole file of this part's first entry in the list at `path`.
     pub fn first_index(&self, path: &[String]) -> usize {
         match path {
             [list] if list == "object" => self.first_object,

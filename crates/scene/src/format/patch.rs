@@ -73,8 +73,7 @@ fn patch_table(
             _ => {}
         }
     }
-    // If a single key is removed, the first new key takes over its comments, as when the kind of a
-    // shape changes.
+    // The first new key takes over the comments of a single removed key, such as a shape's kind.
     let successor = added.first().filter(|_| removed.len() == 1);
     for key in removed {
         let decor = table.key(&key).map(|k| k.leaf_decor().clone());
@@ -238,8 +237,8 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// Replaces the value of `item`, which is not a table. In a list of unchanged length, it replaces
-/// only the numbers that differ.
+/// Replaces the value of `item`, which is not a table. In a list of the same length, only numbers
+/// that differ are replaced.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
         *item = Item::Value(leaf(new));

@@ -67,8 +67,7 @@ impl<'a> SourceScene<'a> {
     ) -> Result<Self, SceneErrors> {
         let mut source = Self { scene: Scene::default(), name, text, parts };
         if !source.read_parts()? {
-            // Objects outside `[[object]]` sections belong to the same list: the file is parsed
-            // again as a whole.
+            // Objects outside of sections belong to the same list: the file is parsed as a whole.
             return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
         }
         source.scene.resolver = resolver;
@@ -191,8 +190,7 @@ pub(crate) fn read_text(
         return Err(fail(&format!("the scene {missing}"), help));
     }
     let mut bytes = Vec::new();
-    // Up to one byte above the limit is read, to notice a file that is too large or an endless
-    // device.
+    // One byte above the limit is read, to notice files that are too large and endless devices.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(

@@ -63,8 +63,7 @@ const fn optional(
 }
 
 /// Reads `root`, the parsed `part` of the file, into `node`, which has default values and the type
-/// `takes`. Adds the schema errors of `root` to `errors`. A node whose value has an error keeps its
-/// default.
+/// `takes`. Adds the schema errors of `root` to `errors`. A node with an error keeps its default.
 pub(crate) fn read(
     root: &Spanned<DeTable>,
     takes: ValueType,
@@ -147,8 +146,7 @@ impl SchemaReader<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key, and returns the name in `fields` that was probably
-    /// meant; `None` if none is similar.
+    /// Adds an error about an unknown key. Returns the name in `fields` that was probably meant.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -239,8 +237,7 @@ impl SchemaReader<'_> {
                 );
                 self.add(span, "the light has no kind".to_string(), help);
             }
-            // If no kind is given, an unknown key may be a mistyped kind, and it has an error
-            // already.
+            // If no kind is given, an unknown key may be a mistyped kind; it has its error already.
             [_] | [] => {}
         }
     }
@@ -254,8 +251,7 @@ impl SchemaReader<'_> {
         }
     }
 
-    /// Reads a table of the type `takes`, an entry of a list or a named table, into the child `key`
-    /// of `list`.
+    /// Reads a list entry or named table of the type `takes` into the child `key` of `list`.
     fn entry(
         &mut self,
         key: String,

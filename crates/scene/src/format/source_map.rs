@@ -58,8 +58,7 @@ fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     value.span()
 }
 
-/// Adds diagnostics for `problems` to `found`. The parts of the file in which the problems are, are
-/// parsed again to locate them.
+/// Adds diagnostics for `problems` to `found`. The parts with problems are parsed again.
 pub(crate) fn locate(
     text: &str,
     parts: &[Part],

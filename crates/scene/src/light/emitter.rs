@@ -105,8 +105,7 @@ impl<S: Float> Sides<S> {
 pub(super) struct PointSample<L: SimdFloat> {
     pub wi: Vec3<L>,
     pub distance: L,
-    /// Density [1/sr] of this direction over all triangles of the emitter, for multiple importance
-    /// sampling.
+    /// Density [1/sr] of this direction over all triangles, for multiple importance sampling.
     pub density: L,
     /// Density [1/sr] by which the radiance is divided; zero if no light arrives.
     pub pdf: L,

@@ -19,8 +19,7 @@ pub trait LightDesc: KeyNode {
     /// Returns the values that edits of position and direction change.
     fn handles(&mut self) -> Handles<'_>;
 
-    /// Sets the position, direction and size of the light by `placement`, as far as it has keys for
-    /// them.
+    /// Sets position, direction and size of the light by `placement`, as far as it has such keys.
     fn place(&mut self, _: &Placement) {}
 }
 

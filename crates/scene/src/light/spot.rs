@@ -57,8 +57,7 @@ impl LightDesc for Spot {
     }
 }
 
-/// Largest value of [`SpotCone::scale`]: for a cone without a soft edge. Finite in single
-/// precision.
+/// Largest value of [`SpotCone::scale`]: that of a cone without a soft edge; finite as an `f32`.
 const SHARP: f64 = 1e30;
 
 /// Cone of a spot light. It gives the factor, 0..=1, by which the light's intensity is multiplied

@@ -47,8 +47,7 @@ impl<S: Float> Triangle<S> {
         all.iter().map(compile).collect()
     }
 
-    /// Returns the index of the triangle whose range contains `u`; the number of triangles if none
-    /// does.
+    /// Returns the index of the triangle whose range contains `u`; their number if none does.
     pub fn index_of(triangles: &[Self], u: S) -> usize {
         triangles.partition_point(|triangle| triangle.end <= u)
     }
@@ -97,8 +96,7 @@ pub(super) struct FacesSeen<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> FacesSeen<'a, L> {
-    /// Creates the view of receivers at `origin`. `convex` is `true` if the triangles enclose a
-    /// convex solid.
+    /// Computes what receivers at `origin` see. `convex`: the triangles enclose a convex solid.
     #[inline(always)]
     pub fn new(
         triangles: &'a [Triangle<L::Scalar>],

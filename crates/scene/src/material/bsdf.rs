@@ -47,8 +47,7 @@ pub enum ReflectionLobe<S> {
         /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
     },
-    /// Directions through uniform points of a square that is perpendicular to the axis, at distance
-    /// 1.
+    /// Directions through uniform points of a square across the axis, at unit distance.
     Square {
         /// Side length of the square.
         side: S,
@@ -103,8 +102,7 @@ fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material`. If `reflects` is `false`, the BSDF has no reflection and no
-    /// transmission.
+    /// Compiles `material`; without reflection and transmission if `reflects` is `false`.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
         let normals = match material.lobe {
@@ -371,8 +369,7 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`; 0 for a mirror. If
-    /// the query's `fold` is `false`, directions below the surface, whose weight is 0, have a
-    /// density, too.
+    /// `fold` is `false`, this includes directions below the surface, whose weight is 0.
     #[inline(always)]
     pub fn pdf<L: SimdFloat<Scalar = S>>(&self, query: &BsdfQuery<L>, direction: Vec3<L>) -> L {
         let density = self.unfolded_pdf(query, direction);

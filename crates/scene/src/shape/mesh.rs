@@ -43,8 +43,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // The edges have the squared length 4; all other pairs of corners have squared distances above
-    // 10.
+    // The edges have the squared length 4; all other squared distances of corners are above 10.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {

@@ -45,8 +45,7 @@ pub trait KeyNode {
         None
     }
 
-    /// Sets the value, without a check of ranges. Returns `true` if it was set, `false` if the node
-    /// cannot have a value of this type.
+    /// Sets the value, without a check of ranges. Returns `true` if the node can have it.
     fn set_value(&mut self, _: KeyValue) -> bool {
         false
     }
@@ -59,8 +58,7 @@ pub trait KeyNode {
     /// Makes an optional value absent.
     fn make_absent(&mut self) {}
 
-    /// Returns the child node `key`: a key of a table, the kind of a value, or an index from 0.
-    /// Returns `None` if there is none.
+    /// Returns the child `key`, if any: a key of a table, the kind of a value, or an index from 0.
     fn child(&self, _key: &str) -> Option<&dyn KeyNode> {
         None
     }

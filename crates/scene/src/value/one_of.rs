@@ -1,5 +1,4 @@
-//! Macros that declare values of one of several kinds: [`one_of!`] with single values, [`kinds!`] with
-//! tables.
+//! Macros for values of one of several kinds: [`one_of!`] for single values, [`kinds!`] for tables.
 
 /// Declares an enum whose variants have one value each. In scene files such an enum is a table with
 /// one key, the name of the variant. Each variant has its help text, key, range and unit, written as
@@ -15,8 +14,7 @@
 /// }
 /// ```
 ///
-/// The short form, without types, implements only the access by key, for an enum that [`kinds!`]
-/// declares.
+/// The short form, without types, implements only the access by key; [`kinds!`] uses it.
 macro_rules! one_of {
     (
         $(#[$attribute:meta])+
@@ -50,8 +48,7 @@ macro_rules! one_of {
                 ),
             )+];
 
-            /// Returns the validation errors of the value. Their keys begin with the key of the
-            /// variant.
+            /// Returns the validation errors of the value. Their keys begin with the variant's key.
             pub fn faults(&self) -> Vec<$crate::value::ValidationError> {
                 let checks = $crate::value::Validator::new(Self::FIELDS);
                 match self {
@@ -174,8 +171,7 @@ macro_rules! kinds {
         )+];
 
         impl $name {
-            /// Every kind, with its key, its fields and its help text. Scene files give exactly one
-            /// of them.
+            /// Every kind, with its key, its fields and its help text; exactly one is given.
             pub const FIELDS: &[$crate::value::Field] = &KIND_TABLE;
 
             /// Keys of all kinds.

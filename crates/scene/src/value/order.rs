@@ -8,8 +8,7 @@ pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
     items.extend(order.into_iter().filter_map(|i| unsorted[i].take()));
 }
 
-/// Returns the indices of `keys`, ordered by ascending keys. Indices of equal keys are in ascending
-/// order.
+/// Returns the indices of `keys`, sorted by ascending key and, for equal keys, by index.
 pub fn ascending(keys: Vec<i64>) -> Vec<usize> {
     let mut order: Vec<(i64, usize)> = keys.into_iter().zip(0..).collect();
     order.sort_unstable();

@@ -21,8 +21,7 @@ pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
-/// Returns the exponent of the largest power of ten that is at most |`x`|; 0 if `x` is 0 or not
-/// finite.
+/// Returns the exponent of the largest power of ten not above |`x`|; 0 if `x` is 0 or not finite.
 pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;

@@ -59,8 +59,7 @@ fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// Converts `node`, whose type is `takes`, to a TOML table, list or value. Optional keys that are
-/// absent are left out.
+/// Converts `node` of the type `takes` to a TOML table, list or value. Absent keys are left out.
 pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     let list = |entry: ValueType| {
         let entries = (0..).map_while(|i: usize| node.child(&i.to_string()));

@@ -85,8 +85,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Records a note for the user about a part of the file that was omitted or replaced. A note
-    /// that is recorded again is ignored.
+    /// Records a note for the user about a part of the file that was omitted or replaced.
+    /// Repetitions are ignored.
     pub fn note(&mut self, note: String) {
         if !self.notes.contains(&note) {
             self.notes.push(note);

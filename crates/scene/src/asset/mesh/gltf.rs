@@ -185,8 +185,7 @@ struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
-    /// Adds vertices, colour and triangles of this part to `builder`. Points and lines are left
-    /// out.
+    /// Adds vertices, colour and triangles of this part to `builder`. Leaves out points and lines.
     fn add(&self, builder: &mut Builder) -> Result<(), AssetError> {
         let mode = self.primitive.mode();
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
