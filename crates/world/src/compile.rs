@@ -79,7 +79,7 @@ struct CompiledMaterials<'a, S> {
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// `default` replaces materials whose names the scene does not define.
+    /// Compiles the materials of `scene`. `default` replaces names that the scene does not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
@@ -160,9 +160,9 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
-/// Height of lights with a size above the surfaces that they touch, in the larger of two rounding
-/// errors: that of the scene's extent, and that of the coordinates in the scene file. Rays that
-/// leave a surface start at about half this height, so that they can hit the light.
+/// Height of lights with a size above the surfaces that they touch. The unit is the larger of two
+/// rounding errors: the error at the scene's extent, and the error of the coordinates in the scene
+/// file. Rays that leave a surface start at about half this height, so that they can hit the light.
 const EMITTER_LIFT: f64 = 16.0;
 
 /// Returns the height at which points are sampled above emissive objects, and by which lights with
@@ -213,7 +213,7 @@ pub(super) struct CompiledLights<S> {
 }
 
 impl<S: Float> CompiledLights<S> {
-    /// Compiles the lights in `groups`. Returns the scale of each group, too.
+    /// Compiles the lights in `groups`. Returns them, and the scale of each group.
     fn new(
         scene: &Scene,
         geometry: &RecenteredGeometry,

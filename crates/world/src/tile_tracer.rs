@@ -23,8 +23,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
 
     /// Creates the tracer of at most [`MAX_BLOCK_PIXELS`](crate::MAX_BLOCK_PIXELS) `pixels`, pairs
     /// of column and row, in `replicate` 0 (A) or 1 (B). Culling uses the rectangle of the raster
-    /// with the upper left corner `origin` and the size `extent`, which must contain them. Returns
-    /// `None` if all samples in the rectangle are black.
+    /// with the upper left corner `origin` and the size `extent`, which must contain the pixels.
+    /// Returns `None` if all samples in the rectangle are black.
     pub fn tile(
         &self,
         replicate: usize,

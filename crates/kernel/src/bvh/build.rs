@@ -17,7 +17,7 @@ pub const LEAF_FLAG: u32 = 1 << 31;
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
-    /// Smallest x, y and z of the children's boxes, then largest x, y and z.
+    /// Six rows of one number per child: smallest x, y and z of the children's boxes, then largest.
     pub bounds: [[f32; BVH_WIDTH]; 6],
     /// Index of each child in the node array, or [`LEAF_FLAG`] and the index of a leaf.
     pub child: [u32; BVH_WIDTH],
@@ -47,7 +47,7 @@ pub struct Bvh8 {
 /// Effort of a BVH build.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Window of the clustering.
+    /// Window in which the clustering searches for nearest nodes.
     pub window: SearchWindow,
     /// Share of the nodes, 0 to 1, that reinsertion may move before small leaves are merged.
     pub reinsertion: f32,
@@ -115,7 +115,7 @@ impl Bvh8 {
 }
 
 impl Bvh8Build {
-    /// Replaces `binary` by eight-wide nodes.
+    /// Replaces `binary` by eight-wide nodes. Leaves stay as they are.
     fn collapse(binary: BinaryBvh) -> Self {
         let plan = CollapsePlan::new(&binary);
         let mut todo = vec![(0usize, 0usize, 1usize)];
@@ -153,20 +153,22 @@ impl Bvh8Build {
 /// the nodes, and thereby the expected number of nodes that a random ray visits (Ylitie, Karras and
 /// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*).
 struct CollapsePlan {
-    /// Division of the child slots of wide nodes. `splits[i][n - 1]`, n from 2 to 8, has the numbers
-    /// of slots for the two children of the binary node i if its subtree takes n slots of a wide
-    /// node; `[0, 0]` if the node itself takes one slot. `splits[i][0]` divides eight slots, for the
-    /// case that the node becomes a wide node.
+    /// Division of the child slots of wide nodes. `splits[i][n - 1]`, n from 2 to 8, applies if the
+    /// subtree of the binary node i takes n slots of a wide node. It has the numbers of slots for
+    /// the two children of node i, or `[0, 0]` if node i itself takes one slot. `splits[i][0]`
+    /// applies if node i becomes a wide node, and divides the eight slots of this wide node.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
 impl CollapsePlan {
+    /// Computes the optimal division of slots for each node of `binary`, children before parents.
     fn new(binary: &BinaryBvh) -> Self {
         let nodes = &binary.nodes;
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
-        // Smallest sum of the areas of the wide nodes in a subtree, by the slots that it may take.
+        // `costs[i][n - 1]` is the smallest sum of the areas of the wide nodes in the subtree of
+        // node i, if the subtree may take n slots of a wide node.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
-        // Without this area, a node without area would have no cost.
+        // Part of the cost of every wide node, so that wide nodes without area have a cost, too.
         let least_area = 1e-7 * nodes[0].aabb.half_area() + f32::MIN_POSITIVE;
         for number in binary.parents_first().into_iter().rev() {
             let node = &nodes[number];

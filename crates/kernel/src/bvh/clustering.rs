@@ -3,22 +3,22 @@
 //!
 //! A pass over the nodes, in the order of the Morton curve, merges every pair of nodes that are
 //! nearest to each other. If many distances are equal, such as between coincident boxes, boxes in a
-//! row or the triangles of a fan, a pass may find a single such pair. Such slow passes merge
-//! neighbours on the curve instead.
+//! row or the triangles of a fan, a pass may find only one such pair. Passes that find few pairs
+//! are slow; in the end they merge neighbours on the curve instead.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
 use crate::bvh::morton::morton_code;
 use glam::{DVec3, Vec3A};
 
-/// Number of node visits per primitive, over all passes so far, after which slow passes merge the
-/// 1st and 2nd node on the Morton curve, the 3rd and 4th, and so on. Boxes at random positions need
-/// 3 visits per primitive altogether.
+/// Number of node visits per primitive, summed over all passes, after which slow passes merge
+/// neighbours on the Morton curve: the 1st and 2nd node, the 3rd and 4th, and so on. Boxes at
+/// random positions need 3 visits per primitive in total.
 const PATIENT_VISITS: usize = 8;
 
 /// Number of nodes per merged pair above which a pass counts as slow.
 const SLOW: usize = 16;
 
-/// Index in [`Nearest`] that means "no nearest node found".
+/// Index in [`Nearest`] that stands for "no nearest node found".
 const NONE: u32 = u32::MAX;
 
 /// Window on the Morton curve in which a pass searches for the nearest node of each node.
@@ -30,11 +30,12 @@ pub struct SearchWindow {
     pub distance: usize,
 }
 
-/// Index of the nearest node of a node, and half the surface area of the box around both.
+/// Half the surface area of the box around a node and its nearest node, and the index of the
+/// nearest node in the list of the pass.
 type Nearest = (f32, u32);
 
-/// Builds a binary BVH of the boxes `bounds`, at least one, with one primitive in each leaf. Returns
-/// it with the number of passes.
+/// Builds a binary BVH of the boxes `bounds`, at least one, with one primitive in each leaf.
+/// Returns the BVH and the number of passes.
 pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> (BinaryBvh, usize) {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);
@@ -86,9 +87,9 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<BinaryNode> {
     codes.iter().map(|(_, i)| leaf(*i)).collect()
 }
 
-/// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after it:
-/// the one for which the box around both has the smallest surface area. Of equal areas, the last
-/// counts.
+/// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after
+/// it: the one for which the box around both has the smallest surface area. Among equal areas, the
+/// last node counts.
 fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {
@@ -107,6 +108,7 @@ fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) 
     }
 }
 
+/// Returns the number of pairs of nodes that are nearest to each other.
 fn mutual_pairs(nearest: &[Nearest]) -> usize {
     let ends_pair = |(i, (_, j)): &(usize, &Nearest)| {
         (*j as usize) < *i && nearest[*j as usize].1 as usize == *i

@@ -3,8 +3,9 @@
 /// Number of bits of each coordinate in a Morton code.
 const BITS: u32 = 20;
 
-/// Returns the Morton code of a point in the unit cube. Bit k of x, rounded down to 20 bits, is bit
-/// 3k of the code; those of y and z follow it. A coordinate that is NaN counts as 0.
+/// Returns the Morton code of a point in the unit cube. Coordinates are rounded down to 20 bits.
+/// Bit k of x, y and z is bit 3k, 3k + 1 and 3k + 2 of the code. A coordinate that is NaN counts as
+/// 0.
 pub fn morton_code(point: [f64; 3]) -> u64 {
     let [x, y, z] = point.map(|x| spread((x * f64::from((1u32 << BITS) - 1)) as u64));
     x | y << 1 | z << 2

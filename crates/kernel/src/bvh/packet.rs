@@ -57,12 +57,15 @@ impl<L: SimdFloat> SlabPacket<L> {
 pub struct PacketBounds<S> {
     /// Rows of [`Bvh8Node::bounds`] with the box sides that the rays pass first, for each axis.
     pub near: [usize; 3],
-    /// Rows with the box sides that the rays pass last.
+    /// Rows of [`Bvh8Node::bounds`] with the box sides that the rays pass last, for each axis.
     pub far: [usize; 3],
-    /// Number that is subtracted from the near sides: the largest ray origin plus the padding if the
-    /// directions are positive on the axis, otherwise the smallest ray origin minus the padding.
+    /// Number that is subtracted from the near sides: the largest ray origin plus the padding if
+    /// the directions are positive on the axis, the smallest ray origin minus the padding if they
+    /// are negative.
     pub near_origin: [S; 3],
-    /// Number that is subtracted from the far sides: the other one of these two.
+    /// Number that is subtracted from the far sides: the smallest ray origin minus the padding if
+    /// the directions are positive on the axis, the largest ray origin plus the padding if they are
+    /// negative.
     pub far_origin: [S; 3],
     /// Smallest and largest reciprocals of the ray directions.
     pub inverse: [[S; 3]; 2],
@@ -97,8 +100,8 @@ impl<S: Float> PacketBounds<S> {
         })
     }
 
-    /// Tests one box per lane: returns the smallest distance at which a ray may enter it, and the
-    /// boxes that a ray may enter within the distance `limit`. `side(k)` is row k of
+    /// Tests one box per lane. Returns the smallest distance at which a ray may enter each box, and
+    /// the lanes whose box a ray may enter within the distance `limit`. `side(k)` is row k of
     /// [`Bvh8Node::bounds`]. `ONE` is `true` if the bounds contain a single ray.
     ///
     /// If [`SlabPacket::enters`] accepts a box for a ray within the bounds, this function accepts
@@ -171,8 +174,8 @@ pub struct StackEntry<S> {
     near: S,
 }
 
-/// Calls `traverse` with a stack of at least `per_level` entries for each level of the hierarchy: an
-/// array of `SMALL` or `LARGE` entries, or on the heap if these do not suffice.
+/// Calls `traverse` with a stack of at least `per_level` entries for each level of the hierarchy.
+/// The stack is an array of `SMALL` or `LARGE` entries, or on the heap if more are needed.
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     per_level: usize,
@@ -189,8 +192,9 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Pushes `entry` to the stack of `top` entries. Those from index `base` on, children of the same
-/// node, stay sorted by descending distance, so that the nearest child is visited first.
+/// Pushes `entry` onto the stack, which has `top` entries. The entries from index `base` on are
+/// children of the same node. They stay sorted by descending distance, so that the nearest child is
+/// visited first.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],
@@ -208,9 +212,10 @@ fn push_sorted<S: Float>(
 }
 
 /// Traverses the hierarchy with a ray packet. Calls `leaf(index, limit)` for each leaf whose box a
-/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits. A ray with
-/// a negative limit is inactive. `bounds` are those of the active rays; with them, the children of a
-/// node are visited in the order of their smallest possible entry distances.
+/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits. A ray
+/// with a negative limit is inactive. `bounds` are the interval bounds of the active rays, if they
+/// have any. With bounds, the children of a node are visited in the order of their smallest
+/// possible entry distances.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,
@@ -233,7 +238,7 @@ pub fn traverse_packet<L: SimdFloat>(
                 let side = |k: usize| load_wide(&node.bounds[k], part);
                 let (near, candidates) = match bounds {
                     Some(bounds) => bounds.enters::<false, L>(side, L::splat(farthest)),
-                    // Without bounds the children are not ordered by distance. This test only
+                    // Without bounds the children are not ordered by distance, and this test only
                     // excludes empty slots.
                     None => (L::zero(), side(0).le(side(3))),
                 };

@@ -19,9 +19,10 @@ impl<L: SimdFloat> Ray<L> {
     }
 
     /// Returns `true` if the rays in the bit mask `lanes` are coherent, so that they traverse a BVH
-    /// faster as a packet than separately. Each ray is compared with the first one in `lanes`. Let
-    /// w be the number of lanes of the packet. The difference of the unit directions may have a
-    /// length of at most w `turn`; each coordinate of the origins may differ by at most w `shift`.
+    /// faster as a packet than separately; `false` for fewer than two rays. Each ray is compared
+    /// with the first one in `lanes`. In a packet of w lanes, the difference of their unit
+    /// directions may have a length of at most w `turn`, and each coordinate of their origins may
+    /// differ by at most w `shift`.
     #[inline(always)]
     pub fn is_coherent(&self, lanes: u32, turn: f64, shift: f64) -> bool {
         if L::WIDTH == 1 || lanes.count_ones() < 2 {

@@ -23,9 +23,9 @@ struct Reinsertion {
 struct Search {
     /// Number of node visits left, over all searches.
     visits_left: usize,
-    /// Candidates for the sibling of the moved subtree. The number is half of the area that the
-    /// removal of the subtree saves, minus the area by which its insertion enlarges the candidate's
-    /// ancestors.
+    /// Candidates for the sibling of the moved subtree, as node indices. The number of a candidate
+    /// is half of the area that the removal of the subtree saves, minus half of the area by which
+    /// its insertion enlarges the candidate's ancestors.
     stack: Vec<(f32, u32)>,
 }
 
@@ -69,7 +69,7 @@ impl<'a> LinkedTree<'a> {
         }
     }
 
-    /// Computes the boxes of the inner node `node` and of its ancestors.
+    /// Recomputes the boxes of the inner node `node` and of its ancestors.
     fn refit(&mut self, mut node: usize) {
         loop {
             let [left, right] = self.nodes[node].children().map(|child| self.nodes[child].aabb);
@@ -82,8 +82,9 @@ impl<'a> LinkedTree<'a> {
     }
 }
 
-/// Moves subtrees in 16 rounds. The first round considers the share `ratio` (0 to 1) of all nodes:
-/// large ones near the root. Round n considers 1/(2n - 1) times as many.
+/// Optimises `tree` in 16 rounds of moves. The first round searches for better places for the share
+/// `ratio` (0 to 1) of all nodes: large ones near the root. Round n searches for 1/(2n - 1) times
+/// as many nodes.
 pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -116,7 +117,8 @@ pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     }
 }
 
-/// Returns the `count` nodes with the largest surface areas among nodes 1 to `2 * count + 1`.
+/// Returns the `count` nodes with the largest surface areas among nodes 1 to `2 * count + 1`, which
+/// are close to the root.
 fn largest_nodes(nodes: &[BinaryNode], count: usize) -> Vec<usize> {
     let end = nodes.len().min(2 * (count + 1));
     let area = |node: usize| nodes[node].aabb.half_area();
@@ -140,8 +142,8 @@ impl Search {
         let aabb = &nodes[node].aabb;
         let parent = tree.parents[node] as usize;
         let (mut best, mut best_saved) = (0, 0.0);
-        // The removal of `node` deletes its parent and shrinks the ancestors up to `pivot`, whose
-        // box is then `pivot_box`. `removed` is half of the surface area that this saves.
+        // The removal of `node` deletes its parent and shrinks the ancestors up to `pivot`, to the
+        // box `pivot_box`. `removed` is half of the surface area that the removal saves.
         let mut removed = area(&nodes[parent].aabb);
         let mut beside = sibling(node);
         let mut pivot_box = nodes[beside].aabb;

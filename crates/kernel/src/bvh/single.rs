@@ -2,9 +2,9 @@
 //! leaf from memory, the others advance.
 //!
 //! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
-//! The other children wait in a stack frame, unsorted; the nearest of them is selected without
-//! branches when the ray returns. Besides memory latency, mispredicted branches are the main cost of
-//! incoherent rays.
+//! The other children wait in a stack frame, unsorted. When the ray returns to the frame, it
+//! selects the nearest of them without branches. Besides memory latency, mispredicted branches are
+//! the main cost of incoherent rays.
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -28,7 +28,7 @@ const NO_KEY: u32 = 0x7f80_0000;
 /// Mask of the low bits of a sort key, which hold the slot number of the child.
 const SLOT_MASK: u32 = BVH_WIDTH as u32 - 1;
 
-/// State of one ray.
+/// State of the traversal by one ray.
 #[derive(Clone, Copy, Default)]
 struct RayTraversal<S> {
     bounds: PacketBounds<S>,
@@ -40,10 +40,10 @@ struct RayTraversal<S> {
 }
 
 /// Traverses the hierarchy with each ray separately. Rays whose limit is not positive are inactive.
-/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of
-/// at most its limit, from near to far. `leaf` returns the new limit of the ray. Calls
-/// `prefetch_leaf(index)` one step before, so that the other rays advance in between. `frames` has
-/// memory for one stack frame for each lane and level.
+/// Calls `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters within the
+/// ray's limit, from near to far. `leaf` returns the new limit of the ray. Before that, calls
+/// `prefetch_leaf(index)`; the other rays advance between both calls. `frames` has memory for one
+/// stack frame for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -108,7 +108,7 @@ fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
 }
 
 impl<S: Float> RayTraversal<S> {
-    /// Returns the initial states of all lanes, at the root.
+    /// Returns the initial state of each lane's ray, at the root.
     #[inline(always)]
     fn each<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, limit: L) -> [Self; MAX_WIDTH] {
         let d = packet.inverse;

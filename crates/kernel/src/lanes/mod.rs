@@ -224,39 +224,39 @@ pub trait SimdFloat:
 
     /// Computes `self * a + b`, rounded once if the target has fused multiply-add, else twice.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// Lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN have
-    /// an unspecified value.
+    /// Returns the lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other`
+    /// is NaN have an unspecified value.
     fn min(self, other: Self) -> Self;
-    /// Lane-wise maximum, with NaN as for [`SimdFloat::min`].
+    /// Returns the lane-wise maximum, with NaN as for [`SimdFloat::min`].
     fn max(self, other: Self) -> Self;
-    /// Returns the minimum and the maximum over all lanes except NaN; without others,
-    /// [`SimdFloat::MAX`] and its negative.
+    /// Returns the minimum and the maximum over the lanes that are not NaN; [`SimdFloat::MAX`] and
+    /// its negative if all lanes are NaN.
     fn min_max(self) -> (Self::Scalar, Self::Scalar);
-    /// Absolute value.
+    /// Returns the absolute value.
     fn abs(self) -> Self;
-    /// Square root; NaN for negative numbers.
+    /// Returns the square root; NaN for negative numbers.
     fn sqrt(self) -> Self;
-    /// Sine and cosine of an angle in radians.
+    /// Returns sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
-    /// Angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
+    /// Returns the angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
     fn atan2(self, x: Self) -> Self;
-    /// Natural logarithm.
+    /// Returns the natural logarithm.
     fn ln(self) -> Self;
-    /// e to the power of each lane.
+    /// Returns e to the power of each lane.
     fn exp(self) -> Self;
-    /// Magnitude of `self` with the sign of `sign`.
+    /// Returns the magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// Lanes where `self < other`; false for NaN.
+    /// Returns the lanes where `self < other`; false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Lanes where `self <= other`; false for NaN.
+    /// Returns the lanes where `self <= other`; false for NaN.
     fn le(self, other: Self) -> Self::Mask;
-    /// Lanes where `self > other`; false for NaN.
+    /// Returns the lanes where `self > other`; false for NaN.
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
         other.lt(self)
     }
-    /// Lanes where `self >= other`; false for NaN.
+    /// Returns the lanes where `self >= other`; false for NaN.
     #[inline(always)]
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
@@ -271,9 +271,9 @@ pub trait SimdFloat:
         Self::select(mask, self, Self::zero())
     }
 
-    /// Stores the bits of a 32-bit id in every lane. Ids can be selected and compared, but not
-    /// computed with: ids below 2^31 - 2^23 have the order of integers, because positive floats have
-    /// the order of their bits.
+    /// Stores the bits of a 32-bit id in every lane. Ids can be selected and compared; arithmetic
+    /// on them is meaningless. Ids below 2^31 - 2^23 compare like integers, because positive floats
+    /// have the order of their bits.
     fn from_id(id: u32) -> Self;
     /// Returns the id that [`SimdFloat::from_id`] has stored in lane `i`.
     fn id_lane(self, i: usize) -> u32;
@@ -314,8 +314,8 @@ pub fn distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> impl Iterator<Item = (u3
     })
 }
 
-/// Constant 1.5 x 2^52. Adding it to a double with a magnitude below 2^51 rounds to the nearest
-/// integer, which is the difference between the bits of the sum and those of the constant.
+/// Constant 1.5 x 2^52. Adding it to a double with a magnitude below 2^51 rounds the double to an
+/// integer: the difference between the bits of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Rounds `x` to the nearest integer, ties to even. `|x|` must be below 2^51.

@@ -56,12 +56,12 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
     }
-    /// Dot product.
+    /// Returns the dot product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
     }
-    /// Cross product `self x o`.
+    /// Returns the cross product `self x o`.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self::new(
@@ -70,7 +70,7 @@ impl<L: SimdFloat> Vec3<L> {
             self.x.mul_add(o.y, -(self.y * o.x)),
         )
     }
-    /// Squared length.
+    /// Returns the squared length.
     #[inline(always)]
     pub fn length_squared(self) -> L {
         self.dot(self)
@@ -91,27 +91,27 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn mul_add(self, t: L, b: Self) -> Self {
         Self::new(self.x.mul_add(t, b.x), self.y.mul_add(t, b.y), self.z.mul_add(t, b.z))
     }
-    /// Multiplies coordinate by coordinate, as for colours.
+    /// Returns the coordinate-wise product, as for colours.
     #[inline(always)]
     pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
-    /// Coordinate-wise minimum.
+    /// Returns the coordinate-wise minimum.
     #[inline(always)]
     pub fn min(self, o: Self) -> Self {
         Self::new(self.x.min(o.x), self.y.min(o.y), self.z.min(o.z))
     }
-    /// Coordinate-wise maximum.
+    /// Returns the coordinate-wise maximum.
     #[inline(always)]
     pub fn max(self, o: Self) -> Self {
         Self::new(self.x.max(o.x), self.y.max(o.y), self.z.max(o.z))
     }
-    /// Largest coordinate.
+    /// Returns the largest coordinate.
     #[inline(always)]
     pub fn max_element(self) -> L {
         self.x.max(self.y).max(self.z)
     }
-    /// Largest absolute value of a coordinate.
+    /// Returns the largest absolute value of a coordinate.
     #[inline(always)]
     pub fn max_abs(self) -> L {
         self.x.abs().max(self.y.abs()).max(self.z.abs())

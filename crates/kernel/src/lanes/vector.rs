@@ -41,7 +41,8 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// Table for byte shuffles: the four bits of each index in reverse order, shifted left by `SHIFT`.
+/// Returns a table for byte shuffles: the reversed four bits of each index, shifted left by
+/// `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -81,7 +82,8 @@ vector_bits!(u32x4, reverse_by_shifts);
 #[cfg(target_feature = "avx512f")]
 vector_bits!(u32x16, reverse_by_shifts);
 
-/// Looks up all lanes by one permutation instruction, if the table fits into one register.
+/// Returns `table[indices[i]]` in each lane i, by one permutation instruction if the table has 16
+/// elements.
 #[cfg(target_feature = "avx512f")]
 #[inline(always)]
 fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
@@ -95,7 +97,7 @@ fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
     f32x16::new(cast(lanes))
 }
 
-/// Adds the halves of `sums` if it has eight elements.
+/// Returns four of the numbers `sums`, or the sums of both halves if there are eight.
 #[inline(always)]
 fn fold_to_four(sums: &[i64]) -> i64x4 {
     sums.chunks_exact(4)
@@ -212,7 +214,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Converted one by one, the lanes would be stored separately.
+                // All lanes are converted together. If converted one by one, they would be stored
+                // separately.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);

@@ -48,7 +48,8 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Returns the largest distance between two such rays for depths from `near` to `far`.
+    /// Returns the largest distance, at depths from `near` to `far`, between a ray from the apex
+    /// and a ray from the lens that meets it at the depth `focus`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -57,7 +58,8 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns `ball`, enlarged by the displacement of rays by the lens and by rounding errors.
+    /// Returns `ball`, enlarged by the largest displacement of rays that the lens and rounding
+    /// errors cause.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = grown(ball).radius;
@@ -101,7 +103,7 @@ pub struct BoundingVolume {
 }
 
 impl BoundingSphere {
-    /// Returns the sphere through the corners of a box; `None` is an infinite box.
+    /// Returns the sphere through the corners of a box; `None` stands for an infinite box.
     pub fn around_box(bounds: Option<Bounds>) -> Self {
         let Some((low, high)) = bounds else {
             return Self { center: DVec3::ZERO, radius: f64::INFINITY };

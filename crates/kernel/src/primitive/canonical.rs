@@ -1,5 +1,5 @@
 //! Trait of all canonical forms, the stage between the description in the scene file and the
-//! compiled primitive. A method has a default implementation only if it is right for most kinds.
+//! compiled primitive. A method has a default implementation only if that is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
 use glam::{DAffine3, DMat3, DVec3};
@@ -65,8 +65,8 @@ pub enum ProxyFace {
     Round(BoundingSphere),
 }
 
-/// Simplified geometry of an object, by which narrow gaps between objects are found: some faces,
-/// and a bounding box. The gaps decide whether single precision suffices.
+/// Simplified geometry of an object: some faces, and a bounding box. It is used to find narrow gaps
+/// between objects, which decide whether single precision suffices.
 #[derive(Clone, Debug)]
 pub struct Proxy {
     /// Faces that may be close to the faces of other objects.
@@ -141,21 +141,23 @@ pub trait CanonicalShape {
     fn thickness(&self) -> f64;
 
     /// Returns a lower bound of the distance between `point` and the surface, 0 on the surface
-    /// except for rounding errors; `None` if there is no surface. For points outside a box around
-    /// the geometry it may be the distance to the box.
+    /// except for rounding errors; `None` if there is no surface. For a point outside the bounding
+    /// box, the distance to the box may be the bound.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
     /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`: one
-    /// list for each solid of a compound, or of other geometry, with such a surface.
+    /// list for each solid of a compound that has such a surface, and at most one list for other
+    /// geometry.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Returns the projection that is used if a material does not choose one: planar for flat
-    /// geometry, and one of a box for geometry that is not round.
+    /// Returns the projection for materials that do not choose one, such as planar for flat
+    /// geometry.
     fn default_mapping(&self) -> Projection {
         Projection::Box
     }
 
-    /// Returns the proxies; none for geometry with too many details.
+    /// Returns simplified geometry for the search for gaps; none for geometry with too many
+    /// details.
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
@@ -174,8 +176,8 @@ pub trait CanonicalShape {
         Some((center - reach, center + reach))
     }
 
-    /// Returns the corners of the convex hull of geometry with flat faces, on which the object can
-    /// stand when it is snapped to the ground; none for other geometry.
+    /// Returns the corners of the convex hull of geometry with flat faces; none for other geometry.
+    /// The object can stand on these corners when it is snapped to the ground.
     fn corners(&self) -> Vec<DVec3> {
         Vec::new()
     }
@@ -193,9 +195,9 @@ pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     Some((low, high))
 }
 
-/// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, the
-/// height of the point above it and its outward normal. The largest height counts as the distance
-/// between the point and the solid.
+/// Implements [`CanonicalShape::normals_at`] for a convex solid. `sides` has, for each side, its
+/// outward normal and the height of the point above the side. The largest height counts as the
+/// distance between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);

@@ -10,8 +10,8 @@ pub struct SurfacePoint<L> {
     pub point: Vec3<L>,
     /// Unit geometric normal, out of a solid or on the front of a flat shape.
     pub normal: Vec3<L>,
-    /// Largest magnitude of the coordinates from which the point was computed. Its rounding error is
-    /// a few units in the last place of this value.
+    /// Largest magnitude of the coordinates from which `point` was computed. The rounding error of
+    /// `point` is a few units in the last place of this value.
     pub max_coordinate: L,
 }
 

@@ -67,7 +67,7 @@ impl CanonicalShape for ConicalFrustumForm {
 
     fn thickness(&self) -> f64 {
         // Smallest distance in the scene between opposite faces of the box around the canonical
-        // solid, 2 by 2 by 1.
+        // solid. In canonical space the box has the size 2 by 2 by 1.
         let [x, y, z] = rows(&self.scene_from_unit.matrix3.inverse()).map(DVec3::length);
         (2.0 / x.max(y)).min(z.recip())
     }
@@ -210,7 +210,8 @@ impl<L: SimdFloat> Chord<L> {
 }
 
 /// Returns the chord of each ray's line; `None` if no line hits the frustum. Distances are counted
-/// from the line's point closest to the middle, so that a distant origin costs no precision.
+/// from the point of the line closest to the middle of the axis, so that a distant origin costs no
+/// precision.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let half = L::from_f64(0.5);
@@ -228,9 +229,9 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
         return None;
     }
     let side = side_crossings(s, p, d);
-    // Interval between the planes of the base and the cap. For a line parallel to these planes it
-    // is practically unbounded if the line is between them, and otherwise too far away to overlap
-    // the solid.
+    // Interval between the planes of the base and the cap. If a line parallel to these planes is
+    // between them, the interval is practically unbounded. If the line is not between them, the
+    // interval is too far away to overlap the solid.
     let tiny = L::from_f64(1e-30);
     let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
     let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
@@ -281,7 +282,7 @@ fn side_crossings<L: SimdFloat>(
     let ey = r.mul_add(d.y, -(kd * p.y));
     let cross = p.x.mul_add(d.y, -(p.y * d.x));
     let discriminant = ex.mul_add(ex, ey.mul_add(ey, -(cross * cross)));
-    // Lines steeper than the side always cross both nappes of the cone.
+    // Lines steeper than the lateral surface always cross both nappes of the cone.
     let steep = a.lt(zero);
     let root = discriminant.max(zero).sqrt();
     let q = -(b + root.copysign(b));

@@ -68,13 +68,14 @@ struct Slab<S> {
     high: S,
 }
 
-/// Convex polyhedron compiled for ray intersection: bounding sphere, slabs, single faces.
+/// Convex polyhedron compiled for ray intersection: bounding sphere, pairs of parallel faces, other
+/// faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     slabs: Vec<Slab<S>>,
-    /// Single faces, relative to `center`.
+    /// Faces without a parallel face, relative to `center`.
     faces: Vec<Plane<S>>,
 }
 
@@ -200,8 +201,9 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
         let from_center = ray.origin - Vec3::splat(self.center);
-        // The face at each end of the chord has the plane closest to this end, among the faces
-        // that the line crosses inwards (at the entry) or outwards (at the exit).
+        // The entry is on the face whose plane is closest to it, among the faces that the line
+        // crosses inwards. The exit is on the face whose plane is closest to it, among the faces
+        // that the line crosses outwards.
         let mut best = (L::from_f64(-L::MAX), L::from_f64(-L::MAX));
         let mut cosines = (L::one(), L::one());
         let mut face = |normal: Vec3<L>, offset: L| {

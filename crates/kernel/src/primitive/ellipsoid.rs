@@ -70,14 +70,14 @@ impl CanonicalShape for EllipsoidForm {
 /// Returns the distance between `point` and the surface of an ellipsoid.
 ///
 /// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
-/// closest point q of the surface q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for
-/// which q is on the surface and `I + l Q` is positive definite, and q^T Q q decreases with l.
-/// (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+/// surface is q^T Q q = 1. Its closest point to p is q = (I + l Q)^-1 p for the only number l for
+/// which q is on the surface and `I + l Q` is positive definite. q^T Q q decreases with l. (Eberly
+/// 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
     let size = frobenius_norm(&q);
-    // The offset selects one of several nearest points if `point` is the centre or on an axis.
+    // The offset selects one of several closest points if `point` is the centre or on an axis.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
     // The smallest half-axis is at least 1 / sqrt(size) and at most 3^(1/4) times this length.
@@ -120,8 +120,8 @@ pub fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
 }
 
-/// Returns the product of the transpose of the matrix with the rows `m` and the vector `v`. A normal
-/// transforms by it if `m` is the inverse of the map.
+/// Returns the product of the transpose of the matrix with the rows `m` and the vector `v`. If `m`
+/// is the inverse of a map, this transforms a normal `v` by the map.
 #[inline(always)]
 pub fn transposed_times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::splat(m[0]) * v.x + Vec3::splat(m[1]) * v.y + Vec3::splat(m[2]) * v.z
@@ -140,7 +140,7 @@ impl<S: Float> Ellipsoid<S> {
 }
 
 /// Returns the distances at which each ray's line enters and leaves the ellipsoid, and the lanes
-/// that hit it; `None` if no line hits it.
+/// whose line hits it; `None` if no line hits it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));

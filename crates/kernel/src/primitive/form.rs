@@ -15,7 +15,7 @@ use crate::primitive::sphere::SphereForm;
 use crate::primitive::torus::TorusForm;
 use glam::{DAffine3, DVec3};
 
-/// Declares an enum of canonical forms, which is dereferenced to their properties.
+/// Declares an enum of canonical forms that dereferences to `dyn CanonicalShape`.
 macro_rules! form_enum {
     ($(#[$meta:meta])* pub enum $name:ident { $($(#[$doc:meta])* $kind:ident($form:ident),)+ }) => {
         $(#[$meta])*

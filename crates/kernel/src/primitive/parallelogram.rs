@@ -33,7 +33,7 @@ impl ParallelogramForm {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
-        // A map that mirrors space would exchange front and back.
+        // Exchanged edges keep the front of the parallelogram under a map that mirrors space.
         let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
         Self { corner, u, v }
     }

@@ -6,9 +6,10 @@ use crate::lanes::{SimdFloat, Vec3};
 /// towards the viewer.
 const LEAST_COSINE: f64 = 0.02;
 
-/// Returns `shading` as a unit vector on the viewer's side of the surface. `normal` is the
-/// geometric normal on the viewer's side, and `direction` is the direction of the rays. If the
-/// result is not finite or not on the side of `normal`, `normal` replaces it.
+/// Returns `shading` as a unit vector on the side of `normal`, bent towards the viewer if it does
+/// not face the viewer. `normal` is the geometric normal on the viewer's side, and `direction` is
+/// the direction of the rays. If the result is not finite or not on the side of `normal`, `normal`
+/// replaces it.
 #[inline(always)]
 pub fn keep_visible<L: SimdFloat>(
     shading: Vec3<L>,

@@ -21,7 +21,7 @@ pub struct SphereForm {
 }
 
 impl SphereForm {
-    /// A similarity maps a sphere to a sphere, any other map to an ellipsoid.
+    /// Returns the image under `map`: a sphere if `map` is a similarity, otherwise an ellipsoid.
     pub(super) fn transformed(self, map: &DAffine3) -> Solid {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
@@ -95,13 +95,13 @@ impl<S: Float> Sphere<S> {
     }
 }
 
-/// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it;
-/// `None` if no line hits it. `f` is the line's origin relative to the centre, and `d` is its unit
-/// direction.
+/// Returns the distances at which each line enters and leaves a sphere, and the lanes whose line
+/// hits it; `None` if no line hits it. `f` is the line's origin relative to the centre, and `d` is
+/// its unit direction.
 ///
 /// The discriminant is computed from the vector f - (f.d) d, whose length is the line's distance
-/// from the centre, and the root closer to the origin from the product of both roots. Neither
-/// computation cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019,
+/// from the centre. The root closer to the origin is computed from the product of both roots.
+/// Neither computation cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019,
 /// *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {

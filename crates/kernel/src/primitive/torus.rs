@@ -3,12 +3,12 @@
 //! = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
-//! Newton's method finds these zeros of h in brackets. Let s be the distance along the line from its
-//! point closest to the centre. Half the derivative of h is s - rho'(s). The graph of rho(s) is a
-//! hyperbola; its second derivative exceeds 1 between two known positions. They divide the line into
-//! three pieces on which the derivative of h is monotone, so that it has one or three zeros, which
-//! bracket the zeros of h (after Yuksel 2022, *High-Performance Polynomial Root Finding for
-//! Graphics*).
+//! Newton's method finds these zeros of h in brackets. Let s be the distance along the line from
+//! its point closest to the centre. Half the derivative of h is s - rho'(s). The graph of rho(s) is
+//! a hyperbola, whose second derivative exceeds 1 only between two known positions. These positions
+//! divide the line into three pieces. On each piece the derivative of h is monotone, so that it has
+//! one or three zeros in total. They bracket the zeros of h (after Yuksel 2022, *High-Performance
+//! Polynomial Root Finding for Graphics*).
 //!
 //! The coefficients of the quartic polynomial with the same zeros are not used, because their terms
 //! would cancel for thin tubes.
@@ -47,8 +47,8 @@ impl TorusForm {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Returns the distance of `point`, in the space of the torus, from the ring, and the unit vector
-    /// from the ring to it.
+    /// Returns the distance of `point`, in the space of the torus, from the ring, and the unit
+    /// vector from the ring to `point`.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -58,8 +58,8 @@ impl TorusForm {
 
 impl CanonicalShape for TorusForm {
     fn bounds(&self) -> Option<Bounds> {
-        // The torus is the Minkowski sum of its ring and of a ball with the radius of the tube. So
-        // is its box.
+        // The torus is the Minkowski sum of its ring and of a ball with the radius of the tube. Its
+        // box is the sum of their boxes.
         let m = &self.scene_from_torus;
         let half = |row: DVec3| self.ring * row.x.hypot(row.z) + self.tube * row.length();
         let half = DVec3::from(rows(&m.matrix3).map(half));
@@ -89,9 +89,9 @@ impl CanonicalShape for TorusForm {
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the exact distance if the map to the scene is a similarity. Otherwise the larger of
-    /// two lower bounds: the distance from the bounding box, and the distance in the space of the
-    /// torus times a lower bound of the factor by which the map scales lengths.
+    /// Returns the exact distance if the map to the scene is a similarity. Otherwise returns the
+    /// larger of two lower bounds: the distance from the bounding box, and the distance in the
+    /// space of the torus times a lower bound of the factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -111,8 +111,8 @@ impl CanonicalShape for TorusForm {
         normals_of_solid(vec![(height, steepness.normalize())], slack)
     }
 
-    /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from 0
-    /// to 1.
+    /// Returns the torus's own coordinates: u is the angle around the ring, v the angle around the
+    /// tube, both from 0 to 1.
     fn default_mapping(&self) -> Projection {
         Projection::Uv
     }
@@ -125,7 +125,7 @@ pub struct Torus<S> {
     /// Linear map from the scene to the space in which the ring has radius 1.
     unit_from_scene: [[S; 3]; 3],
     scene_from_unit: [[S; 3]; 3],
-    /// Radius of the tube in this space.
+    /// Radius of the tube in the space in which the ring has radius 1.
     tube: S,
     inverse_ring: S,
     reach: S,
@@ -145,8 +145,8 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Margin by which the search region for intersections is larger than the torus, in multiples of
-/// the machine epsilon, where the ring has radius 1.
+/// Margin by which the search region for intersections is larger than the torus, in the space in
+/// which the ring has radius 1. The unit is the machine epsilon.
 const ROOM: f64 = 64.0;
 
 /// Largest number of steps of the search for one zero. Bisection alone needs 54 in double precision.
@@ -175,7 +175,7 @@ struct UnitLine<L: SimdFloat> {
     near: L::Mask,
 }
 
-/// Position on a line relative to the torus.
+/// Position on a line, described relative to the torus.
 struct Place<L> {
     /// Distance rho from the axis, minus 1.
     beyond: L,
@@ -195,7 +195,7 @@ struct Separators<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> UnitLine<L> {
-    /// Returns `None` if no line of the packet crosses the region of the torus.
+    /// Prepares the line of each ray. Returns `None` if no line crosses the region of the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
@@ -269,8 +269,8 @@ impl<L: SimdFloat> UnitLine<L> {
         self.height(s).0.le(L::zero())
     }
 
-    /// Returns the positions of the extremes of h: minimum, maximum, minimum. A single extreme is
-    /// repeated three times.
+    /// Returns the positions of the extremes of h along the line: minimum, maximum, minimum. A
+    /// single extreme is repeated three times.
     #[inline(always)]
     fn extremes(&self) -> [L; 3] {
         let (zero, one) = (L::zero(), L::one());
@@ -313,9 +313,9 @@ impl<L: SimdFloat> UnitLine<L> {
     }
 
     /// Returns the zero of `function` between `low` and `high` in the lanes of `open`. `function`
-    /// returns its value and its derivative. `sign` times the value must be negative at `low` and
-    /// positive at `high`. The search bisects where Newton's step leaves the bracket or is slow. The
-    /// steps of a lane do not depend on other lanes.
+    /// returns a value and its derivative. `sign` times the value must be negative at `low` and
+    /// positive at `high`. The search bisects where Newton's step leaves the bracket or is slow.
+    /// The steps of a lane do not depend on other lanes.
     #[inline(always)]
     fn root(
         &self,
@@ -349,7 +349,7 @@ impl<L: SimdFloat> UnitLine<L> {
         place
     }
 
-    /// Returns the separators of the intersections after the position `start`.
+    /// Returns positions that separate the intersections of each line after the position `start`.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);

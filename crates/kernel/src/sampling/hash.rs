@@ -2,8 +2,8 @@
 
 use crate::lanes::SimdU32;
 
-/// Bijective 32-bit hash with low bias (constants: Wellons 2018, *Prospecting for Hash
-/// Functions*, `lowbias32`).
+/// Returns a bijective 32-bit hash of `x` with low bias (constants: Wellons 2018, *Prospecting for
+/// Hash Functions*, `lowbias32`).
 #[inline(always)]
 pub fn hash<B: SimdU32>(x: B) -> B {
     let x = (x ^ (x >> 16)) * B::splat(0x7feb_352d);
@@ -25,8 +25,8 @@ pub fn hash_words(words: &[u32]) -> u32 {
     })
 }
 
-/// Owen scrambling of binary fractions whose first digit is in bit 0. Whether a digit is flipped
-/// depends on `seed` and on all preceding digits.
+/// Applies Owen scrambling to binary fractions whose first digit is in bit 0. Whether a digit is
+/// flipped depends on `seed` and on all preceding digits.
 ///
 /// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]

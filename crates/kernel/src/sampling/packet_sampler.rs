@@ -43,13 +43,14 @@ pub struct SampleSettings {
 }
 
 /// Number of dimensions for a path's first choices between reflection and transmission: the last
-/// ones of the joint set. With indirect diffuse light, the first diffuse bounce uses them instead.
+/// dimensions of the joint set. With indirect diffuse light, the first diffuse bounce uses these
+/// dimensions instead.
 const CHOICES: u32 = 2;
 
 /// Largest number of surfaces on a path at which the sampled direction uses the joint set.
 const MAX_JOINT_LOBES: u32 = 2;
 
-/// Number of ways in which a packet can be divided among pixels, with 2^k samples of each.
+/// Number of ways in which a packet can be divided among pixels, with 2^k samples of each pixel.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
 /// Random positions that camera rays use. Each takes two dimensions, starting with dimension 0.
@@ -86,7 +87,7 @@ pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index of each lane, within the sequence of its pixel.
     index: L::SimdU32,
-    /// Points in each dimension after [`owen_scramble_prefix`].
+    /// Sobol points in each dimension, after [`owen_scramble_prefix`].
     owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
@@ -153,15 +154,15 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     }
 }
 
-/// Largest number of sampled directions, and of choices, in a *segment* of a path for which each
-/// segment has random numbers of its own. Diffuse bounces divide a path into segments.
+/// Number of sampled directions, and of choices, for which each *segment* of a path has random
+/// numbers of its own. Diffuse bounces divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
 /// Number of the first choice of a reservoir. Smaller numbers belong to choices between reflection
 /// and transmission.
 const RESERVOIR: u32 = 1 << 31;
 
-/// Random numbers of the samples in one packet. Each method returns those for one purpose.
+/// Random numbers of the samples in one packet. Each method returns the numbers for one purpose.
 #[derive(Clone, Copy)]
 pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
@@ -177,7 +178,7 @@ pub struct PacketSampler<'a, L: SimdFloat> {
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
-    /// Its choices use only padded sets.
+    /// The choices in this segment use only padded sets.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;
@@ -224,8 +225,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns two random numbers in [0, 1) for a point on emitter `light`, as seen from the
     /// surface that a path hits after `bounce` reflections.
     ///
-    /// They use the dimensions of [`Self::lobe_2d`] with another scrambling. Lobe and emitter may
-    /// share dimensions, because their light is added, never multiplied.
+    /// The numbers use the dimensions of [`Self::lobe_2d`] with another scrambling. Lobe and
+    /// emitter may share dimensions, because their light is added, never multiplied.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
@@ -239,7 +240,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         self.light_2d(bounce, u32::MAX - 1).0
     }
 
-    /// Returns the two dimensions of the surface after `bounce` reflections, scrambled with `salt`.
+    /// Returns the two random numbers for the surface that a path hits after `bounce` reflections,
+    /// scrambled with `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;

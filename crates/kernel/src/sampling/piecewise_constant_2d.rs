@@ -44,8 +44,8 @@ impl PiecewiseConstant2D {
         let luminance = |p: &[f32; 3]| {
             0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
         };
-        // Mean over a pixel of the function that interpolates linearly between the centres of it
-        // and its neighbours on one axis.
+        // Mean, over the middle one of three neighbouring pixels on one axis, of the function that
+        // interpolates linearly between the centres of the three.
         let smoothed =
             |before: f64, middle: f64, after: f64| 0.125 * before + 0.75 * middle + 0.125 * after;
         let along_row = |row: usize| -> Vec<f64> {
@@ -120,7 +120,7 @@ impl PiecewiseConstant2D {
         PixelSample { x, cos, density: self.density_in(row, column) }
     }
 
-    /// Returns the density [1/sr] of the direction at position `[x, y]`, 0..=1.
+    /// Returns the density [1/sr] of the direction at the position `[x, y]` in the image, 0..=1.
     pub fn density(&self, [x, y]: [f64; 2]) -> f64 {
         let rows = self.rows.len() - 1;
         // The conversion to integers saturates.
@@ -154,8 +154,8 @@ fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain(weights.iter().enumerate().map(partial))
 }
 
-/// Returns the index of the last of ascending `numbers` for which `is_below` is `true`, but not of
-/// the last of all.
+/// Returns the index of the last of the ascending `numbers` for which `is_below` is `true`, from 0
+/// to the second-last index.
 fn interval<T>(numbers: &[T], is_below: impl Fn(&T) -> bool) -> usize {
     numbers.partition_point(is_below).clamp(1, numbers.len() - 1) - 1
 }

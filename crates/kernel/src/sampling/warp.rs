@@ -1,5 +1,6 @@
 //! Sample warps: maps from the unit square to directions in a local frame, with their densities.
-//! The z axis is that of the lobe for cones and squares, and the surface normal for microfacets.
+//! The z axis is the axis of the lobe for cones and squares, and the surface normal for
+//! microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
@@ -108,14 +109,15 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 }
 
 /// Samples a microfacet normal h of the Beckmann distribution that is visible from `view` (unit
-/// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is
-/// that of V-cavities if `v_cavity` is `true`, otherwise Smith's.
+/// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is the
+/// masking of V-cavities if `v_cavity` is `true`, otherwise Smith's masking.
 ///
-/// First, the slopes of a microfacet along x and y are sampled, in units of `alpha`, whether it is
-/// visible or not: independent normal deviates with the variance 1/2, from `u` and `v`. Then the
-/// component of the slope along the azimuth of the view is replaced by the slope that has the same
-/// quantile among the visible microfacets. For views near the normal this changes the slope little;
-/// samples across the reflection of an edge along x or y are then spaced as evenly as `u` or `v`.
+/// First, the slopes of a microfacet along x and y are sampled, whether it is visible or not:
+/// independent normal deviates with the variance 1/2, from `u` and `v`, in units of `alpha`. Then
+/// the component of the slope along the azimuth of the view is replaced by the slope that has the
+/// same quantile among the visible microfacets. For views near the normal this changes the slope
+/// little; samples across the reflection of an edge along x or y are then spaced as evenly as `u`
+/// or `v`.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,
@@ -125,8 +127,8 @@ pub fn beckmann_visible<L: SimdFloat>(
     v_cavity: bool,
 ) -> Vec3<L> {
     let (sx, sy) = (erf_inverse(u), erf_inverse(v));
-    // Tangent of the angle between view and normal, in the stretched space where alpha is 1. It is
-    // the length r of the vector (rx, ry), which points along the azimuth of the view.
+    // Tangent of the angle between view and normal, in the stretched space where alpha is 1. The
+    // tangent is the length r of the vector (rx, ry), which points along the azimuth of the view.
     let scale = alpha / view.z.max(L::from_f64(1e-30));
     let (rx, ry) = (view.x * scale, view.y * scale);
     let r2 = rx.mul_add(rx, ry * ry);
@@ -170,8 +172,8 @@ fn scaled_erfc<L: SimdFloat>(x: L) -> L {
 /// microfacet; theta is the angle between view and surface normal.
 const SMALL_R: f64 = 0.25;
 
-/// Returns (t - x) / r for a given slope t of microfacets and the slope x that has the same
-/// quantile among the visible microfacets as t has among all. Both are in units of alpha. `rt` is r
+/// Returns (t - x) / r for a slope t. Here x is the slope that has the same quantile among the
+/// visible microfacets as t has among all microfacets. Both slopes are in units of alpha. `rt` is r
 /// times t, and `r2` is r^2, for r up to [`SMALL_R`]. [`visible_slope`] computes x for larger r.
 ///
 /// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked

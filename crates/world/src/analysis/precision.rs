@@ -3,8 +3,8 @@
 //! In single precision a coordinate is exact to about 2^-23 of the scene's extent, and rays that
 //! leave a surface start 2^-20 of the extent above it (the *ray offset*). Details smaller than a
 //! few ray offsets are lost. For each kind of detail, a constant below is the largest permitted
-//! ratio of the scene extent to its size. `tests/extremes/precision.rs` measures the errors at each
-//! ratio.
+//! ratio of the scene's extent to the size of the detail. `tests/extremes/precision.rs` measures
+//! the errors at each ratio.
 
 use crate::analysis::clearance::clearance;
 use crate::compile::RecenteredGeometry;
@@ -16,32 +16,34 @@ use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::EmissiveSurface;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
-/// Largest ratio to the thickness of an object: the ray offset is 1/128 of the thickness.
+/// Largest ratio of extent to thickness of an object. The ray offset is then 1/128 of the
+/// thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// Largest ratio to the width of a gap between objects: the gap is eight ray offsets wide.
+/// Largest ratio of extent to width of a gap between objects. The gap is then eight ray offsets
+/// wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// Largest ratio to the side of a pixel's footprint on the object closest to the eye: the side is
-/// 32 ray offsets.
+/// Largest ratio of extent to side of a pixel's footprint on the object closest to the eye. The
+/// side is then 32 ray offsets long.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which flat objects may be closer to the eye than curved ones: a hit point is moved
-/// back to the plane almost exactly, and the normal is constant.
+/// Factor by which flat objects may be closer to the eye than curved ones: a hit point on a flat
+/// object is moved back to the plane almost exactly, and the normal is constant.
 const FLAT: f64 = 8.0;
 
-/// Largest ratio to the distance of a light from objects: the direction to the light is wrong by
-/// 1/512 radians.
+/// Largest ratio of extent to distance between a light and objects. The direction to the light is
+/// then wrong by 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
 /// Smallest angle between the rays of neighbouring pixels \[radians\], 64 times the rounding error
-/// of a direction. A lens with the radius r, focused at the distance d, raises it by the factor 1 +
-/// r / d.
+/// of a direction. A lens with the radius r, focused at the distance d, raises this limit by the
+/// factor 1 + r / d.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
-/// Smallest width of a gap, as a fraction of the scene extent, at which two surfaces are separate:
-/// 2^-44. Surfaces with a narrower gap, or with one below 16 rounding errors of the scene file's
-/// coordinates, are treated as coincident.
+/// Smallest width of a gap, as a fraction of the scene's extent, at which two surfaces are
+/// separate: 2^-44. Surfaces with a narrower gap, or with a gap below 16 rounding errors of the
+/// scene file's coordinates, are treated as coincident.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
 /// Largest number of pairs of objects that are searched for gaps. Further pairs count as pairs

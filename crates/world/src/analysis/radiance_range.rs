@@ -65,8 +65,8 @@ pub(crate) struct RadianceRange {
 }
 
 impl RadianceRange {
-    /// Returns this range for the same light with another emission, whose factors in the darkest
-    /// and in the brightest channel are `least` and `most`.
+    /// Returns this range for the same light with another emission. `least` and `most` are the
+    /// factors of its darkest and of its brightest channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -77,7 +77,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range that covers those of two sources in one light group.
+    /// Returns the range that covers the ranges of two sources in one light group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -105,8 +105,8 @@ impl RadianceRange {
     }
 }
 
-/// Returns the smallest integer `n` with 2^n >= `x`. If `x` is multiplied by 2^k, the result is
-/// larger by exactly k.
+/// Returns the smallest integer `n` with 2^n >= `x`, at least -1022; -1022 for NaN. If `x` is
+/// multiplied by 2^k, the result is larger by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -171,7 +171,8 @@ struct LitBy {
     center: DVec3,
     /// Radius of a sphere around the light; 0 for a light without a size.
     radius: f64,
-    /// Smallest distance from surfaces that counts, except for `spots`.
+    /// Smallest distance from surfaces. Nearer surfaces count as at this distance, except in
+    /// `spots`.
     min_distance: f64,
     /// Largest distance at which the light counts as on a surface; negative if it never does.
     min_clearance: f64,
@@ -186,11 +187,13 @@ pub(crate) struct SceneDistances<'a> {
     responses: Vec<Option<Response>>,
     /// Factors of ambient light.
     ambient: Response,
-    /// Smallest factor, at most 1, of mirrors and glass without direct light.
+    /// Smallest factor, at most 1, by which mirrors and glass that reflect no direct light pass on
+    /// light.
     faintest: f64,
     /// Largest factor, at least 1, by which all mirrors of a path together multiply light.
     gain: f64,
-    /// Distance from the scene's centre at which nearer lights count in the typical radiance.
+    /// Smallest distance from the scene's centre. For the typical radiance, nearer lights count as
+    /// at this distance.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -200,8 +203,8 @@ pub(crate) struct SceneDistances<'a> {
 }
 
 impl<'a> SceneDistances<'a> {
-    /// `materials_of` returns the materials of the parts of an object. `epsilon` is the rounding
-    /// error of the world's precision.
+    /// Collects the properties of `scene`. `materials_of` returns the materials of the parts of an
+    /// object. `epsilon` is the rounding error of the world's precision.
     pub fn new(
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
@@ -248,7 +251,7 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the factors over all objects; 1 if no object reflects direct light.
+    /// Returns the factors of all objects together; 1 if no object reflects direct light.
     fn response(&self) -> Response {
         self.responses.iter().flatten().copied().reduce(Response::or).unwrap_or(Response::WHITE)
     }
@@ -310,7 +313,7 @@ impl<'a> SceneDistances<'a> {
     }
 
     /// Returns the range for object `index` of radiance 1. The area of the object's bounding sphere
-    /// stands for its own.
+    /// stands for the area of the object.
     pub fn object(&self, index: usize) -> RadianceRange {
         let bounds = self.forms[index].bounds();
         if bounds.is_some() {
@@ -322,8 +325,8 @@ impl<'a> SceneDistances<'a> {
         self.range_of(1.0, Response { least, most: most.max(1.0), peak: peak.max(1.0) })
     }
 
-    /// Returns the range for a surface inside the sphere `ball`, with the given area and the radiance
-    /// `emitted`, which counts itself if the surface is visible.
+    /// Returns the range for an emissive surface inside the sphere `ball`, with the given area and
+    /// the radiance `emitted`. If the surface is visible, its radiance is itself part of the range.
     fn emitting_surface(
         &self,
         ball: BoundingSphere,
@@ -397,8 +400,9 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see. It
-    /// counts as `brightest` only if it is larger than a quarter of a pixel (`is_wide`).
+    /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see.
+    /// This radiance counts as `brightest` only if the light is wider than a quarter of a pixel
+    /// (`is_wide`).
     fn seen(&self, range: RadianceRange, emitted: f64, is_wide: bool) -> RadianceRange {
         RadianceRange {
             brightest: if is_wide { range.brightest.max(emitted) } else { range.brightest },

@@ -83,8 +83,8 @@ fn without_emission(material: Material) -> Material {
     Material { emission: 0.0, emission_color: Color::WHITE, ..material }
 }
 
-/// Returns the light without its name and with the emission 1, with which samples of a group of its
-/// own are computed.
+/// Returns the light without its name and with the emission 1, as it is traced if it has a light
+/// group of its own.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }

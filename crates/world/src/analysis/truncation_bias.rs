@@ -27,8 +27,8 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     }
 }
 
-/// Returns the largest diffuse albedo. It is infinite for meshes, because vertex colours have no
-/// bound.
+/// Returns the largest diffuse albedo of `material` on `object`. It is infinite for meshes, because
+/// vertex colours have no bound.
 fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     let mut factor = 1.0f64;
     if let Some(Texture::Checker(checker)) = &material.texture {
@@ -70,7 +70,8 @@ struct Reach {
 }
 
 impl Reach {
-    /// `diffuse` is `true` if the factors include the diffuse albedo.
+    /// Computes the factors of the surfaces of `scene`, with the diffuse albedo if `diffuse` is
+    /// `true`.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
@@ -85,10 +86,10 @@ impl Reach {
                     if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
                 let rho = max_albedo(material, form.is_flat()) + diffuse_albedo;
                 let let_in = form.is_solid() && material.transmission > 0.0;
-                // A ray that leaves a convex object outwards cannot hit it again. A ray inside can,
-                // but a path is inside only if it starts there or was transmitted. Bump maps make no
-                // difference: directions on the wrong side of the surface are mirrored to the right
-                // side.
+                // A ray that leaves a convex object outwards cannot hit it again. A ray inside the
+                // object can, but a path is inside only if it starts there or was transmitted. Bump
+                // maps make no difference: directions on the wrong side of the surface are mirrored
+                // to the right side.
                 if !form.is_convex() || let_in || starts_inside && material.two_sided {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
@@ -161,10 +162,10 @@ impl Reach {
 /// diffuse surfaces lack the light of these objects.
 ///
 /// With diffuse bounces the factor of a surface includes its diffuse albedo. The paths that
-/// `max_depth` truncates have hit at least `max_depth + 1` surfaces, those that `max_diffuse_depth`
-/// truncates at least `max_diffuse_depth + 1`, those that are lost because `caustics` is `false` at
-/// least two. Without diffuse bounces, ambient light stands for all indirect light; that is no
-/// truncation.
+/// `max_depth` truncates have hit at least `max_depth + 1` surfaces. The paths that
+/// `max_diffuse_depth` truncates have hit at least `max_diffuse_depth + 1`. The paths that are lost
+/// because `caustics` is `false` have hit at least two. Without diffuse bounces, ambient light
+/// stands for all indirect light; that is no truncation.
 ///
 /// Total internal reflection in a transparent ball is included, although light that can enter a
 /// ball can also leave it: at the rim, rounding decides on which side of the critical angle a ray

@@ -54,11 +54,12 @@ pub(crate) struct Occluder {
     pub exempt_primitive: Option<u32>,
 }
 
+/// Possible occluder in the list of a cell.
 #[derive(Clone, Copy)]
 struct Entry<S> {
     /// Index of the primitive among those in the BVH.
     number: u32,
-    /// See [`Occluder::exempt_primitive`]; otherwise [`NO_PRIMITIVE`].
+    /// See [`Occluder::exempt_primitive`]; [`NO_PRIMITIVE`] stands for `None`.
     exempt_primitive: u32,
     /// Smallest depth of the primitive's bounding sphere. The depth of a point is its distance from
     /// a point light. For a directional light it is the coordinate along the direction in which the

@@ -9,7 +9,7 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo_kernel::primitive::{BoundingSphere, LightTarget};
 
 /// Largest magnitude of the coordinates of spheres in a perspective projection, on the plane at
-/// unit distance from the light. Beyond it, the light has a cube map.
+/// unit distance from the light. If a coordinate is larger, the light has a cube map.
 const MAX_TANGENT: f64 = 3.0;
 
 /// Projection of points, as seen from a light, onto one or more faces with coordinates from 0 to 1.
@@ -104,8 +104,8 @@ pub(crate) struct ProjectedBounds<S> {
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Chooses a projection for a light and projects the spheres `balls`, which are relative to a
-    /// point light.
+    /// Chooses a projection for a light and projects the spheres `balls`. For a point light, their
+    /// positions are relative to the light.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -133,7 +133,7 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
 }
 
-/// Projects spheres to a cube map.
+/// Projects spheres to the faces of a cube map.
 fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
@@ -182,8 +182,8 @@ fn orthographic<S: Float>(
     planar(false, [right, up, -direction], &corners)
 }
 
-/// Returns the projection that maps rectangles, each given by its lowest and highest corner, into the
-/// unit square, so that together they fill it, and the mapped rectangles.
+/// Returns the projection that maps the common bounding box of rectangles to the unit square, and
+/// the mapped rectangles. Each rectangle is given by its lowest and highest corner.
 fn planar<S: Float>(
     is_perspective: bool,
     axes: [DVec3; 3],

@@ -23,8 +23,8 @@ const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
     /// Returns the bounds of the projected corners of an object's bounding box, wider by the
-    /// largest blur of the lens. They are infinite if the object has no bounding box, or if a
-    /// corner is not in front of the eye.
+    /// largest blur of the lens. The bounds are infinite if the object has no bounding box, or if a
+    /// corner of it is not in front of the eye.
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -126,8 +126,8 @@ impl ScreenGrid {
     }
 
     /// Returns the ids of the primitives that camera rays through a rectangle \[pixels\] can hit,
-    /// in ascending order. Returns `None` if there are more than [`MAX_PER_CELL`] in it, or in a
-    /// cell that it overlaps.
+    /// in ascending order. Returns `None` if the rectangle, or a cell that it overlaps, has more
+    /// than [`MAX_PER_CELL`] candidates.
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

@@ -22,7 +22,7 @@ pub struct TileCandidates {
 pub(crate) struct Occluders {
     pub delta_lights: Vec<PrimitiveSet>,
     pub emitters: Vec<PrimitiveSet>,
-    /// Those of each stratum of the lights among which paths choose.
+    /// Possible occluders of each stratum of the lights among which paths choose.
     pub strata: Vec<PrimitiveSet>,
 }
 
@@ -57,17 +57,17 @@ pub(crate) enum CullingMode {
     ScreenBounds(Vec<ScreenBounds>),
     /// Looks up the screen cells that the tile overlaps. The primitives are in a BVH.
     ScreenGrid(ScreenGrid),
-    /// All primitives are candidates. Those in a BVH are found by its traversal.
+    /// All primitives are candidates. Rays find those in a BVH by traversal.
     Off,
 }
 
-/// Primitives that rays are tested against, with and without a tile.
+/// Candidates of rays, and the method that finds the candidates of a tile.
 pub(crate) struct Culling<S> {
     pub mode: CullingMode,
     /// Candidates for rays that belong to no tile.
     pub all_candidates: TileCandidates,
-    /// Light buffer of each light without a size; shadow rays to a light without one traverse the
-    /// BVH.
+    /// Light buffer of each light without a size. Shadow rays to a light that has no light buffer
+    /// traverse the BVH.
     pub light_buffers: Vec<Option<LightBuffer<S>>>,
 }
 
@@ -116,7 +116,7 @@ pub(crate) struct FrustumCuller {
 }
 
 impl FrustumCuller {
-    /// Creates the culler of the primitives `forms`. `outside_only` is that of the world.
+    /// Creates the culler of the primitives `forms`. `outside_only` is the field of `World`.
     pub fn new(forms: Vec<&Form>, outside_only: &[bool], lights: LightBounds) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(lights.max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
@@ -128,8 +128,8 @@ impl FrustumCuller {
         Self { lights, self_shadowing, bounds }
     }
 
-    /// Creates the light buffer of each light without a size, of the primitives in the BVH of
-    /// `geometry`; see [`LightBuffer::new`].
+    /// Creates the light buffer of each light without a size, with the primitives in the BVH of
+    /// `geometry` as possible occluders; see [`LightBuffer::new`].
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -155,7 +155,7 @@ impl FrustumCuller {
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|primitive| parts[primitive as usize].is_some());
         // Primitives that can occlude one light from a visible part of some primitive. `occludes`
-        // tests one primitive and one visible part.
+        // returns whether a primitive can occlude the light from a visible part.
         let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
             geometry.select(|primitive| {
                 let primitive = primitive as usize;

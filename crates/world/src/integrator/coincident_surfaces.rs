@@ -24,8 +24,8 @@ use zerkalo_kernel::primitive::{Aggregate, Bounds, Form, PrimitiveId, SphereForm
 use zerkalo_scene::value::{ascending, total_order};
 
 /// *Tie distance*: the largest distance along the normal at which a surface counts as coincident
-/// with that of a hit point, in rounding errors of the largest coordinate. `primitive::csg` uses the
-/// same value for surfaces of parts of a compound.
+/// with the surface of a hit point, in rounding errors of the largest coordinate. `primitive::csg`
+/// uses the same value for surfaces of parts of a compound.
 const TIE: f64 = 16.0;
 
 /// Height above coincident surfaces at which rays that leave them start, in tie distances.
@@ -51,7 +51,7 @@ enum SurfaceKind {
 /// Another primitive that may touch a primitive.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the touching primitive; for a compound, that of its first part.
+    /// Id of the touching primitive; for a compound, the id of its first part.
     primitive: u32,
     /// Smallest tie distance \[scene units\].
     tie: S,
@@ -67,15 +67,15 @@ impl<S: Float> Contact<S> {
         Self { primitive, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the tie distance at points with the result `rounding` of the function [`rounding`].
+    /// Returns the tie distance at points for which the function [`rounding`] returns `rounding`.
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Returns the lanes whose point may be on the touching primitive: at most two tie distances from
-    /// its bounding box. One is the range of the search for coincident surfaces, the other a margin
-    /// for its rounding error.
+    /// Returns the lanes whose point may be on the touching primitive: at most two tie distances
+    /// from its bounding box. One tie distance is the range of the search for coincident surfaces,
+    /// the other is a margin for rounding errors.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -125,7 +125,7 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub primitive: L,
     pub triangle: L,
     pub layer: L,
-    /// Distance of ray origins from the surface that is beyond all coincident surfaces.
+    /// Distance above the start surface at which ray origins are beyond all coincident surfaces.
     pub offset: L,
 }
 
@@ -141,7 +141,7 @@ impl<L: SimdFloat> CoincidentState<L> {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// Returns `yes` in the lanes of `mask` and `no` elsewhere. The field `lanes` is that of `no`.
+    /// Returns `yes` in the lanes of `mask` and `no` elsewhere. The result has the `lanes` of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -154,10 +154,11 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the primitives that may touch each other; `None` if no primitive that transmits touches
-    /// another one. `transparent` is `true` for primitives that transmit, and `priority_of` is the
-    /// priority of the solid that each bounds. `epsilon` is the relative rounding error of
-    /// coordinates, and `input_error` the absolute one of the scene file.
+    /// Finds the primitives that may touch each other; `None` if no primitive that transmits
+    /// touches another one. `transparent` is `true` for primitives that transmit. `priority_of` has
+    /// the priority of the solid that each primitive bounds. `epsilon` is the relative rounding
+    /// error of coordinates, and `input_error` is the absolute rounding error of coordinates in the
+    /// scene file.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -265,8 +266,8 @@ impl<S: Float> Contacts<S> {
         self.search(geometry, &coincident, media, layer)
     }
 
-    /// Searches the surfaces that coincide with the start points for the one with the lowest layer
-    /// between that of `coincident` and `layer`.
+    /// Searches the surfaces that coincide with the start points for the one with the lowest layer,
+    /// among layers above that of `coincident` and below `layer`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,

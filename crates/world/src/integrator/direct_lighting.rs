@@ -18,9 +18,10 @@ pub(crate) fn cosine_pdf<L: SimdFloat>(cos: L) -> L {
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Estimate of the light of one sample (`SampleLd` of pbrt), added to a light group. `lit` are
-    /// the lanes that the light reaches if nothing occludes it. `occluded` traces the shadow rays
-    /// of its lanes. `radiance` returns the radiance that surfaces reflect or transmit.
+    /// Adds an estimate of the light of one light sample to a light group (`SampleLd` of pbrt).
+    /// `lit` are the lanes that the light reaches if nothing occludes it. `occluded` traces shadow
+    /// rays for the given lanes and returns the occluded lanes. `radiance` returns the radiance
+    /// that surfaces reflect or transmit.
     #[inline(always)]
     pub fn add_light(
         &mut self,
@@ -75,8 +76,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         value
     }
 
-    /// Adds ambient light, which approximates indirect light, except in the lanes `bouncing`, whose
-    /// diffuse bounces compute it.
+    /// Adds ambient light, which approximates indirect light. The lanes `bouncing` get none,
+    /// because their diffuse bounces compute indirect light.
     #[inline(always)]
     pub fn ambient_light<const SIMPLE: bool>(&mut self, bouncing: Option<L::Mask>) {
         let (world, interaction) = (self.world, self.interaction);

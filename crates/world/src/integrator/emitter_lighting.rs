@@ -32,8 +32,8 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
 }
 
 /// Adds to `out` the radiance of the visible lights with a size that the rays of `lanes` hit before
-/// the distance `t_max`, and that of the visible environments where `t_max` is the largest finite
-/// number, so that the rays hit no surface.
+/// the distance `t_max`. Where `t_max` is the largest finite number, the rays hit no surface, and
+/// the radiance of the visible environments is added, too.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
@@ -64,7 +64,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Reflected rays of a packet that find emitters, the second strategy.
+/// Reflected rays of a packet, which find emitters by the second strategy.
 pub(crate) struct ReflectedRays<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
     pub lanes: L::Mask,
@@ -97,8 +97,8 @@ pub(crate) fn eval_lobe<L: SimdFloat>(
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Adds the radiance, weighted for multiple importance sampling, that emissive surfaces emit at
-    /// the hit points.
+    /// Adds the radiance that emissive surfaces emit at the hit points, weighted for multiple
+    /// importance sampling.
     #[inline(never)]
     pub fn surface_emission(&mut self, hit: &Hit<L>) {
         let path = &*self.path;
@@ -117,7 +117,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Adds the light of all emitters and environments that the surfaces reflect. `rays` are the
-    /// reflected rays that find them, too.
+    /// reflected rays that find this light, too.
     #[inline(never)]
     pub fn emitter_lighting(&mut self, rays: &ReflectedRays<L>) {
         let (world, interaction) = (self.world, self.interaction);
@@ -152,7 +152,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Returns those of `lanes` whose BSDF scatters light in more than single directions.
+    /// Returns the lanes of `lanes` whose BSDF scatters light in more than single directions.
     #[inline(always)]
     pub fn not_delta(&self, lanes: L::Mask) -> L::Mask {
         let bsdfs = self.interaction.bsdfs(lanes);
@@ -163,8 +163,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
 
     /// Returns the BSDF [1/sr] times the cosine of the angle of incidence, weighted for multiple
     /// importance sampling, in the lanes in which `light` `arrives` at the surface. `rays` are the
-    /// reflected rays that find this light, too. `diffuse` returns the weighted density of
-    /// cosine-weighted directions for their density.
+    /// reflected rays that find this light, too. `diffuse` gets the density of cosine-weighted
+    /// directions and returns it times its weight.
     #[inline(always)]
     pub fn reflected(
         &self,
@@ -192,8 +192,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Samples a point of the emitter with the number `index`, to light the points `origin`.
-    /// Emitters are the lights with a size, followed by the emissive objects; `None` if there is no
-    /// such emitter.
+    /// Emitters are the lights with a size, followed by the emissive objects. Returns `None` if
+    /// there is no emitter with this number whose points can be sampled.
     #[inline(always)]
     pub fn sample_emitter(
         &self,

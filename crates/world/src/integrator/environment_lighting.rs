@@ -48,8 +48,8 @@ pub(crate) fn visible_environments<L: SimdFloat>(
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Adds the light of all environments that the surfaces reflect. `glossy` are the reflected rays
-    /// with a finite density, which find it, too.
+    /// Adds the light of all environments that the surfaces reflect. `glossy` are the reflected
+    /// rays with a finite density, which find this light, too.
     #[inline(never)]
     pub fn environment_lighting(&mut self, glossy: &ReflectedRays<L>) {
         let interaction = self.interaction;

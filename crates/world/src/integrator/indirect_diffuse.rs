@@ -4,9 +4,9 @@
 //! starts at the camera, as in a scene without indirect diffuse light. One hit of a generation is
 //! chosen for the diffuse bounce, with a probability in proportion to the light that it can pass on
 //! (weighted reservoir sampling, Chao 1982, *A General Purpose Unequal Probability Sampling Plan*).
-//! The next generation starts there, in a direction whose density is the cosine to the normal,
-//! divided by pi. Mirrors thereby have no more noise than without diffuse bounces, and a path
-//! bounces at most once per generation.
+//! The next generation starts at the chosen hit, in a direction whose density is the cosine to the
+//! normal, divided by pi. Mirrors thereby have no more noise than without diffuse bounces, and a
+//! path bounces at most once per generation.
 //!
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
 //! therefore adds nothing where it reaches an emitter or escapes to an environment.

@@ -50,7 +50,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.geometric.mul_add(self.offset, self.point)
     }
 
-    /// Returns the origins of rays that leave on the other side.
+    /// Returns the origins of rays that leave on the side opposite to the incoming rays.
     #[inline(always)]
     pub fn ray_origin_behind(&self) -> Vec3<L> {
         self.geometric.mul_add(-self.offset, self.point)
@@ -79,7 +79,8 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Returns `direction`, mirrored at the geometric surface in lanes in which it points into it.
+    /// Returns `direction`, mirrored at the geometric surface in lanes in which it points into the
+    /// surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
@@ -124,8 +125,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Computes the surface properties if rays hit several primitives: the lanes `remaining` hit others
-/// than the first.
+/// Computes the surface properties if rays hit several primitives. The lanes `remaining` hit other
+/// primitives than the first.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

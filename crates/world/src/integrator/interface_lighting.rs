@@ -39,9 +39,9 @@ struct Side<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> RoughInterface<'a, L> {
-    /// Selects the rough interfaces out of `hit`, whose query is `query`. Surfaces that coincide with another one, in the
-    /// lanes of `coincident`, are left out, because their transmitted rays start on the other
-    /// surface.
+    /// Selects the rough interfaces out of `hit`, whose query is `query`. Surfaces that coincide
+    /// with another one, in the lanes of `coincident`, are left out, because their transmitted rays
+    /// start on the other surface.
     #[inline(always)]
     pub fn new(
         vertex: &Vertex<'_, L>,
@@ -60,9 +60,9 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
     }
 
     /// Returns the value of the interfaces for light from `direction`, and the density with which
-    /// transmitted rays, if `behind` is `true`, or reflected rays are sampled in this direction. In
-    /// lanes in which only these rays find the light, the value is zero, and the density is the
-    /// largest finite number.
+    /// rays are sampled in this direction: transmitted rays if `behind` is `true`, otherwise
+    /// reflected rays. In lanes in which only sampled rays find the light, the value is zero, and
+    /// the density is the largest finite number.
     #[inline(never)]
     pub fn eval(&self, vertex: &Vertex<'_, L>, direction: &Vec3<L>, behind: bool) -> BsdfValue<L> {
         let (world, interaction) = (vertex.world, vertex.interaction);

@@ -15,7 +15,8 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinc
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
 use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
-/// Largest number of solids that a medium stack holds: those listed last in the scene file.
+/// Largest number of solids that a medium stack holds. Of more solids around a ray, it holds those
+/// listed last in the scene file.
 const MAX_NESTING: usize = 4;
 
 /// Medium stack: priorities of the solids that each ray is inside of, in descending order. Priority
@@ -110,7 +111,8 @@ impl<L: SimdFloat> Media<'_, L> {
     }
 }
 
-/// Returns `true` if the bounding box of an object overlaps the sphere `ball`, or if it has none.
+/// Returns `true` if the bounding box of an object overlaps the sphere `ball`, or if the object has
+/// none.
 pub(crate) fn may_reach(ball: &BoundingSphere, form: &Form) -> bool {
     let reaches = |bounds| box_distance(bounds, ball.center) <= ball.radius;
     form.bounds().is_none_or(reaches)
@@ -143,8 +145,8 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> InterfaceHit<L> {
-    /// Returns the media of the rays that leave on the side of the incoming rays, whose media are
-    /// `stack`.
+    /// Returns the media of the rays that leave on the side of the incoming rays. `stack` has the
+    /// media of the incoming rays.
     #[inline(always)]
     pub fn stack_reflected(&self, stack: &MediumStack<L>) -> MediumStack<L> {
         MediumStack::select(self.lanes, &self.medium_reflected, stack)
@@ -162,8 +164,8 @@ impl<L: SimdFloat> InterfaceHit<L> {
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
-    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are those with the indices
-    /// `bsdf_of`; `None` if no BSDF transmits. Camera rays start in the sphere `start`.
+    /// Compiles the transmissive surfaces of `primitives`; `None` if no BSDF transmits. `bsdf_of`
+    /// has the index of each primitive's BSDF in `bsdfs`. Camera rays start in the sphere `start`.
     pub fn new(
         geometry: &RecenteredGeometry,
         primitives: &[PrimitiveId],
@@ -278,7 +280,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns what `media`, if any, let through of `radiance` along rays of the length `distance`.
+/// Returns the part of `radiance` that is left after `distance` in `media`; all of it without
+/// media.
 #[inline(always)]
 pub(crate) fn attenuated<L: SimdFloat>(
     media: Option<Media<'_, L>>,

@@ -15,10 +15,9 @@ impl<L: SimdFloat> Integrator<'_, L> {
     /// paths start in the lanes `active`. `path` is overwritten. `reservoir` collects the hits from
     /// which indirect diffuse light may bounce.
     ///
-    /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. If `EMITTERS` is
-    /// `true`, `SIMPLE` is `false`; otherwise it is the value of
-    /// [`World::simple`](crate::World::simple). `SIMPLE` has the same meaning in all called
-    /// functions.
+    /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. `SIMPLE` is then
+    /// `false`; otherwise it is the value of [`World::simple`](crate::World::simple). `SIMPLE` has
+    /// the same meaning in all called functions.
     #[inline(never)]
     pub fn trace_opaque<const SIMPLE: bool, const EMITTERS: bool>(
         &self,

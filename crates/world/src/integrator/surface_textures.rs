@@ -20,7 +20,8 @@ struct SurfaceTexture<S> {
 
 /// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
-    /// `None` for primitives with neither. Empty if no material has any.
+    /// Texture and bump map of each primitive; `None` for a primitive with neither. Empty if no
+    /// material has a texture or a bump map.
     of_primitive: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
@@ -127,8 +128,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
     }
 }
 
-/// Returns the texture coordinates at the hit points: those of the mesh if `mapping` uses them and
-/// the mesh has them, otherwise those of the projection.
+/// Returns the texture coordinates at the hit points: the primitive's own coordinates if it has
+/// some and `mapping` uses them, otherwise the coordinates of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     mapping: &TextureMapping<L::Scalar>,
@@ -175,8 +176,8 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
 }
 
 /// Returns unit shading normals at the hit points of rays along `direction`: interpolated on smooth
-/// meshes, perturbed by bump maps, and bent so that they face the rays. They are on the side of the
-/// normal `geometric`, which faces the rays and points outwards in the lanes `front`.
+/// meshes, perturbed by bump maps, and bent so that they face the rays. The normals are on the side
+/// of `geometric`, the normal that faces the rays and points outwards in the lanes `front`.
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,

@@ -101,9 +101,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         }
     }
 
-    /// Traces the rays of `branch` to their next surfaces and adds the radiance of these. Replaces
-    /// `branch` by the paths that continue, and returns `false` if there are none. At an interface
-    /// among the first [`SPLIT_DEPTH`] surfaces, the reflected branch is stored in `waiting`.
+    /// Traces the rays of `branch` to their next surfaces and adds the radiance of these surfaces.
+    /// Replaces `branch` by the paths that continue, and returns `false` if there are none. At an
+    /// interface among the first [`SPLIT_DEPTH`] surfaces, the reflected branch is stored in
+    /// `waiting`.
     fn advance(
         &self,
         branch: &mut Branch<L>,
@@ -243,8 +244,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
-    /// Finds the next of several coincident surfaces behind rays of `branch` that start on one of
-    /// them. Replaces their hits in `hit`, and moves their origin onto that surface.
+    /// Finds the surface that rays of `branch` cross next if they start on one of several
+    /// coincident surfaces. Replaces the hits of these rays in `hit`, and moves their origins onto
+    /// the surface. Returns `None` if no ray starts on such a surface.
     fn behind(&self, branch: &mut Branch<L>, hit: &mut Hit<L>) -> Option<CoincidentQuery<L>> {
         let contacts = self.nested_dielectrics.contacts.as_ref()?;
         let coincident = branch.coincident.as_ref()?;
@@ -261,10 +263,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         Some(next)
     }
 
-    /// Continues `branch` with the transmitted paths, and in lanes without one with the reflected
-    /// paths. Lanes with both store the reflected branch in `waiting`, or choose one of the two at
-    /// random after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of transmitted rays.
-    /// Returns `false` if no path continues.
+    /// Continues `branch` with the transmitted paths, or with the reflected paths in lanes that
+    /// have no transmitted one. Lanes with both store the reflected branch in `waiting`, or choose
+    /// one of the two at random after [`SPLIT_DEPTH`] surfaces. `coincident` is the state of
+    /// transmitted rays. Returns `false` if no path continues.
     fn follow(
         &self,
         branch: &mut Branch<L>,
@@ -312,8 +314,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 }
 
-/// Returns the reflected rays that find emitters, too, and the share of the light that is
-/// reflected. Rough interfaces are excluded; see [`RoughInterface`].
+/// Returns the reflected rays that find emitters, too, and the reflected share of the light. Rough
+/// interfaces are excluded; see [`RoughInterface`].
 fn reflected_rays<L: SimdFloat>(
     vertex: &Vertex<'_, L>,
     hit: Option<&InterfaceHit<L>>,
@@ -387,7 +389,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
     }
 
     /// Samples the directions of `lanes`, whose surfaces have BSDF number `index`: they are opaque,
-    /// or transmit without roughness. `numbers` are those of [`Vertex::lobe_numbers`].
+    /// or transmit without roughness. `numbers` is the argument of [`Vertex::lobe_numbers`].
     fn sample_smooth(
         &mut self,
         vertex: &mut Vertex<'_, L>,
@@ -432,7 +434,7 @@ impl<'a, L: SimdFloat> Split<'a, L> {
     }
 
     /// Samples the directions of `lanes`, whose surfaces have BSDF number `index` and transmit with
-    /// roughness. `numbers` are those of [`Vertex::lobe_numbers`].
+    /// roughness. `numbers` is the argument of [`Vertex::lobe_numbers`].
     #[inline(never)]
     fn sample_rough(
         &mut self,

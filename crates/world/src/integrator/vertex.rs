@@ -27,9 +27,9 @@ pub(crate) struct Vertex<'a, L: SimdFloat> {
     pub out: &'a mut Radiance<L>,
 }
 
-/// Multiplies the throughput of `path` by the transmittance up to its hits at the distance `t`. Adds
-/// the background in those of the lanes `active` that hit no surface, where `t` is the largest finite
-/// number, and returns the others.
+/// Multiplies the throughput of `path` by the transmittance up to its hits at the distance `t`,
+/// which is the largest finite number without a hit. Adds the background in the lanes of `active`
+/// that hit no surface. Returns the other lanes of `active`.
 #[inline(always)]
 pub(crate) fn add_background<L: SimdFloat>(
     world: &World<L>,

@@ -89,10 +89,10 @@ pub(crate) struct ChosenSets<'a, S> {
 
 impl<S: Float> LightChoice<S> {
     /// Removes from `sources` the lights among which paths choose: point and spot lights that are
-    /// not on a surface, except for bright ones. Lights of a kind remain if the scene does not have
-    /// `many` of it, or if fewer than `MIN_LIGHTS` of them are not on a surface. Returns `None`,
-    /// and removes nothing, if no lights are left to choose from. `extent` is the largest absolute
-    /// coordinate of the scene's shapes and camera.
+    /// not on a surface, except for bright ones. Point lights remain if the scene does not have
+    /// `many` of them, or if fewer than `MIN_LIGHTS` of them are not on a surface. The same holds
+    /// for spot lights. Returns `None`, and removes nothing, if no lights are left to choose from.
+    /// `extent` is the largest absolute coordinate of the scene's shapes and camera.
     pub fn take(sources: &mut Vec<DeltaSource<S>>, many: &ManyLights, extent: f64) -> Option<Self> {
         let of_kind = |is_spot: bool, is_many: bool| {
             let is_kind = |source: &DeltaSource<S>| match &source.light.light {
@@ -317,8 +317,8 @@ fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
 }
 
 /// Returns the power of each light in arbitrary units: red, green and blue. Lights without falloff
-/// are compared with the others at the mean distance of the lights from the scene's centre, or at
-/// `extent` if it is larger.
+/// are compared with the others at the mean distance of the lights from the scene's centre.
+/// Distances below `extent` count as `extent`.
 fn powers<'a, S: Float>(
     lights: impl Iterator<Item = &'a DeltaSource<S>> + Clone,
     extent: f64,
@@ -340,11 +340,11 @@ fn powers<'a, S: Float>(
 ///
 /// The bright lights are the brightest k. The number k, at most [`MAX_BRIGHT`], is the one with the
 /// smallest product of variance and cost. The cost is the number of rays per surface: one that
-/// arrives, one to each bright light, and those to the lights of a set. The variance has three
-/// parts. The first is common to all lights, because it depends on the place of the surface only:
-/// the squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
-/// powers of the bright lights. The third is that sum for the other lights, times the number of
-/// sets, because a path reaches only one of the sets.
+/// arrives, one to each bright light, and one to each light of a set. The variance has three parts.
+/// The first is common to all lights, because it depends on the place of the surface only: the
+/// squared sum of all powers, times [`COMMON_VARIANCE`]. The second is the sum of the squared
+/// powers of the bright lights. The third is the sum of the squared powers of the other lights,
+/// times the number of sets, because a path reaches only one of the sets.
 ///
 /// If all lights have similar powers, none is bright, because the squared sum outweighs the rest.
 fn bright_lights(powers: &[DVec3], sets: usize) -> Vec<usize> {

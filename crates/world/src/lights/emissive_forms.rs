@@ -16,8 +16,8 @@ pub(crate) fn is_sampled(form: &Form) -> bool {
     surface_of(form).is_some()
 }
 
-/// Returns the surface from which light of the object `form` is sampled; `None` if its points cannot
-/// be sampled, see [`is_sampled`].
+/// Returns the surface from which light of the object `form` is sampled; `None` if its points
+/// cannot be sampled.
 pub(crate) fn surface_of(form: &Form) -> Option<EmissiveSurface> {
     match form {
         Form::Sphere(sphere) => {

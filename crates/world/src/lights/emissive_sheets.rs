@@ -18,19 +18,22 @@ use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace};
 
-/// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
-/// points. At this distance the surface does not count as covering them (see [`CONTACT_LIFTS`]).
+/// Distance between an emissive sheet and the surface off which it is moved, in multiples of the
+/// height of sampled points. At this distance the surface does not count as covering the points
+/// (see [`CONTACT_LIFTS`]).
 const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
 
 /// Number of test points for contact along each side of a triangle.
 const POINTS_PER_SIDE: u32 = 12;
 
-/// Largest number of triangles of a form that are tested at several points each; others at one
-/// point.
+/// Largest number of triangles of a form for which several points of each triangle are tested. For
+/// more triangles, one point of each is tested.
 const MAX_DETAILED: usize = 12;
 
+/// Largest number of triangles of a mesh that are tested.
 const MAX_POINTS: usize = 1024;
 
+/// Smallest cosine of the angle between normals that count as parallel.
 const MIN_COSINE: f64 = 0.999_999;
 
 /// Sides on which an object emits light.

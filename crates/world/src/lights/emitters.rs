@@ -80,7 +80,8 @@ impl<S: Float> Emitters<S> {
                 emitting.push((name, light));
             }
         }
-        // Parts of objects whose materials emit: the index of the object, and that in `emitting`.
+        // For each primitive whose material emits, the index of its object and the index in
+        // `emitting`.
         let part_of = |id: &PrimitiveId| {
             let name = scene.objects[id.form].materials()[id.part];
             Some((id.form, emitting.iter().position(|(known, _)| *known == name)?))
@@ -92,7 +93,8 @@ impl<S: Float> Emitters<S> {
         let mut known = HashSet::new();
         let distinct = parts.iter().flatten().filter(|part| known.insert(**part)).copied();
         let compile = |part: (usize, usize)| {
-            // Of compounds, no points are sampled: only they have materials of parts.
+            // The object has one material: only compounds have more, and their points are not
+            // sampled.
             let material = scene.materials.get(&scene.objects[part.0].material);
             let both_sides = material.is_none_or(|material: &Material| material.two_sided);
             let light = surface_of(&forms[part.0])
@@ -144,6 +146,7 @@ impl<S: Float> Emitters<S> {
         }
     }
 
+    /// Returns the result of [`Self::covered`] for the objects `touching`, which touch the emitter.
     #[inline(never)]
     fn covered_by<L: SimdFloat<Scalar = S>>(
         &self,

@@ -13,15 +13,15 @@ use zerkalo_scene::material::Material;
 use zerkalo_scene::value::Color;
 use zerkalo_scene::{Object, Scene};
 
-/// Largest number of light groups for lights and emissive materials. Further ones share the last of
-/// these groups.
+/// Largest number of light groups for lights and emissive materials. Further lights and materials
+/// share the last of these groups.
 const MAX_LIGHT_GROUPS: usize = 8;
 
 /// Largest number of light groups, with ambient light and background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
 /// Largest size of the film's integer sums \[bytes\]. Lights get groups of their own until the sums
-/// reach it.
+/// reach this size.
 const FILM_BYTES: u64 = 1 << 30;
 
 /// Bytes of the film per pixel and light group: two replicates, three channels, eight bytes.
@@ -139,8 +139,8 @@ impl LightGroups {
         Self { members, lit, ambient, many }
     }
 
-    /// Returns the number of groups that would remain if all lights and emissive materials shared
-    /// one.
+    /// Returns the number of groups that would remain if all lights and emissive materials shared a
+    /// single group.
     pub fn merged_count(&self) -> usize {
         let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
         self.members.len() - lights.saturating_sub(1)
@@ -192,8 +192,8 @@ impl LightGroups {
     }
 
     /// Returns the scale of each group: the number of integer steps per unit of radiance in the
-    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `ranges` has that of
-    /// each light, by its index in the scene, for intensity 1.
+    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `ranges` has the
+    /// range of each light, by its index in the scene, for intensity 1.
     pub(crate) fn scales<S: Float>(
         &self,
         scene: &Scene,

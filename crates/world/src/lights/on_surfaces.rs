@@ -15,7 +15,8 @@ use zerkalo_kernel::primitive::Form;
 /// largest coordinate.
 const ON: f64 = 8.0;
 
-/// Height above a light's surface at which shadow rays to the light end, in the same unit.
+/// Height above a light's surface at which shadow rays to the light end, in rounding errors of the
+/// largest coordinate.
 const LIFT: f64 = 16.0;
 
 /// Largest distance by which one solid moves the end point of shadow rays away from a light on its

@@ -81,8 +81,8 @@ macro_rules! batches {
     };
 }
 
-// Kinds of compiled primitives, in the order in which primitives are numbered. Forms of the last
-// kinds become several primitives, or none. A new kind needs a word here.
+// Kinds of compiled primitives, in the order in which primitives are numbered. A form of the kinds
+// after `parts` becomes several primitives, or none. A new kind needs a word here.
 batches! {
     Parallelogram, Plane, Sphere, Ellipsoid, ConvexPolyhedron, ConicalFrustum, Torus;
     parts: Csg(CompoundPart), Mesh(MeshInstance)
@@ -137,7 +137,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
     }
 }
 
-/// Origin of a compiled primitive.
+/// Origin of a compiled primitive in the list of canonical forms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
     /// Index of the canonical form in the list given to the aggregate.
@@ -158,7 +158,8 @@ pub struct LabelledBatch<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Compiles those of `forms` for which `compile` returns primitives; `None` if there are none.
+    /// Compiles the `forms` for which `compile` returns primitives into one batch; `None` if there
+    /// are none.
     fn new<P, I: IntoIterator<Item = P>>(
         forms: &[Form],
         compile: impl Fn(&Form) -> Option<I>,

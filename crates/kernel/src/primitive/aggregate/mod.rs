@@ -29,7 +29,7 @@ pub const BVH_MIN_PRIMITIVES: usize = 96;
 /// Structure that an [`Aggregate`] uses to test rays against fewer primitives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AccelerationStructure {
-    /// No structure: primitives are tested one by one. The string is the name of such a list in the
+    /// No structure: primitives are tested one by one. The string is the name of this method in the
     /// inventory of the scene.
     List(&'static str),
     /// Bounding box of each primitive.
@@ -143,7 +143,7 @@ impl<L: SimdFloat> Aggregate<L> {
         Self { batches, all, bvh, in_bvh, boxes, sources, description }
     }
 
-    /// Returns the set of all primitives in the BVH and of the others that `wanted` accepts.
+    /// Returns the set of all primitives in the BVH, and of those outside it that `wanted` accepts.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(usize, Range<usize>)> = Vec::new();
         for (index, range) in &self.all.ranges {
@@ -158,8 +158,8 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, bvh: self.all.bvh }
     }
 
-    /// Returns the set of all primitives outside the BVH and of `primitives`, which must be in it,
-    /// for tests without traversal of the BVH.
+    /// Returns the set of all primitives outside the BVH and of `primitives`, which must be in the
+    /// BVH. Queries of this set do not traverse the BVH.
     pub fn select_indices(&self, primitives: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for primitive in primitives {
@@ -202,8 +202,8 @@ impl<L: SimdFloat> Aggregate<L> {
         self.batches.iter().take_while(|batch| batch.end <= primitive).count()
     }
 
-    /// Returns the closest hit of each ray with the primitives of `set`; at equal distances that of
-    /// the primitive with the lowest number, whatever the order of the BVH.
+    /// Returns the closest hit of each ray with the primitives of `set`. Among hits at equal
+    /// distances, the primitive with the lowest number counts, whatever the order of the BVH.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
         self.closest_masked(ray, set, L::mask(true))
@@ -252,7 +252,8 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Iterates over the primitives that are tested one by one: batch, number in it, bounding box.
+    /// Iterates over the primitives of `set` that are tested one by one: batch, number in the
+    /// batch, and bounding box, which is `None` for an infinite primitive.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
@@ -406,9 +407,9 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().iter().any(MeshInstance::is_colored)
     }
 
-    /// Returns the shading normal of `primitive` at a hit point. `at` has the hit point,
-    /// and the geometric normal on the viewer's side. `direction` is the direction of the rays. The angles of
-    /// the result to the geometric normal and to the direction of the viewer are below 90 degrees.
+    /// Returns the shading normal of `primitive` at a hit point. `at` has the hit point and the
+    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The result
+    /// is less than 90 degrees away from the geometric normal and from the direction to the viewer.
     pub fn shading_normal(
         &self,
         primitive: u32,

@@ -11,7 +11,7 @@ use glam::DVec3;
 pub struct PrimitiveBox<S> {
     low: [S; 3],
     high: [S; 3],
-    /// Object space of the box; `None` if its axes are those of the scene.
+    /// Object space of an oriented box; `None` if the box is axis-aligned in the scene.
     space: Option<BoxFrame<S>>,
 }
 
@@ -20,8 +20,8 @@ pub struct PrimitiveBox<S> {
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// Sum of the magnitudes of each row: the largest factor by which the map to object space
-    /// enlarges a rounding error on that axis.
+    /// Sum of the magnitudes in each row: the largest factor by which the map to object space
+    /// enlarges rounding errors along the axis of the row.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
@@ -36,9 +36,9 @@ pub fn padded((low, high): Bounds, epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// Largest distance between a side of a solid's bounding box and the solid, as a fraction of the
-/// largest coordinate. It is not 0 far from the origin of the scene file, because box and solid are
-/// rounded differently in double precision.
+/// Rounding error of a bounding box in double precision, as a fraction of the largest coordinate.
+/// Far from the origin of the scene file, a solid may extend beyond its box by this error, because
+/// both are rounded differently.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> PrimitiveBox<S> {

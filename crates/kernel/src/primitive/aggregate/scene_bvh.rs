@@ -9,14 +9,15 @@ use crate::primitive::aggregate::primitive_box::padded;
 use crate::primitive::canonical::Bounds;
 use glam::DVec3;
 
-/// Coherence limit, for [`Ray::is_coherent`]: bound of the differences of directions, and of those
-/// of origins divided by the extent of the primitives. It is divided by the square root of the
-/// number of primitives.
+/// Coherence limit for [`Ray::is_coherent`]. Divided by the square root of the number of
+/// primitives, it is the largest difference of unit directions. This quotient times the extent of
+/// the primitives is the largest difference of origins.
 ///
 /// Measured with spheres inside a large ball and packets of eight rays. A packet is as fast as
 /// single rays if its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000.
 /// With 100 spheres, even packets of random rays are as fast as single rays. For packets of four
-/// rays, the differences at which both are equally fast are at most half as large.
+/// rays, the differences at which packets and single rays are equally fast are at most half as
+/// large.
 const COHERENCE_LIMIT: f64 = 1.5;
 
 /// BVH over the primitives of a scene, one primitive per leaf.
@@ -24,9 +25,9 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// Primitive in each leaf of the BVH, as its index in the list given to [`SceneBvh::new`].
     primitives: Vec<u32>,
-    /// Largest difference of unit directions for which [`Ray::is_coherent`].
+    /// Argument `turn` of [`Ray::is_coherent`].
     turn: f64,
-    /// Largest difference of the coordinates of origins for which [`Ray::is_coherent`].
+    /// Argument `shift` of [`Ray::is_coherent`].
     shift: f64,
 }
 

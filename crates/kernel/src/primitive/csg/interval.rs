@@ -51,9 +51,9 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines the transitions of two operands into that of the result, with the given `before`
-    /// and `after`. In a lane in which `self` changes sides and ends on the same side as the
-    /// result, the surface is that of `self`, in other lanes that of `other`.
+    /// Combines the transitions of two operands into the transition of the result, whose sides are
+    /// `before` and `after`. The surface is that of `self` in lanes in which `self` changes sides
+    /// and ends on the same side as the result. In other lanes it is that of `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));

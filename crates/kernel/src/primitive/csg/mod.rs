@@ -2,8 +2,9 @@
 //! intervals along lines (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
 //! Each part returns the spans in which a line is inside it. The sorted ends of all spans divide
-//! the line into pieces. Each piece is either inside or outside any given part, and therefore the
-//! compound. The line crosses the surface of the compound where an inner and an outer piece meet.
+//! the line into pieces. Each piece is either inside or outside any given part, and therefore
+//! either inside or outside the compound. The line crosses the surface of the compound where an
+//! inner and an outer piece meet.
 //!
 //! Two ends coincide if the distance between them, measured perpendicular to the surface, is at
 //! most [`TIE`] rounding errors. There is no piece between them. A cut flush with a face therefore
@@ -27,8 +28,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Distance within which surfaces of a compound's parts count as coincident. The unit is the
-/// rounding error of the largest coordinate. The distance covers two faces whose coordinates differ
-/// by four units in the last place, each hit with a few rounding errors.
+/// rounding error of the largest coordinate. Two faces whose coordinates differ by four units in
+/// the last place are within this distance, although each is hit with a few rounding errors.
 const TIE: f64 = 16.0;
 
 /// Instruction of a stack machine that computes whether a point is inside a compound. An entry of
@@ -135,8 +136,8 @@ impl<S: Float> Compound<S> {
         depth
     }
 
-    /// Replaces `hit` in the lanes of `wanted` whose ray hits the compound nearer than `hit`. The ids
-    /// of its parts begin with `first_id`.
+    /// Replaces `hit` in the lanes of `wanted` whose ray hits the compound nearer than `hit`. The
+    /// first part of the compound has the id `first_id`; the other parts follow.
     #[inline(never)]
     fn intersect<L: SimdFloat<Scalar = S>>(
         &self,
@@ -201,7 +202,8 @@ impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
         Some(hit.t.lt(limit))
     }
 
-    /// The normal points out of the compound.
+    /// Returns the point on the surface of this part, with the normal that points out of the
+    /// compound.
     #[inline(never)]
     fn surface(&self, _triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let part = &self.compound.parts[self.part];
@@ -215,7 +217,7 @@ impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
     }
 }
 
-/// Lines of a ray packet through one compound.
+/// Lines of a ray packet, cut by the parts of one compound.
 struct Lines<'a, L: SimdFloat> {
     compound: &'a Compound<L::Scalar>,
     /// Id of the compound's first part.
@@ -230,8 +232,8 @@ impl<L: SimdFloat> Lines<'_, L> {
         &self.spans[self.compound.parts[part as usize].spans.clone()]
     }
 
-    /// Executes the instructions on a stack of values: `part` returns the value of a part, and
-    /// `join` combines two values.
+    /// Executes the instructions of the compound on a stack of values. `part` returns the value of
+    /// a part, and `join` combines two values.
     #[inline(always)]
     fn evaluate<T: Copy>(
         &self,

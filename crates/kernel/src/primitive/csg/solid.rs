@@ -30,7 +30,7 @@ pub struct Span<L: SimdFloat> {
 
 /// Compiled primitive that encloses a volume.
 pub trait SolidPrimitive<L: SimdFloat>: AnalyticPrimitive<L> {
-    /// Spans in ascending order and without overlap.
+    /// Collection of spans in ascending order, without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
     /// Returns the spans of the lines of a ray packet; none if no line hits the solid.
@@ -116,7 +116,8 @@ macro_rules! solids {
     };
 }
 
-// Solids, each with the largest number of spans of one line, and the forms that are none.
+// Kinds of solids, each with the largest number of spans of one line. Forms after `others` are no
+// solids.
 solids! {
     Sphere(SphereForm, 1),
     Ellipsoid(EllipsoidForm, 1),

@@ -98,6 +98,7 @@ impl CsgSolid {
         }
     }
 
+    /// Returns the bounding box of the points of `tree`; `None` if it is infinite.
     fn bounds_of(&self, tree: &CsgTree) -> Option<Bounds> {
         match tree {
             CsgTree::Part(i) => self.parts[*i].bounds(),
@@ -108,8 +109,7 @@ impl CsgSolid {
             CsgTree::Intersection(list) => {
                 let boxes = list.iter().filter_map(|t| self.bounds_of(t));
                 let (low, high) = boxes.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
-                // If the boxes are disjoint along an axis, the result has no extent along this
-                // axis.
+                // The result has no extent along an axis on which the boxes are disjoint.
                 Some((low, high.max(low)))
             }
             CsgTree::Difference(list) => self.bounds_of(list.first()?),

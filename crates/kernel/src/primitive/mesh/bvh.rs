@@ -82,8 +82,8 @@ impl Mesh {
         Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
     }
 
-    /// Returns a unit normal per vertex: those of the file, or else the mean normal of the adjacent
-    /// triangles, which the first call computes.
+    /// Returns a unit normal per vertex: the normals of the file, or else the mean normals of the
+    /// adjacent triangles, which the first call computes.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,
@@ -101,7 +101,7 @@ impl Mesh {
     }
 
     /// Returns the least value of `of_triangle` over all triangles. `lower_bound` returns a number
-    /// that is at most the values of all triangles in a box.
+    /// that is not above the value of any triangle in a box.
     pub fn least(
         &self,
         lower_bound: impl Fn(Bounds) -> f64,

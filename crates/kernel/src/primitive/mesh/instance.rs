@@ -97,7 +97,7 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// A mesh has many faces, and its corners are in single precision.
+    /// Returns none: a mesh has many faces, and its corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
         Vec::new()
     }
@@ -127,10 +127,11 @@ pub struct MeshInstance<S> {
     extent: PrimitiveBox<S>,
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
-    /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
-    /// space. Points are transformed relative to it, so that the rounding error of the linear map
-    /// is in proportion to the distance from it.
+    /// Centre of the mesh's bounding box in scene space. Points are transformed relative to it, so
+    /// that the rounding error of the linear map is in proportion to their distance from the
+    /// centre.
     center: [S; 3],
+    /// Centre of the mesh's bounding box in mesh space.
     mesh_center: [S; 3],
     reach: S,
     /// `true` if shading normals are interpolated between vertices.
@@ -143,7 +144,7 @@ struct Triangle<L> {
 }
 
 impl<S: Float> MeshInstance<S> {
-    /// Compiles a placed mesh; none without finite bounds.
+    /// Compiles a placed mesh; `None` for a mesh without finite bounds.
     pub fn of(form: &MeshForm) -> Option<Self> {
         let MeshForm { mesh, scene_from_mesh, smooth } = form;
         let [low, high] = mesh.mesh.bounds.map(|c| DVec3::from(c.map(f64::from)));
@@ -155,8 +156,8 @@ impl<S: Float> MeshInstance<S> {
             .into_iter()
             .map(DVec3::length)
             .fold(0.0, f64::max);
-        // Rounding errors in mesh space are at most those of the largest corner coordinate, here
-        // in scene units.
+        // Rounding errors in mesh space are at most those of the largest coordinate of a corner,
+        // which is converted to scene units here.
         let inner = low.abs().max(high.abs()).max_element() * scale;
         let outer = form.max_coordinate();
         Some(Self {
@@ -188,7 +189,8 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Returns the ray in mesh space, and the length there of a step of length 1 in the scene.
+    /// Returns each ray in mesh space, and the length in mesh space of a step of length 1 in the
+    /// scene.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -219,8 +221,8 @@ impl<S: Float> MeshInstance<S> {
         [a, b, c].map(|components| components.each_ref().map(vector))
     }
 
-    /// Returns the vertices of the triangle in one lane. Lanes that hit another primitive may hold
-    /// any triangle id; it is clamped to a valid one.
+    /// Returns the vertices of the triangle in one lane. A lane that hits another primitive may
+    /// hold any triangle id, which is clamped to a valid one.
     #[inline(always)]
     fn vertices<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L, lane: usize) -> [u32; 3] {
         let triangles = &self.mesh.mesh.triangles;
@@ -306,11 +308,12 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
         Some(intersection::occluded(&self.mesh, &inner, limit))
     }
 
-    /// Projects `point` onto the plane of `triangle`.
+    /// Returns the projection of `point` onto the plane of `triangle`.
     #[inline(never)]
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let triangle = self.triangle(triangle);
-        // Divided by its largest component, the squared length neither overflows nor underflows.
+        // The normal is divided by its largest component, so that its squared length is neither 0
+        // nor infinite.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());

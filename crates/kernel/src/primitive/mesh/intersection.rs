@@ -1,7 +1,7 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! The rays of a coherent packet traverse the BVH together, those of other packets separately. A
-//! triangle is tested by the same operations in both cases, so that both find the same one.
+//! The rays of a coherent packet traverse the BVH together; the rays of other packets traverse it
+//! separately. Both ways test a triangle by the same operations, so that they find the same hits.
 
 use crate::bvh::BVH_WIDTH;
 use crate::bvh::Ray;
@@ -12,17 +12,17 @@ use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 use crate::primitive::mesh::{Mesh, TriangleBlock};
 
-/// Coherence limit, for [`Ray::is_coherent`]: bound of the differences of directions, and of those
-/// of origins divided by the size of the mesh. It is divided by the square root of the number of
-/// triangles.
+/// Coherence limit for [`Ray::is_coherent`]. Divided by the square root of the number of triangles,
+/// it is the largest difference of unit directions. This quotient times the size of the mesh is the
+/// largest difference of origins.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four rays, these limits are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Upper limit of the bound that follows from [`COHERENCE_LIMIT`]. It takes effect for meshes of
-/// fewer than about 3900 triangles.
+/// Upper limit of the quotient of [`COHERENCE_LIMIT`] and the square root of the number of
+/// triangles. It takes effect for meshes of fewer than about 3900 triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest hit of each ray with the triangles of a mesh.
@@ -99,8 +99,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of consecutive triangles of a leaf, one per lane. The first one has the
-    /// index `part` times the number of lanes.
+    /// Returns the corners of consecutive triangles of a leaf, one triangle per lane. The first
+    /// triangle has the index `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -110,7 +110,8 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, it ends when any triangle on the ray is found.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, a ray's traversal ends at the first triangle
+/// found.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
@@ -241,7 +242,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
 }
 
 /// Returns the closest triangle that each ray hits within the distance `limit`; at equal distances
-/// the one with the lowest number. Lanes with a limit of 0 or less are inactive.
+/// the triangle with the lowest number. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)

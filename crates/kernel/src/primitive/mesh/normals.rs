@@ -7,8 +7,8 @@ use std::collections::HashMap;
 /// the vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal Facets*).
 ///
 /// Vertices with equal positions count as one, so that shading is smooth where a mesh is cut only
-/// for its texture coordinates. The result is the z axis without adjacent triangles, or if their
-/// normals cancel.
+/// for its texture coordinates. A vertex has the z axis as its normal if it has no adjacent
+/// triangles, or if their normals cancel.
 pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
     let mut first: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
     let welded: Vec<u32> = positions
