@@ -171,14 +171,14 @@ fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Largest lift of a sphere light, or a light whose centre is on no surface, in radii or shorter
-/// sides.
+/// Largest lift of a light that is a sphere or whose centre is on no surface, as a fraction of
+/// [`EmissiveSurface::thickness`].
 const MAX_LIFT: f64 = 1e-4;
 
 /// Returns the distance by which a light with the surface `surface` is moved off the surfaces that
-/// it touches. Infinite surfaces are not part of the scene's extent, so that the
-/// coordinates of a light on one of them may exceed the extent. The rounding error of the light's
-/// own coordinates then counts as well.
+/// it touches. Infinite surfaces are not part of the scene's extent, so that the coordinates of a
+/// light on one of them may exceed the extent. The rounding error of the light's own coordinates
+/// then counts as well.
 fn light_lift<S: Float>(geometry: &RecenteredGeometry, surface: &EmissiveSurface) -> f64 {
     let lift = emitter_lift::<S>(geometry);
     let center = surface.center() - geometry.origin;
@@ -275,6 +275,7 @@ impl<S: Float> CompiledLights<S> {
         !self.emitters.is_empty() || !self.environments.is_empty()
     }
 
+    /// Returns the places of the lights, for which culling lists possible occluders.
     fn bounds(&self) -> LightBounds {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of = |source: &DeltaSource<S>| match &source.light.light {

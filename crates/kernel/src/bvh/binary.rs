@@ -73,8 +73,7 @@ impl BinaryBvh {
     }
 
     /// Merges each subtree of at most `in_leaf` primitives into one leaf, unless this increases the
-    /// cost of the tree by the surface area heuristic. `traversal_cost` is the cost of a node visit
-    /// divided by the cost of a primitive's intersection test.
+    /// cost of the tree by the surface area heuristic. `traversal_cost` is as in `BuildQuality`.
     pub fn merge_leaves(&mut self, in_leaf: u32, traversal_cost: f32) {
         let mut counts = vec![0; self.nodes.len()];
         let mut costs = vec![0.0; self.nodes.len()];

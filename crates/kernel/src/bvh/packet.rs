@@ -59,13 +59,12 @@ pub struct PacketBounds<S> {
     pub near: [usize; 3],
     /// Rows of [`Bvh8Node::bounds`] with the box sides that the rays pass last, for each axis.
     pub far: [usize; 3],
-    /// Number that is subtracted from the near sides: the largest ray origin plus the padding if
-    /// the directions are positive on the axis, the smallest ray origin minus the padding if they
-    /// are negative.
+    /// Number subtracted from the near sides: the largest ray origin plus the padding for
+    /// directions that are positive on the axis, the smallest ray origin minus the padding for
+    /// negative ones.
     pub near_origin: [S; 3],
-    /// Number that is subtracted from the far sides: the smallest ray origin minus the padding if
-    /// the directions are positive on the axis, the largest ray origin plus the padding if they are
-    /// negative.
+    /// Number subtracted from the far sides: the smallest ray origin minus the padding for positive
+    /// directions, the largest ray origin plus the padding for negative ones.
     pub far_origin: [S; 3],
     /// Smallest and largest reciprocals of the ray directions.
     pub inverse: [[S; 3]; 2],
@@ -192,9 +191,9 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Pushes `entry` onto the stack, which has `top` entries. The entries from index `base` on are
-/// children of the same node. They stay sorted by descending distance, so that the nearest child is
-/// visited first.
+/// Pushes `entry` onto the stack, which has `top` entries. The entries from index `base` on,
+/// children of one node, stay sorted by descending distance, so that the nearest child is visited
+/// first.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],
@@ -212,10 +211,9 @@ fn push_sorted<S: Float>(
 }
 
 /// Traverses the hierarchy with a ray packet. Calls `leaf(index, limit)` for each leaf whose box a
-/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits. A ray
-/// with a negative limit is inactive. `bounds` are the interval bounds of the active rays, if they
-/// have any. With bounds, the children of a node are visited in the order of their smallest
-/// possible entry distances.
+/// ray may enter within its limit. `leaf` returns the new limits. A ray with a negative limit is
+/// inactive. `bounds` are the interval bounds of the active rays. If they are given, the children
+/// of a node are visited in the order of their smallest possible entry distances.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,

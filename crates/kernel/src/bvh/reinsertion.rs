@@ -23,9 +23,9 @@ struct Reinsertion {
 struct Search {
     /// Number of node visits left, over all searches.
     visits_left: usize,
-    /// Candidates for the sibling of the moved subtree, as node indices. The number of a candidate
-    /// is half of the area that the removal of the subtree saves, minus half of the area by which
-    /// its insertion enlarges the candidate's ancestors.
+    /// Candidates for the sibling of the moved subtree: a saving and a node. The saving is half of
+    /// the area that the removal of the subtree saves, minus half of the area by which its
+    /// insertion enlarges the candidate's ancestors.
     stack: Vec<(f32, u32)>,
 }
 
@@ -82,9 +82,8 @@ impl<'a> LinkedTree<'a> {
     }
 }
 
-/// Optimises `tree` in 16 rounds of moves. The first round searches for better places for the share
-/// `ratio` (0 to 1) of all nodes: large ones near the root. Round n searches for 1/(2n - 1) times
-/// as many nodes.
+/// Moves subtrees in 16 rounds. The first round searches for better places for the share `ratio` (0
+/// to 1) of all nodes: large ones near the root. Round n does so for 1/(2n - 1) times as many.
 pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -117,8 +116,7 @@ pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     }
 }
 
-/// Returns the `count` nodes with the largest surface areas among nodes 1 to `2 * count + 1`, which
-/// are close to the root.
+/// Returns the `count` nodes with the largest surface areas among nodes 1 to `2 * count + 1`.
 fn largest_nodes(nodes: &[BinaryNode], count: usize) -> Vec<usize> {
     let end = nodes.len().min(2 * (count + 1));
     let area = |node: usize| nodes[node].aabb.half_area();

@@ -41,8 +41,7 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// Returns a table for byte shuffles: the reversed four bits of each index, shifted left by
-/// `SHIFT`.
+/// Returns a table for byte shuffles: the reversed bits of each 4-bit index, shifted by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -82,8 +81,7 @@ vector_bits!(u32x4, reverse_by_shifts);
 #[cfg(target_feature = "avx512f")]
 vector_bits!(u32x16, reverse_by_shifts);
 
-/// Returns `table[indices[i]]` in each lane i, by one permutation instruction if the table has 16
-/// elements.
+/// Returns `table[indices[i]]` in each lane i, by one instruction if the table has 16 elements.
 #[cfg(target_feature = "avx512f")]
 #[inline(always)]
 fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
@@ -214,8 +212,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // All lanes are converted together. If converted one by one, they would be stored
-                // separately.
+                // Lanes that are converted one by one would be stored separately.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);

@@ -58,8 +58,7 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns `ball`, enlarged by the largest displacement of rays that the lens and rounding
-    /// errors cause.
+    /// Returns `ball`, enlarged by the displacement of rays that lens and rounding errors cause.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = grown(ball).radius;

@@ -150,14 +150,12 @@ pub trait CanonicalShape {
     /// geometry.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Returns the projection for materials that do not choose one, such as planar for flat
-    /// geometry.
+    /// Returns the projection for materials that do not choose one: planar for flat geometry.
     fn default_mapping(&self) -> Projection {
         Projection::Box
     }
 
-    /// Returns simplified geometry for the search for gaps; none for geometry with too many
-    /// details.
+    /// Returns simplified geometry for the search for gaps; none if there are too many details.
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }

@@ -68,8 +68,7 @@ struct Slab<S> {
     high: S,
 }
 
-/// Convex polyhedron compiled for ray intersection: bounding sphere, pairs of parallel faces, other
-/// faces.
+/// Convex polyhedron compiled for ray intersection: bounding sphere, slabs, faces without a slab.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,

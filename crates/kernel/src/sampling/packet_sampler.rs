@@ -43,8 +43,7 @@ pub struct SampleSettings {
 }
 
 /// Number of dimensions for a path's first choices between reflection and transmission: the last
-/// dimensions of the joint set. With indirect diffuse light, the first diffuse bounce uses these
-/// dimensions instead.
+/// ones of the joint set. With indirect diffuse light, they serve the first diffuse bounce instead.
 const CHOICES: u32 = 2;
 
 /// Largest number of surfaces on a path at which the sampled direction uses the joint set.
@@ -240,8 +239,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         self.light_2d(bounce, u32::MAX - 1).0
     }
 
-    /// Returns the two random numbers for the surface that a path hits after `bounce` reflections,
-    /// scrambled with `salt`.
+    /// Returns the random numbers for the surface after `bounce` reflections, scrambled with
+    /// `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;

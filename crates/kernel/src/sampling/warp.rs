@@ -1,6 +1,5 @@
 //! Sample warps: maps from the unit square to directions in a local frame, with their densities.
-//! The z axis is the axis of the lobe for cones and squares, and the surface normal for
-//! microfacets.
+//! The z axis is the lobe's axis for cones and squares, and the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
@@ -112,12 +111,12 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 /// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is the
 /// masking of V-cavities if `v_cavity` is `true`, otherwise Smith's masking.
 ///
-/// First, the slopes of a microfacet along x and y are sampled, whether it is visible or not:
-/// independent normal deviates with the variance 1/2, from `u` and `v`, in units of `alpha`. Then
-/// the component of the slope along the azimuth of the view is replaced by the slope that has the
-/// same quantile among the visible microfacets. For views near the normal this changes the slope
-/// little; samples across the reflection of an edge along x or y are then spaced as evenly as `u`
-/// or `v`.
+/// First, the slopes of a microfacet along x and y are sampled, in units of `alpha`, whether the
+/// microfacet is visible or not: independent normal deviates with the variance 1/2, from `u` and
+/// `v`. Then the component of the slope along the azimuth of the view is replaced by the slope that
+/// has the same quantile among the visible microfacets. For views near the normal this changes the
+/// slope little, and samples across the reflection of an edge along x or y are as even as `u` or
+/// `v`.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,

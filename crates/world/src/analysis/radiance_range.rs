@@ -171,8 +171,8 @@ struct LitBy {
     center: DVec3,
     /// Radius of a sphere around the light; 0 for a light without a size.
     radius: f64,
-    /// Smallest distance from surfaces. Nearer surfaces count as at this distance, except in
-    /// `spots`.
+    /// Smallest distance of surfaces that counts. Nearer surfaces count as at this distance, except
+    /// in `spots`.
     min_distance: f64,
     /// Largest distance at which the light counts as on a surface; negative if it never does.
     min_clearance: f64,
@@ -401,7 +401,7 @@ impl<'a> SceneDistances<'a> {
     }
 
     /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see.
-    /// This radiance counts as `brightest` only if the light is wider than a quarter of a pixel
+    /// This is the `brightest` radiance only if the light is wider than a quarter of a pixel
     /// (`is_wide`).
     fn seen(&self, range: RadianceRange, emitted: f64, is_wide: bool) -> RadianceRange {
         RadianceRange {

@@ -70,8 +70,7 @@ struct Reach {
 }
 
 impl Reach {
-    /// Computes the factors of the surfaces of `scene`, with the diffuse albedo if `diffuse` is
-    /// `true`.
+    /// Computes the factors of surfaces, including the diffuse albedo if `diffuse` is `true`.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
@@ -126,9 +125,9 @@ impl Reach {
         }
     }
 
-    /// Returns the largest possible sum of the throughputs of paths that end below `least`, with up
-    /// to `bounces` diffuse bounces and `depth` surfaces in each generation, the part of a path
-    /// between two diffuse bounces.
+    /// Returns the largest possible sum of the throughputs of paths that end below `least`. They
+    /// have up to `bounces` diffuse bounces, and up to `depth` surfaces in each generation, the
+    /// part of a path between two diffuse bounces.
     fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
         let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
         (least + rest) * (f64::from(bounces) + 1.0)

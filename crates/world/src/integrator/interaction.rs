@@ -79,8 +79,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Returns `direction`, mirrored at the geometric surface in lanes in which it points into the
-    /// surface.
+    /// Returns `direction`, mirrored at the geometric surface where it points into this surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());

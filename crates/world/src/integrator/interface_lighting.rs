@@ -125,7 +125,7 @@ impl<L: SimdFloat> Vertex<'_, L> {
     }
 
     /// Adds the light of `source` that rough interfaces scatter from one `side`. `emitter` is the
-    /// number of the emitter on which it was sampled; `None` for environments.
+    /// number of the emitter on which `source` was sampled; `None` for environments.
     #[inline(always)]
     fn add_scattered(
         &mut self,

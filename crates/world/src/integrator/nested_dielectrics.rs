@@ -15,8 +15,8 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinc
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
 use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
-/// Largest number of solids that a medium stack holds. Of more solids around a ray, it holds those
-/// listed last in the scene file.
+/// Largest number of solids that a medium stack holds. Solids listed earlier in the scene file are
+/// left out if a ray is inside of more.
 const MAX_NESTING: usize = 4;
 
 /// Medium stack: priorities of the solids that each ray is inside of, in descending order. Priority
@@ -111,8 +111,7 @@ impl<L: SimdFloat> Media<'_, L> {
     }
 }
 
-/// Returns `true` if the bounding box of an object overlaps the sphere `ball`, or if the object has
-/// none.
+/// Returns `true` if the bounding box of an object overlaps the sphere `ball` or is infinite.
 pub(crate) fn may_reach(ball: &BoundingSphere, form: &Form) -> bool {
     let reaches = |bounds| box_distance(bounds, ball.center) <= ball.radius;
     form.bounds().is_none_or(reaches)
@@ -280,8 +279,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns the part of `radiance` that is left after `distance` in `media`; all of it without
-/// media.
+/// Returns the part of `radiance` that is left after `distance` in `media`; all if there are none.
 #[inline(always)]
 pub(crate) fn attenuated<L: SimdFloat>(
     media: Option<Media<'_, L>>,

@@ -103,7 +103,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
 
     /// Traces the rays of `branch` to their next surfaces and adds the radiance of these surfaces.
     /// Replaces `branch` by the paths that continue, and returns `false` if there are none. At an
-    /// interface among the first [`SPLIT_DEPTH`] surfaces, the reflected branch is stored in
+    /// interface among the first [`SPLIT_DEPTH`] surfaces, stores the reflected branch in
     /// `waiting`.
     fn advance(
         &self,

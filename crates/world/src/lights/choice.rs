@@ -54,7 +54,8 @@ enum Table<S> {
 struct Stratum<S> {
     /// Sphere around the lights.
     ball: BoundingSphere,
-    /// Coordinates; NaN in sets without a light of the stratum, so that no surface faces it.
+    /// Coordinates; NaN in sets without a light of the stratum, so that no surface faces such a
+    /// light.
     positions: [Table<S>; 3],
     /// Irradiance at normal incidence, the same at every distance; 0 for lights whose irradiance
     /// decreases with the square of the distance.

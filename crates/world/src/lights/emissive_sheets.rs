@@ -18,9 +18,8 @@ use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use zerkalo_kernel::primitive::{BoundingSphere, Form, HalfSpace};
 
-/// Distance between an emissive sheet and the surface off which it is moved, in multiples of the
-/// height of sampled points. At this distance the surface does not count as covering the points
-/// (see [`CONTACT_LIFTS`]).
+/// Distance between an emissive sheet and the surface off which it is moved, in heights of sampled
+/// points above the sheet. This surface then covers no points (see [`CONTACT_LIFTS`]).
 const GAP_LIFTS: f64 = CONTACT_LIFTS + 2.0;
 
 /// Number of test points for contact along each side of a triangle.

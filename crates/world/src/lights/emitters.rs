@@ -80,8 +80,7 @@ impl<S: Float> Emitters<S> {
                 emitting.push((name, light));
             }
         }
-        // For each primitive whose material emits, the index of its object and the index in
-        // `emitting`.
+        // Objects and indices in `emitting` of the primitives whose materials emit.
         let part_of = |id: &PrimitiveId| {
             let name = scene.objects[id.form].materials()[id.part];
             Some((id.form, emitting.iter().position(|(known, _)| *known == name)?))
@@ -93,8 +92,7 @@ impl<S: Float> Emitters<S> {
         let mut known = HashSet::new();
         let distinct = parts.iter().flatten().filter(|part| known.insert(**part)).copied();
         let compile = |part: (usize, usize)| {
-            // The object has one material: only compounds have more, and their points are not
-            // sampled.
+            // Only compounds have several materials, and no points of compounds are sampled.
             let material = scene.materials.get(&scene.objects[part.0].material);
             let both_sides = material.is_none_or(|material: &Material| material.two_sided);
             let light = surface_of(&forms[part.0])
@@ -127,8 +125,8 @@ impl<S: Float> Emitters<S> {
         Some(source.with_light(source.light.as_ref()?.sample(origin, numbers)))
     }
 
-    /// Returns those of `lanes` whose point, sampled on emitter number `index`, is just inside an
-    /// object that touches the emitter. The shadow rays `ray` reach the points at `distance`.
+    /// Returns the lanes of `lanes` whose point, sampled on emitter number `index`, is just inside
+    /// an object that touches the emitter. The shadow rays `ray` reach the points at `distance`.
     #[inline(always)]
     pub fn covered<L: SimdFloat<Scalar = S>>(
         &self,

@@ -158,8 +158,8 @@ pub struct LabelledBatch<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Compiles the `forms` for which `compile` returns primitives into one batch; `None` if there
-    /// are none.
+    /// Compiles into one batch the `forms` for which `compile` returns primitives; `None` without
+    /// any.
     fn new<P, I: IntoIterator<Item = P>>(
         forms: &[Form],
         compile: impl Fn(&Form) -> Option<I>,

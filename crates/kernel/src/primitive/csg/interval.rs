@@ -26,6 +26,7 @@ pub struct Interval<L> {
 }
 
 impl<L: SimdFloat> Interval<L> {
+    /// Returns the lanes in which `t` is in the interval.
     #[inline(always)]
     pub fn at(&self, t: L) -> L::Mask {
         self.enter.le(t) & self.leave.ge(t)

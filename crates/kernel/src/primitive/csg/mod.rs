@@ -202,8 +202,7 @@ impl<L: SimdFloat> Primitive<L> for CompoundPart<L::Scalar> {
         Some(hit.t.lt(limit))
     }
 
-    /// Returns the point on the surface of this part, with the normal that points out of the
-    /// compound.
+    /// Returns the projection of `point` onto this part. The normal points out of the compound.
     #[inline(never)]
     fn surface(&self, _triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let part = &self.compound.parts[self.part];

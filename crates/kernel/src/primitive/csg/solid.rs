@@ -116,7 +116,7 @@ macro_rules! solids {
     };
 }
 
-// Kinds of solids, each with the largest number of spans of one line. Forms after `others` are no
+// Kinds of solids, each with the largest number of spans of one line; then forms that are no
 // solids.
 solids! {
     Sphere(SphereForm, 1),

@@ -189,7 +189,7 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Returns each ray in mesh space, and the length in mesh space of a step of length 1 in the
+    /// Returns each ray in mesh space, and the length there of a step that has length 1 in the
     /// scene.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
@@ -312,8 +312,7 @@ impl<L: SimdFloat> Primitive<L> for MeshInstance<L::Scalar> {
     #[inline(never)]
     fn surface(&self, triangle: L, point: Vec3<L>) -> SurfacePoint<L> {
         let triangle = self.triangle(triangle);
-        // The normal is divided by its largest component, so that its squared length is neither 0
-        // nor infinite.
+        // The scaled normal has a squared length that neither overflows nor vanishes.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());

@@ -110,8 +110,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, a ray's traversal ends at the first triangle
-/// found.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, a ray ends at the first triangle found.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
@@ -176,6 +175,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         found
     }
 
+    /// Traverses the mesh's BVH with the packet as a whole if it is coherent, otherwise by each
+    /// ray.
     #[inline(always)]
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let packet = slab_packet(ray, self.mesh);
