@@ -57,7 +57,7 @@ impl<L: SimdFloat> Hit<L> {
         Self { t, primitive: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces the hits in `lanes` by those of `other`.
+    /// Replaces the hits in `lanes` by the hits of `other`.
     #[inline(always)]
     pub fn replace(&mut self, lanes: L::Mask, other: &Self) {
         self.t = L::select(lanes, other.t, self.t);

@@ -98,8 +98,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
         let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
         let t = -height / speed;
         let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
-        // A line parallel to the plane is behind it or in front of it everywhere. A distance that
-        // overflows is clamped to the largest number, which means that there is no crossing.
+        // A line parallel to the plane is on one side everywhere. A distance that overflows is
+        // clamped to the largest number, which means that there is no crossing.
         let enter = L::select(enters, t.max(none).min(all), none);
         let leave = L::select(leaves, t.max(none).min(all), all);
         let meets = enters | leaves | height.le(L::zero());

@@ -152,8 +152,8 @@ const ROOM: f64 = 64.0;
 /// Largest number of steps of the search for one zero. Bisection alone needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
-/// Line of a ray in the space in which the ring has radius 1. A position on it is a signed distance
-/// from `point`.
+/// Line of a ray in the space in which the ring has radius 1. A position on the line is a signed
+/// distance from `point`.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
     /// Point of the line closest to the centre.
@@ -163,7 +163,7 @@ struct UnitLine<L: SimdFloat> {
     across2: L,
     /// Position of the ray's origin.
     origin: L,
-    /// Length in the scene of a step of length 1.
+    /// Length in the scene of a step of length 1 on the line.
     scale: L,
     tube: L,
     /// Position at which the line enters the region of the torus.

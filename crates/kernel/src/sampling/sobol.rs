@@ -1,13 +1,14 @@
 //! Sobol points in eight dimensions with a 32-bit index. The dimensions form four pairs. Each pair
 //! consists of the first two dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Pair k has the points of that sequence in an order of its own: its point i is point `M_k i` of
-//! the sequence. Here i is a vector of bits, and `M_k` is an upper triangular matrix of bits with
-//! ones on its diagonal. Such a matrix permutes the first 2^m indices for every m, so that each
-//! pair is still a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random Scrambling of Digital
-//! (t,s)-Sequences*). With the usual direction numbers (Joe and Kuo 2008) only the first pair is a
-//! (0, 2)-sequence. This matters for images in a mirror: their noise depends on only two pairs, the
-//! position in the pixel and the direction in the lobe. docs/accuracy.md has the measured benefit.
+//! Pair k has the points of this (0, 2)-sequence in an order of its own: point i of the pair is
+//! point `M_k i` of the sequence. Here i is a vector of bits, and `M_k` is an upper triangular
+//! matrix of bits with ones on its diagonal. Such a matrix permutes the first 2^m indices for every
+//! m, so that each pair is still a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random
+//! Scrambling of Digital (t,s)-Sequences*). With the usual direction numbers (Joe and Kuo 2008)
+//! only the first pair is a (0, 2)-sequence. This matters for images in a mirror: their noise
+//! depends on only two pairs, the position in the pixel and the direction in the lobe.
+//! docs/accuracy.md has the measured benefit.
 //!
 //! The first columns of the matrices were found by search, one column after the other. The search
 //! minimised the errors of two estimates from 2^m randomly scrambled points. One is the volume of a

@@ -310,11 +310,10 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
 }
 
 /// Samples a microfacet normal h of the GGX distribution that is visible from `view`, a unit vector
-/// with z >= 0. The density is that of visible normals: G_1(view, h) D(h) view.h / view.z, with
-/// Smith's G_1.
+/// with z >= 0. The density is G_1(view, h) D(h) view.h / view.z, with Smith's G_1.
 ///
-/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The spherical cap is
-/// sampled by the concentric map of [`disk`].
+/// The method is from Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*.
+/// The spherical cap is sampled by the concentric map of [`disk`].
 #[inline(always)]
 pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -327,17 +326,17 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
 }
 
 /// Samples a microfacet normal of the GGX distribution in V-cavities that is visible from `view`, a
-/// unit vector with a positive z. The density is that of [`beckmann_visible`], with the D of GGX.
+/// unit vector with a positive z. The density is as for [`beckmann_visible`], with the D of GGX.
 ///
 /// A point (s, s') of the unit disk stands for the microfacet with the slopes (s, s') / sqrt(1 -
 /// s^2 - s'^2), in units of alpha. The points of all microfacets, visible or not, are uniform in
-/// the disk. Coordinate s points away from the view, along its azimuth. From here on it is in units
-/// of half the chord of the disk at s', so that it is uniform in \[-1, 1\] over all microfacets.
-/// Where both sides of the groove are visible, the visible microfacets have the distribution
-/// function s + sqrt(1 - s^2) tan(theta), up to a constant; theta is the angle between the
-/// stretched view and z. Where one side is visible, the function is twice that of all microfacets.
-/// Both functions have inverses in closed form: with s = sin(a), the first is sin(a + theta) /
-/// cos(theta).
+/// the disk. Coordinate s points away from the view, along the azimuth of the view. In the rest of
+/// this comment, the unit of s is half the chord of the disk at s'. The coordinate is thus uniform
+/// in \[-1, 1\] over all microfacets. Where both sides of the groove are visible, the visible
+/// microfacets have the distribution function s + sqrt(1 - s^2) tan(theta), up to a constant; theta
+/// is the angle between the stretched view and z. Where one side is visible, their distribution
+/// function is twice the function of all microfacets. Both functions have inverses in closed form:
+/// with s = sin(a), the first is sin(a + theta) / cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();

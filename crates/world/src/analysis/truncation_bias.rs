@@ -149,13 +149,13 @@ impl Reach {
 /// Returns one sentence for each limit of `scene` that truncates paths, with a bound of the lost
 /// radiance.
 ///
-/// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. f is the
-/// largest factor of one surface. The throughputs of all branches of a path that have hit n
+/// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. One
+/// surface multiplies it by at most f. The throughputs of all branches of a path that have hit n
 /// surfaces therefore sum up to at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd
 /// n. The sum over n and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost
 /// radiance is at most this sum times the radiance of the brightest surface, light with a size, or
-/// background. Nothing is truncated if no surface reflects or transmits, or if the only object that
-/// does is flat or convex, so that a path hits it once.
+/// background. Nothing is truncated if no surface reflects or transmits. The same holds if the only
+/// object that reflects or transmits is flat or convex, so that a path hits it once.
 ///
 /// The emission of some objects is found only by rays that hit them. Without diffuse bounces,
 /// diffuse surfaces lack the light of these objects.

@@ -11,15 +11,15 @@ use zerkalo_kernel::primitive::{
 };
 use zerkalo_scene::value::{ascending, total_order};
 
-/// Largest number of occluders in the list of a cell. If more primitives overlap the cell, those
-/// closest to the light are kept.
+/// Largest number of occluders in the list of a cell. If more primitives overlap the cell, the list
+/// has the primitives closest to the light.
 const MAX_PER_CELL: u32 = 16;
 
 /// Value of [`Entry::exempt_primitive`] for a primitive against which all shadow rays are tested.
 const NO_PRIMITIVE: u32 = u32::MAX;
 
 /// Lists of the primitives that can occlude one light. Each list belongs to a *cell*: a square of a
-/// grid over the projection from the light, that is, a range of directions from it.
+/// grid over the projection from the light, which stands for a range of directions.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
     /// Number of rows and of columns of cells on each face of the projection.
@@ -30,7 +30,7 @@ pub(crate) struct LightBuffer<S> {
     max_coordinate: S,
     /// Cells of all faces, face by face and row by row.
     cells: Vec<Cell<S>>,
-    /// Occluders of all cells, cell after cell; those of a cell are in ascending order of
+    /// Occluders of all cells, cell after cell. The occluders of a cell are in ascending order of
     /// [`Entry::near`].
     entries: Vec<Entry<S>>,
 }
@@ -57,7 +57,7 @@ pub(crate) struct Occluder {
 /// Possible occluder in the list of a cell.
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Index of the primitive among those in the BVH.
+    /// Index of the primitive in [`Aggregate::in_tree`].
     number: u32,
     /// See [`Occluder::exempt_primitive`]; [`NO_PRIMITIVE`] stands for `None`.
     exempt_primitive: u32,

@@ -1,13 +1,13 @@
 //! Coincident surfaces: surfaces of different primitives at the same position, such as the bottom
 //! of a glass and the table below it.
 //!
-//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
-//! them starts beyond the others. Paths therefore cross coincident surfaces in a fixed order if at
-//! least one of them transmits. The order is that of primitives with a gap of zero width: a ray
-//! first leaves the solids that it is inside, then crosses flat primitives, then enters the solids
-//! behind. Several solids on the same side of a surface count as nested. Transparent solids enclose
-//! opaque ones, and a transparent solid encloses those that the scene file lists before it. Flat
-//! transparent primitives are on both sides of opaque ones.
+//! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one
+//! surface starts beyond the others. Paths therefore cross coincident surfaces in a fixed order if
+//! at least one of the surfaces transmits. The order is as if the primitives had gaps of zero
+//! width: a ray first leaves the solids that it is inside, then crosses flat primitives, then
+//! enters the solids behind. Several solids on the same side of a surface count as nested.
+//! Transparent solids enclose opaque solids, and a transparent solid encloses those listed before
+//! it in the scene file. Flat transparent primitives are on both sides of flat opaque ones.
 //!
 //! The *layer* of a surface is a number that gives its position in this order along the ray.
 //! Surfaces where the ray leaves a solid have negative layers, surfaces where it enters a solid
@@ -125,7 +125,8 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
     pub primitive: L,
     pub triangle: L,
     pub layer: L,
-    /// Distance above the start surface at which ray origins are beyond all coincident surfaces.
+    /// Distance above the start surface at which ray origins are beyond all coincident surfaces; 0
+    /// if there are none.
     pub offset: L,
 }
 
@@ -267,7 +268,7 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Searches the surfaces that coincide with the start points for the one with the lowest layer,
-    /// among layers above that of `coincident` and below `layer`.
+    /// among layers above `coincident.layer` and below `layer`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,

@@ -86,8 +86,8 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Replaces the hit points in `lanes` by those of `other`. All masks of `self` must be `false`
-    /// in these lanes.
+    /// Replaces the hit points in `lanes` by the hit points of `other`. All masks of `self` must be
+    /// `false` in these lanes.
     #[inline(always)]
     fn blend(&mut self, lanes: L::Mask, other: &Self) {
         self.normal = Vec3::select(lanes, other.normal, self.normal);

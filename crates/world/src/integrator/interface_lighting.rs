@@ -29,7 +29,7 @@ pub(crate) struct RoughInterface<'a, L: SimdFloat> {
 
 /// Side of an interface from which light arrives.
 struct Side<'a, L: SimdFloat> {
-    /// `true` for the side of the transmitted rays, `false` for that of the reflected rays.
+    /// `true` for the side of the transmitted rays, `false` for the side of the reflected rays.
     behind: bool,
     /// Lanes for which points of emitters are sampled on this side.
     lanes: L::Mask,

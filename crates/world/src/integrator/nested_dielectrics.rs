@@ -218,8 +218,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of[primitive] > 0
     }
 
-    /// Adds to `media` the solids in which camera rays start: those whose boundary the ray first hits
-    /// from inside.
+    /// Adds to `media` the solids in which camera rays start: the solids whose boundary the ray
+    /// first hits from inside.
     #[inline(always)]
     pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
         for (priority, solid) in &self.around_eye {

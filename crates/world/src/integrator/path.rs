@@ -4,8 +4,8 @@ use crate::lights::groups::MAX_GROUPS;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Mask, SimdFloat, Vec3};
 
-/// Radiance of a packet's samples in each light group. The radiance of a light with a group of its
-/// own is that of a white light of intensity 1.
+/// Radiance of a packet's samples in each light group. A light with a group of its own counts as a
+/// white light of intensity 1.
 pub struct Radiance<L> {
     /// Radiance of each light group. Elements beyond the number of groups are not in use.
     pub groups: [Vec3<L>; MAX_GROUPS],

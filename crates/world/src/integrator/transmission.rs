@@ -169,10 +169,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.follow(branch, &mut split, coincident.as_ref(), waiting, &mut out.counts)
     }
 
-    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
-    /// of the surface that the path crosses first. `behind` is the coincident surface behind the
-    /// start points of the rays, if one was found. Returns the state of rays that pass the surface,
-    /// or `None` if no surfaces coincide.
+    /// Resolves hits of `lanes` on coincident surfaces: changes `hit` and `interaction` to the
+    /// surface that the path crosses first. `behind` is the coincident surface behind the start
+    /// points of the rays, if one was found. Returns the state of rays that pass the surface, or
+    /// `None` if no surfaces coincide.
     #[inline(never)]
     fn cross_first(
         &self,

@@ -135,7 +135,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Returns the contact of the sheet with the object `carrier`; `None` if no tested point of the
-    /// sheet is on it.
+    /// sheet is on the object.
     fn contact(&self, carrier: &Form, eye: DVec3, reach: f64) -> Option<Contact> {
         let normal = self.plane.normal;
         for point in points_on(self.form).into_iter().chain(points_on(carrier)) {
@@ -178,7 +178,8 @@ struct Contact {
 /// planes may be up to `reach` apart.
 fn may_carry(carrier: &Form, sheet: &Sheet, reach: f64) -> bool {
     let is_parallel = |normal: DVec3| normal.dot(sheet.plane.normal).abs() >= MIN_COSINE;
-    // Angles below that of `MIN_COSINE` displace the edge of the sheet by 0.2 % of its radius.
+    // Angles with a cosine above `MIN_COSINE` displace the sheet's edge by 0.2 % of its radius at
+    // most.
     let room = reach + 2e-3 * sheet.ball.radius;
     let is_face =
         |face: &HalfSpace| is_parallel(face.normal) && face.height(sheet.ball.center).abs() <= room;

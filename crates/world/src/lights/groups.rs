@@ -68,7 +68,7 @@ pub(crate) struct GroupedSource<'a> {
     pub source: &'a LightGroupSource,
     /// Index of the light group.
     pub group: usize,
-    /// Emission by which the tracer multiplies the samples: 1 in a group of its own.
+    /// Emission by which the tracer multiplies the samples; 1 for a source with a group of its own.
     pub emission: [f64; 3],
 }
 
@@ -95,8 +95,8 @@ pub struct LightGroups {
 impl LightGroups {
     /// Creates the light groups of `scene`. Lights and emissive materials have groups of their own,
     /// with three exceptions that share the last group: all of them if `merge_lights` is `true`,
-    /// the lights of a kind of which the scene has many (see `ManyLights`), and those beyond the
-    /// largest number of groups.
+    /// the lights of a kind of which the scene has many (see `ManyLights`), and the lights and
+    /// materials beyond the largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can

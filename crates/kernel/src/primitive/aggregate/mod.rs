@@ -223,7 +223,7 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the result of [`Aggregate::closest_masked`] for those primitives of `set` that are
+    /// Returns the result of [`Aggregate::closest_masked`] for the primitives of `set` that are
     /// tested one by one, without BVH and bounding boxes.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
@@ -314,7 +314,7 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the result of [`Aggregate::occluded`] for those primitives of `set` that are tested
+    /// Returns the result of [`Aggregate::occluded`] for the primitives of `set` that are tested
     /// one by one, without BVH and bounding boxes.
     #[inline(always)]
     pub fn occluded_linear(

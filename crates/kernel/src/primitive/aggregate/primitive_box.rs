@@ -15,8 +15,8 @@ pub struct PrimitiveBox<S> {
     space: Option<BoxFrame<S>>,
 }
 
-/// Object space of an oriented bounding box. A point p of the scene has the coordinates
-/// `rows (p - center)` in it.
+/// Object space of an oriented bounding box. A point p of the scene has the coordinates `rows (p -
+/// center)` in this space.
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],

@@ -156,8 +156,8 @@ impl<S: Float> MeshInstance<S> {
             .into_iter()
             .map(DVec3::length)
             .fold(0.0, f64::max);
-        // Rounding errors in mesh space are at most those of the largest coordinate of a corner,
-        // which is converted to scene units here.
+        // Rounding errors in mesh space are at most the error of the largest coordinate of a
+        // corner. This coordinate is converted to scene units.
         let inner = low.abs().max(high.abs()).max_element() * scale;
         let outer = form.max_coordinate();
         Some(Self {
