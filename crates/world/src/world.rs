@@ -123,7 +123,7 @@ pub struct WorldInfo {
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Returns the random positions that camera rays use.
+    /// Returns which random positions camera rays use: in the pixel, on the lens, both or none.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
     }

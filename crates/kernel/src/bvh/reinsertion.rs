@@ -126,7 +126,7 @@ fn largest_nodes(nodes: &[BinaryNode], count: usize) -> Vec<usize> {
 }
 
 impl Search {
-    /// Counts a node visit. Returns `false` if the limit of visits is reached.
+    /// Counts a node visit. Returns `true` until the limit of visits is reached.
     fn visit(&mut self) -> bool {
         self.visits_left = self.visits_left.saturating_sub(1);
         self.visits_left > 0

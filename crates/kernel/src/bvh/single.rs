@@ -10,7 +10,7 @@ use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefetch};
 
-/// Children of a node that the ray enters and has not visited yet.
+/// Node on a ray's stack, with the children that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
     /// Sort keys of the node's children: the bits of the distance at which the ray enters the child,
@@ -18,7 +18,7 @@ pub struct StackFrame {
     /// or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
-    /// Number of children that have not been visited.
+    /// Number of children that the ray has still to visit.
     remaining: u32,
 }
 

@@ -58,7 +58,7 @@ pub fn array_from_fn<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> 
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number.
     const EPSILON: f64;
-    /// Rounds `x` to the nearest value.
+    /// Rounds `x` to the nearest value of this type.
     fn from_f64(x: f64) -> Self;
     /// Converts to double precision without rounding.
     fn to_f64(self) -> f64;

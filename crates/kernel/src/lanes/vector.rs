@@ -212,7 +212,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Lanes that are converted one by one would be stored separately.
+                // Whole vectors are converted, because the compiler would store single lanes one by
+                // one.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);

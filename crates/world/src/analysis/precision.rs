@@ -16,10 +16,10 @@ use zerkalo_scene::camera::PerspectiveCamera;
 use zerkalo_scene::light::EmissiveSurface;
 use zerkalo_scene::value::{sort_by_number, total_order};
 
-/// Largest ratio of extent to thickness of an object. The ray offset is then 1/128 of a thickness.
+/// Largest ratio of extent to thickness of an object: the ray offset is 1/128 of the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// Largest ratio of extent to width of a gap between objects: the gap has eight ray offsets.
+/// Largest ratio of extent to width of a gap between objects: the gap is 8 ray offsets wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
 /// Largest ratio of extent to side of a pixel's footprint on the object closest to the eye. The

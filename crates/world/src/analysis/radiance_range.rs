@@ -401,7 +401,7 @@ impl<'a> SceneDistances<'a> {
     }
 
     /// Returns `range` for a light with the radiance `emitted` that the camera and mirrors see.
-    /// This is the `brightest` radiance only if the light is wider than a quarter of a pixel
+    /// `emitted` counts as `brightest` only if the light is wider than a quarter of a pixel
     /// (`is_wide`).
     fn seen(&self, range: RadianceRange, emitted: f64, is_wide: bool) -> RadianceRange {
         RadianceRange {

@@ -15,8 +15,8 @@ use zerkalo_kernel::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, distinc
 use zerkalo_kernel::primitive::{Aggregate, BoundingSphere, Form, PrimitiveId, box_distance};
 use zerkalo_scene::material::{Bsdf, InterfaceMedia, InterfaceQuery};
 
-/// Largest number of solids that a medium stack holds. Solids listed earlier in the scene file are
-/// left out if a ray is inside of more.
+/// Largest number of solids that a medium stack holds. If a ray is inside of more solids, the stack
+/// has those listed last in the scene file.
 const MAX_NESTING: usize = 4;
 
 /// Medium stack: priorities of the solids that each ray is inside of, in descending order. Priority

@@ -381,7 +381,7 @@ impl<L: SimdFloat> Aggregate<L> {
         batch.batch.surface((primitive - batch.base) as usize, triangle, point)
     }
 
-    /// Returns the meshes, which have the highest numbers of the aggregate.
+    /// Returns the meshes. Their numbers are the highest ones of the aggregate.
     fn meshes(&self) -> &[MeshInstance<L::Scalar>] {
         match self.batches.last() {
             Some(BatchRange { batch: PrimitiveBatch::Mesh(meshes), .. }) => meshes,
