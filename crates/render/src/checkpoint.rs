@@ -77,8 +77,8 @@ impl SampleInputs {
                 .can_reuse(&compiled, scene)
     }
 
-    /// Reads the inputs from the header of a film file. Returns `None` if it has none, or damaged
-    /// ones.
+    /// Reads the inputs from the header of a film file. Returns `None` if the header has no inputs
+    /// or damaged ones.
     pub fn of(header: &FilmFileHeader) -> Option<Self> {
         let mut fields = Fields::new(header.chunks.get(&SCENE)?);
         let hash = fields.u64()?;
@@ -145,8 +145,8 @@ impl Checkpoint {
         SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Compiles the checkpoint's scene and restores its render, as a picture of `scene`. Fails if
-    /// the samples are not those of `scene` and `options`.
+    /// Compiles the checkpoint's scene, restores the render, and relights it as `scene`. Fails if
+    /// the samples are not valid for `scene` and `options`.
     pub(super) fn resume(
         self,
         scene: &Arc<Scene>,
@@ -194,7 +194,7 @@ impl Checkpoint {
         Ok(Resumed { state, schedule, seconds, is_relit })
     }
 
-    /// Checks size, seed, sampler and program version.
+    /// Checks that size, seed, sampler and program version are those of the checkpoint.
     fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), FileError> {
         let film = &self.header.film;
         let [width, height] = scene.film.size.map(|n| n as usize);

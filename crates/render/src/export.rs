@@ -20,8 +20,8 @@ pub struct Provenance {
     pub adaptive: bool,
 }
 
-/// Returns the hash of a scene file's text and of the contents of its meshes and images, after the
-/// name of the algorithm.
+/// Returns the hash of a scene file's text and of the contents of its meshes and images: `fnv1a64:`
+/// and 16 hexadecimal digits.
 pub fn scene_hash(text: &str, scene: &Scene) -> String {
     let mut hash = Fnv1a64::default();
     hash.update(text.as_bytes());
@@ -82,7 +82,7 @@ fn display_text(display: &Display) -> String {
 
 /// Key of the metadata entry with sampler, precision, sample allocation and display transform.
 const SETTINGS: &str = "Settings";
-/// Text before the display transform in that entry.
+/// Text before the display transform in the entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries about samples and noise.

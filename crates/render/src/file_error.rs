@@ -37,7 +37,7 @@ impl FileError {
     }
 }
 
-/// Opens a regular file. Returns its length in bytes, too.
+/// Opens a regular file and returns it with its length in bytes.
 pub(super) fn open(path: &Path) -> Result<(File, u64), FileError> {
     let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     opened.map(|(length, file)| (file, length)).map_err(|e| match e.kind() {

@@ -89,8 +89,8 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the pixels that one stage adds to adjacent tiles. `steps` are those of the previous
-    /// stage (0: none) and of this one.
+    /// Traces the pixels that one stage adds to adjacent tiles. `steps` has the lattice steps of
+    /// the previous stage (0: none) and of this stage.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();

@@ -64,8 +64,8 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
 /// Memory \[bytes\] of a tile of a region in addition to its sums: its entry in the schedule, its
 /// estimates, jobs and reports.
 const REGION_TILE_BYTES: u64 = 1024;
-/// Memory \[bytes\] of a tile of a picture in regions: its estimate, and its entry in the list for
-/// percentiles.
+/// Memory \[bytes\] for each tile of the whole picture, while regions are rendered: its estimate,
+/// and its entry in the list for percentiles.
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
 /// Memory \[bytes per pixel column and layer\] while a row of OpenEXR tiles is encoded. The layers
 /// are the picture, its two replicates, and the light groups.
@@ -87,9 +87,9 @@ pub struct Regions {
     pub bytes: u64,
 }
 
-/// Divides a picture into the fewest regions for which this process, with the program, the compiled
-/// scene and one region at a time, has at most `cap` bytes. If not even one row of tiles fits, or
-/// the process has used more already, returns the smallest possible `cap`.
+/// Divides a picture into the fewest regions such that this process uses at most `cap` bytes for the
+/// program, the compiled scene and one region at a time. Fails with the smallest possible `cap` if
+/// not even one row of tiles fits, or if the process has already used more.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }
@@ -121,7 +121,7 @@ fn divide_from(
     })
 }
 
-/// Rounds a side down to a multiple of 16, or of 128 from 1024 on, for messages; at least 1.
+/// Rounds a side in pixels down to a multiple of 16, or of 128 from 1024 on. Below 16, returns 1.
 fn round_down(side: u32) -> u32 {
     match side {
         0..16 => 1,

@@ -18,7 +18,7 @@ const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
 pub struct PassContext<'a> {
     pub sampling: &'a SampleSettings,
     pub pool: &'a rayon::ThreadPool,
-    /// Once it is `true`, no further job starts.
+    /// Request to cancel the pass: once it is `true`, no further job starts.
     pub cancel: &'a AtomicBool,
 }
 
@@ -68,6 +68,7 @@ pub fn run_typed<L: SimdFloat>(
     }
 }
 
+/// Tracer and film limits, which all jobs of a pass share.
 pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
     /// Scale of each light group: integer steps of the film per unit of radiance.
@@ -214,7 +215,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 
     /// Implements [`Self::reject_invalid`] for a packet with an invalid sample. A light group in
     /// which a channel is NaN or negative becomes black. A channel above the limit, even an
-    /// infinite one, is reduced to it.
+    /// infinite one, is reduced to the limit.
     #[cold]
     fn replace_invalid(
         &self,

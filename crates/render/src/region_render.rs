@@ -98,7 +98,7 @@ impl RegionRender {
         Ok((self.report.clone(), self.stopped_by))
     }
 
-    /// Returns the film with the row `y`, after the regions down to it have been rendered.
+    /// Renders the regions down to row `y`, if necessary, and returns the film with this row.
     pub fn film_with_row(&mut self, y: usize, observer: Observer) -> io::Result<&Film> {
         if y < self.finished_rows as usize {
             observer(&self.report)?;
@@ -159,8 +159,8 @@ impl RegionRender {
         Ok(())
     }
 
-    /// Returns the report on the picture with the region of `state`, of which `share` is done after
-    /// `seconds` seconds.
+    /// Returns the report on the finished regions and the region of `state`. Of this region, `share`
+    /// is done, after `seconds` seconds.
     fn report_with(
         &self,
         state: &RenderState,

@@ -1,4 +1,4 @@
-//! Relighting: shows the samples of one scene under other light weights, those of another scene.
+//! Relighting: shows the samples of one scene under the light weights of another scene.
 
 use crate::film::LightWeights;
 use std::sync::Arc;

@@ -4,11 +4,11 @@
 /// Pixels of an image that one cell overlaps along one axis, fully or in part.
 pub(super) struct Coverage {
     pub first: usize,
-    /// Fraction of each pixel from `first` that the cell covers, 0..=1.
+    /// Fractions, 0..=1, of the consecutive pixels from `first` on that the cell covers.
     pub parts: Vec<f64>,
 }
 
-/// Divides a row of `pixels` pixels into equal `cells`.
+/// Divides a row of `pixels` pixels into `cells` equal cells. Returns the pixels of each cell.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
@@ -21,8 +21,9 @@ pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     (0..cells).map(cover).collect()
 }
 
-/// Returns the mean of an image of `size` (columns, rows) over equal `cells` (columns, rows),
-/// `[row][column]`. `pixel` returns the value of the pixel with an index in `[row][column]` order.
+/// Divides an image of `size` (columns, rows) into `cells` (columns, rows) of equal size. Returns
+/// the mean of each cell, `[row][column]`. `pixel` returns the value of the pixel with a given
+/// index, counted row by row.
 pub fn box_means(
     size: [usize; 2],
     cells: [usize; 2],
@@ -53,9 +54,9 @@ pub fn box_means(
     means
 }
 
-/// Fills cells without samples, where `known` is `false`, in an image of `cols` x `rows` cells of
-/// `stride` values. They get the values of the nearest cell with samples in their row, rows without
-/// samples those of the nearest row with samples.
+/// Fills the cells without samples, where `known` is `false`, in an image of `cols` x `rows` cells
+/// of `stride` values each. Such a cell gets the values of the nearest cell with samples in its
+/// row. A row without samples gets the values of the nearest row with samples.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -78,8 +79,8 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns, for each element, the index of the nearest `known` one: the lower of two that are
-/// equally near, its own if none is known.
+/// Returns, for each element, the index of the nearest element that is `known`; of two equally near
+/// elements, the lower index. If no element is known, each gets its own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

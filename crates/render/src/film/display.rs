@@ -44,7 +44,7 @@ impl FromStr for Tone {
 /// Display transform: exposure, then tone curve, then sRGB encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Display {
-    /// Exposure in stops.
+    /// Exposure in stops; 0 leaves radiance as it is.
     pub exposure_ev: f64,
     /// Tone curve.
     pub tone: Tone,
@@ -56,7 +56,7 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Rounds [`Display::levels`] to 8 bits, several times faster by a lookup table.
+    /// Returns [`Display::levels`] rounded to 8 bits, several times faster, by a lookup table.
     pub fn levels_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
@@ -78,7 +78,7 @@ impl Display {
     }
 }
 
-/// Applies the tone curve `tone` to `color`, which includes the exposure.
+/// Applies `tone` to `color`, which is radiance times the exposure factor. Returns 0..=1.
 #[inline(always)]
 pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     match tone {
@@ -106,7 +106,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Rounds an 8-bit level, 0..=255, to 16 bits; 255 becomes 65535.
+/// Converts an unrounded level, 0..=255, to a 16-bit value; 255 becomes 65535.
 pub fn quantised_16(level: f64) -> u16 {
     (level * (65535.0 / 255.0)).round() as u16
 }

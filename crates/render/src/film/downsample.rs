@@ -25,8 +25,8 @@ impl Thumbnail {
     /// Averages `film` over `cols` x `rows` equal cells. The value of a cell is the mean of its
     /// sampled pixels, weighted by their areas inside the cell.
     ///
-    /// A cell without samples gets the value of the nearest one of its row, a row without samples
-    /// that of the nearest row. A film without samples is black.
+    /// A cell without samples gets the value of the nearest sampled cell of its row. A row without
+    /// samples gets the values of the nearest sampled row. A film without samples is black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
         let mut downsample = IncrementalDownsample::new(film, cols, rows);
         downsample.update(film, None);
@@ -71,15 +71,15 @@ struct Span {
     first: usize,
     len: usize,
     /// For each pixel along the axis, the cells that overlap it: the cell's index, counted from
-    /// `first`, and the fraction of the pixel that it covers.
+    /// `first`, and the fraction of the pixel that the cell covers.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
 /// Contribution of a film tile to the cells that it overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// Film's epoch, [`Tile::counts`] and [`Tile::lattice_px`] at the latest refresh. `None` if the
-    /// tile had no samples.
+    /// Film's epoch, [`Tile::counts`] and [`Tile::lattice_px`] at the latest call of
+    /// [`IncrementalDownsample::stale`]. `None` if the tile had no samples.
     version: Option<(u64, [u32; 2], usize)>,
     /// Values of each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
     /// inside the cell, then sums of this area times the pixel's mean. Empty without samples.
@@ -163,6 +163,7 @@ impl IncrementalDownsample {
 
 impl Span {
     /// Finds the cells that the tiles from pixel `start` overlap along an axis of `pixels` pixels.
+    /// `coverage` has the pixels of each cell along this axis.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -206,8 +207,8 @@ impl TilePart {
     }
 }
 
-/// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of a row of cells as in
-/// [`TilePart::sums`], as if the pixels were inside it with their full height.
+/// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of one row of cells, laid
+/// out as in [`TilePart::sums`]. Pixels count with their full height.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

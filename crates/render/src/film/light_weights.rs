@@ -11,8 +11,8 @@ pub struct LightWeights {
 }
 
 impl LightWeights {
-    /// Returns the factors, `[group][channel]`, that convert integer sums of a film with `scales`
-    /// to sums of the radiance of samples under these weights.
+    /// Returns the factors, `[group][channel]`, that convert the integer sums of a film with
+    /// `scales` to sums of radiance under these weights.
     pub fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
@@ -59,8 +59,8 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns the mean over the samples in `replicates`, black without samples. `per_unit` is the
-    /// result of [`LightWeights::radiance_per_step`].
+    /// Returns the mean radiance of the samples in `replicates`; black without samples. `per_unit`
+    /// is the result of [`LightWeights::radiance_per_step`].
     #[inline(always)]
     pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(replicates);

@@ -14,8 +14,8 @@ pub struct LinearImage {
 }
 
 impl LinearImage {
-    /// Creates the image of `film` under `weights`. Pixels without samples are filled as cells of
-    /// [`Thumbnail::of_film`](crate::film::Thumbnail::of_film).
+    /// Creates the image of `film` under `weights`. Pixels without samples are filled by the rule
+    /// of [`Thumbnail::of_film`](crate::film::Thumbnail::of_film) for cells without samples.
     pub fn of_film(film: &Film, weights: &LightWeights) -> Self {
         let (width, height) = (film.width(), film.height());
         let per_unit = weights.radiance_per_step(film.scales());

@@ -35,5 +35,5 @@ pub use srgb_table::quantised_8;
 pub use store::{Film, Header, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
-/// Side of a film tile in pixels, which are stored and sampled together.
+/// Side of a film tile in pixels. The pixels of a tile are stored and sampled together.
 pub const TILE: usize = 16;

@@ -59,7 +59,7 @@ impl Mse {
         *self = self.zip(other, |sum, value| sum + weight * value);
     }
 
-    /// Combines both measures of the error with those of `other`.
+    /// Applies `f` to each measure of the error and the same measure of `other`.
     pub(crate) fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self { linear: f(self.linear, other.linear), levels: f(self.levels, other.levels) }
     }
@@ -101,15 +101,15 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile. `None` if the tile has no samples, or different numbers of
-    /// them in both replicates.
+    /// Estimates the error of a tile. Returns `None` if the tile has no samples, or unequal numbers
+    /// of samples in A and B.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts;
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// Estimates the error of a tile, even if replicate B has fewer samples than A. `None` if A or
-    /// B has no samples, or during the first pass.
+    /// Estimates the error of a tile, even if replicate B has fewer samples than A. Returns `None`
+    /// if A or B has no samples, or during the first pass.
     ///
     /// Let A have n samples and B have m, each of variance v. (A - B)^2 then has the mean v (n + m)
     /// / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m). The half difference is
@@ -211,12 +211,13 @@ pub struct Noise {
     /// Largest RMSE of a displayed tile, in 8-bit levels.
     pub worst_levels: f64,
     /// Number of effective pixels (Kish's effective sample size): (sum of e)^2 / (sum of e^2),
-    /// where e is the squared error of a pixel, linear and displayed; 0 without error.
+    /// where e is the squared error of a pixel. `linear` has the number for radiance, `levels` for
+    /// the displayed picture; both are 0 without error.
     pub effective_pixels: Mse,
 }
 
 impl Noise {
-    /// Returns this estimate with the larger RMSE of both.
+    /// Returns this estimate, with the larger value of both estimates as RMSE of the picture.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             rmse_linear: self.rmse_linear.max(other.rmse_linear),
@@ -225,7 +226,8 @@ impl Noise {
         }
     }
 
-    /// Combines the estimates of all tiles. `None` if there are no tiles or an estimate is missing.
+    /// Combines the estimates of all tiles. Returns `None` if there are no tiles or an estimate is
+    /// missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut squares = Mse::default();
@@ -247,7 +249,7 @@ impl Noise {
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_levels = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
-        // `sum` is of means over three channels, `squares` of sums over them.
+        // `sum` adds means over three channels; `squares` adds squares of sums over channels.
         let effective_pixels = all.zip(squares, |sum, squares| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }

@@ -17,8 +17,8 @@ pub struct PixelProbe {
     pub radiance: [f64; 3],
     /// Displayed value in unrounded 8-bit levels, 0..=255.
     pub levels: [f64; 3],
-    /// Half the difference of both replicates in radiance, which estimates the error within a
-    /// factor of two or three. `None` if one of them has no samples.
+    /// Half the absolute difference of the replicates' radiance, which estimates the error within a
+    /// factor of two or three. `None` if A or B has no samples.
     pub difference: Option<[f64; 3]>,
     /// Estimated RMSE of the pixel's tile, in 8-bit levels. `None` without an estimate.
     pub tile_rmse_levels: Option<f64>,

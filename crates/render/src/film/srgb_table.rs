@@ -9,8 +9,8 @@ const SEGMENTS_LOG2: u32 = 7;
 /// Exponent of the smallest octave of the table. The sRGB encoding is linear up to 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Upper bits of a double minus this are its index in the table. Entry 0 is the linear part of the
-/// encoding; entry 1 begins at 2^FIRST_OCTAVE.
+/// Number that is subtracted from the upper bits of a double to get its index in the table. Entry 0
+/// is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
@@ -20,7 +20,7 @@ const MAX_ERROR: f64 = 5.5e-4;
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Lines through the segments, in 8-bit levels: value at 0, and slope.
+    /// Line through each segment: its level at linear light 0, and its slope in levels.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -64,7 +64,7 @@ impl SrgbTable {
     }
 }
 
-/// Rounds an 8-bit level, 0..=255.
+/// Rounds a level to the nearest of 0..=255; NaN becomes 0.
 pub fn quantised_8(level: f64) -> u8 {
     level.round() as u8
 }

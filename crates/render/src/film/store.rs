@@ -9,7 +9,7 @@ use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 
-/// Size in bytes from which all tiles are allocated before the first sample.
+/// Size of a film in bytes from which all its tiles are allocated before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
 
 /// Properties of a film. Only films with equal properties can be added.
@@ -105,8 +105,8 @@ impl Film {
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
     }
 
-    /// Allocates the tiles of a large film. Those of a small film are allocated when they are first
-    /// written, so that the first picture appears sooner.
+    /// Allocates the tiles of a large film. The tiles of a small film are allocated when they are
+    /// first written, so that the first picture appears sooner.
     fn reserve(&mut self) -> Result<(), TryReserveError> {
         let size = [self.width(), self.height()].map(|n| n as u32);
         if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
@@ -115,6 +115,7 @@ impl Film {
         self.tiles.iter_mut().try_for_each(Tile::reserve)
     }
 
+    /// Creates a film whose tiles have no memory for sums yet.
     fn without_memory(header: Header) -> Result<Self, TryReserveError> {
         let Header { width, height, scales, .. } = &header;
         assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
@@ -269,8 +270,8 @@ impl Film {
         }
     }
 
-    /// Returns the estimated error of the picture. `None` if a tile has no samples, or different
-    /// numbers of them in both replicates.
+    /// Returns the estimated error of the picture. `None` if a tile has no samples, or unequal
+    /// numbers of samples in A and B.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));

@@ -73,8 +73,8 @@ impl Tile {
         Ok(())
     }
 
-    /// Clears the tile if it was written before `epoch`, that of the film. Allocates its memory if
-    /// necessary.
+    /// Clears the tile if it was written before the film's current epoch, `epoch`. Allocates its
+    /// memory if necessary.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -121,7 +121,7 @@ impl Tile {
     /// their first sample. A step of 1 completes the first pass.
     ///
     /// # Panics
-    /// Panics if `step_px` is none of these, or larger than in the same pass before.
+    /// Panics if `step_px` is none of these, or larger than the previous step of the same pass.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -179,7 +179,7 @@ impl Tile {
     }
 
     /// Adds non-negative `values`, `[group][channel]`, to the sums of a pixel. A sum that would
-    /// exceed `i64::MAX` stays there: the result is independent of the order of addition.
+    /// exceed `i64::MAX` stays at it: the result is independent of the order of addition.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -220,8 +220,8 @@ impl Tile {
         self.bad.record(sample);
     }
 
-    /// Adds the samples of `other`, a tile at the same position of another film. Not both may hold
-    /// the first sample of only a part of their pixels.
+    /// Adds the samples of `other`, a tile at the same position of another film. At most one of the
+    /// two tiles may be in its first pass.
     pub(super) fn add_tile(&mut self, other: &Self) {
         for (replicate, pixel) in other.written() {
             self.add(replicate, pixel, other.pixel(replicate, pixel));
@@ -244,12 +244,13 @@ fn saturated_sum(sum: i64) -> i64 {
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // The step is a power of two: its multiples have no bits below that of the step.
+    // The step is a power of two: no bit of its multiples below the bit of the step is set.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
 /// Iterates row by row over the pixels of a tile whose x and y are multiples of `step_px`, which
-/// divides 16, but not of the larger step `before_px` (0: none is left out).
+/// divides 16. Pixels whose x and y are multiples of the larger step `before_px` are left out,
+/// unless it is 0.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()

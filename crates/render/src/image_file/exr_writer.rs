@@ -1,9 +1,9 @@
 //! OpenEXR writer. Pictures are linear radiance in 32-bit floats, with additional channels for
 //! replicates, light groups and sample count.
 //!
-//! `R G B` is the picture, `A.R ..` and `B.R ..` are those of the replicates, `light_NAME.R ..` the
-//! contributions of the light groups, whose sum is the picture. `count` is the number of samples of
-//! a pixel.
+//! `R G B` is the picture. `A.R ..` and `B.R ..` are the pictures of the replicates. `light_NAME.R
+//! ..` are the contributions of the light groups, whose sum is the picture. `count` is the number
+//! of samples of a pixel.
 //!
 //! The file consists of tiles, so that programs can read a part of a large picture. The header is
 //! written again at the end, with sorted attributes and the final metadata.
@@ -88,7 +88,7 @@ fn encode_to(
     Ok(replace_start(sink, &before?, &after?)?)
 }
 
-/// Returns all bytes before the table of chunks.
+/// Returns the bytes of the file before its table of chunks.
 fn header(
     picture: &FilmFileHeader,
     channels: &[(String, Source)],

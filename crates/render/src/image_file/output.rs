@@ -25,7 +25,7 @@ pub trait Bands {
 
     /// Returns the metadata after the last row; `None` if they are those of the header.
     ///
-    /// A value such as the noise may differ from that of the header if it has at most 128 bytes.
+    /// A value may differ from the value in the header if both have at most 128 bytes.
     fn final_metadata(&self) -> Option<Vec<(String, String)>> {
         None
     }
@@ -53,6 +53,7 @@ static FORMATS: [Format; 2] = [
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImageOutput {
     path: PathBuf,
+    /// Index in [`FORMATS`].
     format: usize,
     existing: Existing,
 }
@@ -86,13 +87,13 @@ impl ImageOutput {
         &self.path
     }
 
-    /// Checks that the file can be written, for the start of a long render.
+    /// Checks, before a long render, that the file can be written.
     pub fn check_writable(&self) -> Result<(), WriteError> {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
     /// Writes the picture with its `header` row by row to a temporary file, which replaces an old
-    /// one when it is complete and stored on the disk. `depth` is that of a PNG.
+    /// file when it is complete and stored on the disk. Only PNG files use `depth`.
     ///
     /// A key of the metadata has 1 to 79 printable ASCII characters without leading, trailing or
     /// double spaces. It begins with an upper-case letter, because the keys of OpenEXR do not.
@@ -114,7 +115,7 @@ impl ImageOutput {
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Replaces `before`, the first bytes of a file, by `after`, then seeks to its end.
+/// Replaces `before`, the first bytes of a file, by `after`, then seeks to the end of the file.
 ///
 /// # Errors
 /// Fails if `before` and `after` have different lengths, or if the output cannot be written.

@@ -114,7 +114,7 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Replaces `bytes` by those of row `y`. 16-bit levels are big-endian.
+/// Replaces `bytes` by the encoded row `y`. 16-bit levels are big-endian.
 fn encode_row(header: &FilmFileHeader, depth: Depth, film: &Film, y: usize, bytes: &mut Vec<u8>) {
     let row = film.row(y - film.first_row, Replicates::Both, &header.weights);
     bytes.clear();

@@ -38,8 +38,8 @@ impl PlannedTile {
 
 impl Plan {
     /// Returns the range of sample indices that `shard` traces in each tile, in row order, and in
-    /// both replicates. Ranges may be empty. The shard [`BASE`] has those that the plan started
-    /// from. Panics if there is no such shard.
+    /// both replicates. Ranges may be empty. The ranges of the shard [`BASE`] are the samples that
+    /// the plan started from. Panics if there is no such shard.
     pub fn ranges(&self, shard: u32) -> Vec<Range<u32>> {
         let shards = self.settings.shards;
         assert!(shard <= shards, "shard {shard} of {shards}");

@@ -1,8 +1,8 @@
 //! Plan files: text with one setting or tile per line, in a fixed order, and a checksum at the end.
 //!
-//! The line of a tile has four fields: samples per pixel and replicate when the plan started, the
-//! same in the merged picture, the expected number of rays per sample, and `g` if a path in the
-//! tile has made a random choice, otherwise `-`.
+//! The line of a tile has four fields: samples per pixel and replicate in the base, samples per
+//! pixel and replicate in the merged picture, the expected number of rays per sample, and `g` for a
+//! glossy tile, otherwise `-`.
 
 use crate::file_error::{self, FileError, begins_with};
 use crate::film::{Display, Tone};
@@ -17,9 +17,9 @@ use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
 
 /// First line of a plan file.
 const TITLE: &str = "zerkalo plan 1";
-/// Largest length in bytes. The plan of a picture of 16384 x 16384 pixels has about 30 MB.
+/// Largest length of a plan file in bytes. The plan of 16384 x 16384 pixels has about 30 MB.
 const MAX_BYTES: u64 = 1 << 26;
-/// Largest width and height in pixels.
+/// Largest width and height of the picture in pixels.
 const MAX_SIDE: u32 = 1 << 14;
 /// Bytes of the shortest line of a tile.
 const MIN_TILE_BYTES: usize = 8;
@@ -39,7 +39,7 @@ impl Plan {
         text
     }
 
-    /// Returns the hash of the text. Plans with equal checksums count as equal.
+    /// Returns the hash of all lines before the checksum. Plans with equal checksums count as equal.
     pub fn checksum(&self) -> u64 {
         fnv1a64(self.body().as_bytes())
     }
@@ -117,6 +117,7 @@ impl Plan {
         Self::parse_body(&mut lines)
     }
 
+    /// Parses the lines between the title and the checksum.
     fn parse_body(lines: &mut Lines) -> Result<Self, FileError> {
         let positive = |text: &str| number(text).filter(|n: &f64| n.is_finite() && *n > 0.0);
         // The fields are read in the order of the file. The last two follow other lines.

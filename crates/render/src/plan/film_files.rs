@@ -40,7 +40,7 @@ struct FilmFile {
     path: PathBuf,
     /// Shard that a named plan expects in this file.
     shard: Option<u32>,
-    /// Stamp when the file was last read. `None` for a missing file.
+    /// Stamp of the file when it was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
     /// Samples, over all pixels, that the file contributes to the sum.
@@ -83,7 +83,7 @@ pub struct WatchedShards {
     pub samples: u64,
     /// Number of samples that the file will hold when it is complete; `None` if unknown.
     pub total: Option<u64>,
-    /// Time since the last modification.
+    /// Time since the last modification of the file. `None` without a file.
     pub age: Option<Duration>,
 }
 
@@ -122,6 +122,7 @@ impl FilmFiles {
         films.try_join().map(|()| films)
     }
 
+    /// Adds the film files of the plan at `path`. Fails if another plan was named before.
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
         let plan = Plan::read(path).map_err(|error| error.to_string())?;
         // The base of a plan that continues an earlier one is the merged film of the earlier plan,
@@ -141,7 +142,7 @@ impl FilmFiles {
         }
     }
 
-    /// Reads the files that were replaced since the last call. Returns `true` if there were any.
+    /// Reads the files that were replaced since the last call. Returns `true` if any were replaced.
     pub fn poll(&mut self) -> bool {
         let changed = self.read_changed();
         if !changed.is_empty() {
@@ -167,14 +168,14 @@ impl FilmFiles {
         between.unwrap_or_default().as_secs_f64()
     }
 
-    /// Returns the share of the plan's samples that the films hold, 0..=1.
+    /// Returns the share, 0..=1, of the plan's samples that the films hold. `None` without a plan.
     pub fn progress(&self) -> Option<f64> {
         let ((_, film), plan) = (self.sum.as_ref()?, self.plan.as_ref()?);
         let pixels = (film.width() * film.height()) as f64;
         Some(film.samples() as f64 / (plan.spp() * pixels).max(1.0))
     }
 
-    /// Returns the numbers of complete shards and of all shards, including the base.
+    /// Counts the complete shards and all shards, including the base. `None` without a plan.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
         let all = self.plan.as_ref()?.settings.shards as usize + 1;
         Some([self.shards_held().filter(|shard| shard.complete).count(), all])
@@ -248,8 +249,8 @@ impl FilmFiles {
         changed
     }
 
-    /// Refuses those of the `changed` files whose films cannot be added to the unchanged files and
-    /// to the accepted ones before them. Returns the first reason.
+    /// Refuses each of the `changed` files whose film cannot be added to the unchanged files and to
+    /// the changed files that were accepted before. Returns the first reason.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
         let reason = self.try_join().err()?;
         let new: Vec<Contents> = changed
@@ -265,6 +266,7 @@ impl FilmFiles {
         Some(reason)
     }
 
+    /// Checks that all usable films can be added, and stores their common plan.
     fn try_join(&mut self) -> Result<(), String> {
         let is_alone = self.files.len() + usize::from(self.named.is_some()) == 1;
         let named = self.named.iter_mut().map(|(path, part)| (&**path, part));
@@ -288,7 +290,7 @@ impl FilmFiles {
         }
     }
 
-    /// Computes the sum of all usable films, or returns the file that cannot be added, with the
+    /// Computes the sum of all usable films. If a file cannot be added, fails with its index and the
     /// reason.
     pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
         self.sum = None;
@@ -310,6 +312,7 @@ impl FilmFiles {
         Ok(())
     }
 
+    /// Adds the film of file `i` to `film`. Fails if it has other samples than its shards.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
@@ -332,7 +335,7 @@ impl FilmFiles {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns the common plan with all shards in the files.
+    /// Returns the common plan with all shards that the files hold. `None` without such a shard.
     pub(super) fn part(&self) -> Option<Part> {
         let mut shards: Vec<PartShard> = self.shards_held().copied().collect();
         shards.sort_unstable();
@@ -370,7 +373,7 @@ impl FilmFile {
         }
     }
 
-    /// Returns the shard by which usable files are ordered.
+    /// Returns the number of the shard by which usable files are ordered. `None` for other files.
     fn first_shard(&self) -> Option<u32> {
         match &self.contents {
             Contents::Part(part) => Some(part.shards[0].number),

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Sum of the films of the parts of a plan.
 pub struct Merged {
     pub film: Film,
-    /// Header of the file with the lowest shard number, with `part` in place of its own.
+    /// Header of the file with the lowest shard number, in which `part` replaces the file's part.
     pub header: FilmFileHeader,
     pub part: Part,
 }
@@ -49,6 +49,7 @@ pub(super) fn without_plan(path: &Path) -> String {
     )
 }
 
+/// Checks that no shard of the plan is missing or unfinished.
 fn check_complete(films: &FilmFiles, part: &Part) -> Result<(), String> {
     let mut faults = Vec::new();
     for (path, part) in films.parts() {
@@ -76,9 +77,9 @@ fn check_complete(films: &FilmFiles, part: &Part) -> Result<(), String> {
     ))
 }
 
-/// Checks that the films with `parts`, each with the path of its file, can be added, and returns
-/// their common plan. One part may be of the merged film that this plan started from. It becomes a
-/// part of this plan that holds only the shard [`BASE`].
+/// Checks that films can be added, and returns their common plan. `parts` has the path and the part
+/// of each film. One film may be the merged film from which the common plan started; its part
+/// becomes a part of the common plan that holds only the shard [`BASE`].
 ///
 /// # Errors
 /// Fails if there is no part, if the parts belong to different plans, if two of them hold the same
@@ -101,6 +102,7 @@ pub(super) fn join(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String
     Ok(plan)
 }
 
+/// Finds the common plan of `parts` for [`join`], and converts the part of the plan's base.
 fn common_plan(parts: &mut [(&Path, &mut Part)]) -> Result<Arc<Plan>, String> {
     let latest = parts.iter().map(|(_, part)| &part.plan).find(|latest| {
         let is_base = |plan: &Plan| latest.settings.base_plan == Some(plan.checksum());

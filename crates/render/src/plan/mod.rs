@@ -66,7 +66,7 @@ pub struct Plan {
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_levels: f64,
-    /// Slopes of the error in tiles that are not glossy, and in glossy tiles.
+    /// Exponents p of RMSE ~ n^-p for n samples: in tiles that are not glossy, and in glossy tiles.
     pub slopes: [f64; 2],
     /// Tiles in row order.
     pub tiles: Vec<PlannedTile>,
@@ -74,8 +74,8 @@ pub struct Plan {
 
 impl Plan {
     /// Creates the plan that continues from the samples of `schedule` to its noise target.
-    /// `usual_slopes` are used where the schedule has not measured any. Returns `None` without a
-    /// noise target or an estimate.
+    /// `usual_slopes`, of tiles that are not glossy and of glossy tiles, replace slopes that the
+    /// schedule has not measured. Returns `None` without a noise target or an estimate.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
@@ -113,7 +113,8 @@ impl Plan {
         samples as f64 / (width * height) as f64
     }
 
-    /// Multiplies samples per pixel and replicate in each tile by its pixels and replicates.
+    /// Converts samples per pixel and replicate of each tile to samples of the whole tile in both
+    /// replicates.
     fn samples_of(&self, counts: impl Iterator<Item = u32>) -> impl Iterator<Item = u64> {
         let tiles = counts.enumerate();
         tiles.map(|(i, count)| 2 * u64::from(count) * pixels_of(self.settings.size, i))

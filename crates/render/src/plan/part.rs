@@ -46,7 +46,7 @@ impl Part {
     }
 
     /// Reads plan and shards from the header of the film file at `path`. Returns `None` if the film
-    /// belongs to no plan. Fails if they are not valid, or do not fit the film.
+    /// belongs to no plan. Fails if plan or shards are not valid, or do not fit the film.
     pub fn of_header(path: &Path, header: &FilmFileHeader) -> Result<Option<Self>, String> {
         let Some(plan) = header.chunks.get(&PLAN_TAG) else { return Ok(None) };
         let plan = Plan::parse(path, plan).map_err(|e| e.to_string())?;
@@ -66,6 +66,7 @@ impl Part {
         Ok(Some(part))
     }
 
+    /// Parses the chunk [`PART_TAG`] of a part of `plan`. Returns `None` if it is invalid.
     fn parse(plan: Plan, text: &[u8]) -> Option<Self> {
         let mut lines = std::str::from_utf8(text).ok()?.lines();
         let rays = lines.next()?.strip_prefix("rays ")?.parse().ok()?;
@@ -94,7 +95,7 @@ impl Part {
     }
 
     /// Returns the numbers of the shards that are missing or incomplete, such as `3, 5-7`. `None`
-    /// if the film holds all.
+    /// if the film holds all shards completely.
     pub fn missing(&self) -> Option<String> {
         let complete = self.shards.iter().filter(|shard| shard.complete);
         let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());

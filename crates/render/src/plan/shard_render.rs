@@ -28,7 +28,7 @@ pub struct ShardRender {
     pool: rayon::ThreadPool,
     /// Jobs that remain to be traced, in both replicates.
     remaining: VecDeque<Job>,
-    /// Samples of the complete shard, and those in the film, over all pixels and both replicates.
+    /// Numbers of samples of the complete shard and in the film, over all pixels and replicates.
     samples: [u64; 2],
     pub rays: u64,
     /// Samples and seconds of tracing in all steps so far.
@@ -37,9 +37,9 @@ pub struct ShardRender {
 
 impl ShardRender {
     /// Creates the render of a shard with the sample indices `ranges` in each tile. The film of
-    /// `state` may already hold the first samples, which took `rays` rays. Fails if its sample
-    /// counts cannot come from an interrupted render of these ranges, or if a thread cannot be
-    /// started.
+    /// `state` may already hold the first samples, which took `rays` rays. Fails if the film's
+    /// sample counts cannot come from an interrupted render of these ranges, or if a thread cannot
+    /// be started.
     pub fn new(
         state: RenderState,
         ranges: &[Range<u32>],
@@ -67,7 +67,7 @@ impl ShardRender {
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
     }
 
-    /// Traces a quarter of a second. Returns `false` if no samples are left.
+    /// Traces samples for about a quarter of a second. Returns `false` if there were none to trace.
     pub fn step(&mut self) -> bool {
         let speed = match self.measured {
             (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,

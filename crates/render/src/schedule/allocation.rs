@@ -25,16 +25,16 @@ const ROUND_SHARE: f64 = 0.1;
 /// Share of the rays of a round that goes to the tiles with the fewest samples, whatever their
 /// estimates are. It finds features that no sample has hit.
 ///
-/// True error above the reported one in 30 sparse pictures (`tests/error_estimates`): 18 % in the
-/// mean with 1/16, 16 % with 1/8, 13 % with 1/4. Million rays to an RMSE of 0.00068 in the physical
-/// mirror room: 60.7 with 1/32, 61.7 with 1/16, 64.8 with 1/8.
+/// Mean excess of the true over the reported error of 30 sparse pictures (`tests/error_estimates`):
+/// 18 % with 1/16, 16 % with 1/8, 13 % with 1/4. Rays until the physical mirror room has an RMSE of
+/// 0.00068: 60.7 million with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
 /// Smallest number of blocks in a round, unless fewer tiles can get samples or fewer blocks meet
 /// the error target. It keeps every thread busy until the end of the round.
 const MIN_BLOCKS: usize = 64;
 /// A tile whose next block would more than double its samples is set aside, because an estimate is
 /// reliable for one doubling only. The round ends when the largest gain of the remaining tiles is
-/// below this fraction of the largest gain of those set aside.
+/// below this fraction of the largest gain of the tiles set aside.
 const WORTHWHILE: f64 = 0.25;
 /// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
 /// estimates of its class have the weight 1.
@@ -46,8 +46,8 @@ const OWN_WEIGHT: f64 = 0.25;
 /// Ratio of true to reported error in 40 sparse pictures (`tests/error_estimates`, 48 to 64 seeds
 /// each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
-/// Largest distance between a class and a class that widens it: the number of factors of sqrt(2)
-/// between the allocation estimates plus that between the sample counts.
+/// Largest distance between a class and a class that widens it. A distance is the number of factors
+/// of sqrt(2) between the allocation estimates plus the number between the sample counts.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
 /// Block of samples that a round may give to a tile.
@@ -106,10 +106,10 @@ struct TileModels {
 /// sample: `(floor(log2 n), floor(2 log2 v))`. The second number is `None` if v is 0.
 type Class = (u32, Option<i32>);
 
-/// Returns the length of the next block of a tile with `count` samples per pixel and replicate. It
-/// ends at the next power of two below [`SAMPLE_ALIGNMENT`], and at the next multiple of it from
-/// there on. From a multiple on, the length is the largest power of two up to a quarter of `count`,
-/// because such blocks of the sample sequence are well distributed.
+/// Returns the length of the next block of a tile with `count` samples per pixel and replicate. A
+/// count below [`SAMPLE_ALIGNMENT`] grows to the next power of two. A larger count grows to the next
+/// multiple of [`SAMPLE_ALIGNMENT`]. A multiple grows by the largest power of two up to a quarter of
+/// `count`, at least [`SAMPLE_ALIGNMENT`]: such blocks of the sequence are well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -245,8 +245,8 @@ impl Schedule {
 
     /// Returns the expected error of each tile. At the present count it is the mean of the
     /// validation estimates of the tile's class and of the tile's own allocation estimate, weighted
-    /// by pixels and [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the class
-    /// has none.
+    /// by pixels and [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the
+    /// validation estimates of the class are 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -270,9 +270,10 @@ impl Schedule {
     }
 }
 
-/// Returns the sum of the validation estimates of `class` and of its nearest classes, scaled to its
-/// allocation estimate, until there are [`MIN_CLASS_TILES`] tiles or [`MAX_CLASS_DISTANCE`] is
-/// reached. A class whose allocation estimate is 0 is not widened.
+/// Returns the sum of the validation estimates of `class`, widened by its nearest classes until
+/// there are [`MIN_CLASS_TILES`] tiles or [`MAX_CLASS_DISTANCE`] is reached. Estimates of other
+/// classes are scaled to the allocation estimate of `class`. A class whose allocation estimate is 0
+/// is not widened.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };

@@ -37,9 +37,10 @@ impl ConvergenceFit {
     }
 
     /// Returns a lower and an upper estimate of the total number of rays at which the RMSE falls to
-    /// `target`: extrapolated with the steepest and the flattest of the slopes over the latest two,
-    /// four and six steps, about one, two and three doublings. Before the first two steps, the
-    /// extreme plausible slopes are used. Returns `None` before the first point.
+    /// `target`. Three slopes are fitted: over the latest two, four and six steps between points.
+    /// The steepest slope gives the lower estimate, the flattest slope the upper one. Before the
+    /// first two steps, [`STEEPEST`] and [`FLATTEST`] are used. Returns `None` before the first
+    /// point.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {

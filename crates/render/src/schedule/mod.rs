@@ -29,25 +29,25 @@ use tile::{FLATTEST, Tile, clamp_slope};
 
 /// Samples per pixel and replicate before adaptive sampling and noise estimates start. Estimates
 /// from fewer samples are unreliable and take as long as tracing. With 16, tiles without noise
-/// would get a third of all samples of the mirror room, and two thirds of those of the reflecting
-/// tracks.
+/// would get a third of all samples in the scene of the mirror room, and two thirds in the scene of
+/// the reflecting tracks.
 const MIN_SAMPLES: u32 = 4;
 /// Value that replaces [`MIN_SAMPLES`] below [`FEW_PIXELS`] effective pixels: the picture has
 /// either no noise, or a few noisy pixels, which more samples find.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
-/// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k of them
-/// the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
+/// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k
+/// effective pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Number of which the samples per pixel and replicate are a multiple, except for smaller counts
-/// and after the last block of a tile. It is the width of the widest packets, on every processor,
-/// because the samples of a picture must not depend on the processor.
+/// Divisor of the number of samples per pixel and replicate, except for smaller counts and after
+/// the last block of a tile. It is the width of the widest packets, on every processor, because the
+/// samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per pixel and replicate at which a tile is full: the largest multiple of
 /// [`SAMPLE_ALIGNMENT`] whose double fits 32 bits.
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 below
-/// it. A larger count is no multiple only if an earlier stop criterion or cap ended there.
+/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]; 0 for
+/// a smaller `count`. A larger count is no multiple only if a stop criterion or a cap ended there.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
@@ -75,6 +75,7 @@ pub struct Schedule {
     tiles: Vec<Tile>,
     /// Jobs of the current round, each for both replicates.
     round: Vec<Job>,
+    /// `true` if the current round ends with noise estimates.
     estimate: bool,
     replicate: usize,
     /// Jobs of the round that are not traced yet in the current replicate.
@@ -189,7 +190,7 @@ impl Schedule {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }
-        // A round that began before the first estimates would end without new ones.
+        // The current round may have begun before the first estimates, without `estimate`.
         self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
         self.update_noise();
     }
@@ -201,7 +202,7 @@ impl Schedule {
         }
     }
 
-    /// Returns the latest error estimates of the tiles, in row order; `None` before the first.
+    /// Returns the latest error estimate of each tile, in row order; `None` before its first.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
         self.tiles.iter().map(|tile| tile.error)
     }
@@ -275,7 +276,7 @@ impl Schedule {
     }
 
     /// Returns jobs that raise all tiles to the same number of samples, or to their caps. `common`
-    /// is that of [`Schedule::common_count`].
+    /// is the result of [`Schedule::common_count`].
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
             // The count is between two powers if an earlier stop criterion has ended the render
@@ -301,10 +302,10 @@ impl Schedule {
         self.jobs_to(self.tiles.iter().map(|t| after.min(self.cap(t))))
     }
 
-    /// Returns the growth of a pixel's `done` samples per replicate in the next uniform round,
-    /// before it is rounded to [`SAMPLE_ALIGNMENT`]. With an error target it is half of the
-    /// estimated remaining samples, at most `done`. Without one, or at most with a time limit, it
-    /// is an eighth of `done`.
+    /// Returns the number of samples by which a uniform round raises `done` samples per pixel and
+    /// replicate, before it is rounded to [`SAMPLE_ALIGNMENT`]. Without an error target it is an
+    /// eighth of `done`. With an error target it is half of the estimated remaining samples, at most
+    /// `done`; if there is also a time limit, at most an eighth of `done`.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };

@@ -29,7 +29,7 @@ pub struct Prediction {
 /// Sample counts of one tile in a prediction or a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedTile {
-    /// Samples per pixel and replicate so far: those of the base.
+    /// Samples per pixel and replicate so far, which are the base of a plan.
     pub base: u32,
     /// Samples per pixel and replicate at the end, including `base`.
     pub end: u32,
@@ -40,7 +40,7 @@ pub struct PlannedTile {
 
 impl Schedule {
     /// Creates the schedule of a film that holds the samples of the planned `tiles`, which have
-    /// `pixels` pixels inside the picture and the error `errors`, in row order.
+    /// `pixels` pixels inside the picture and the estimated errors `errors`, in row order.
     pub fn of_planned(
         tiles: &[PlannedTile],
         pixels: &[u32],
@@ -83,8 +83,8 @@ impl Schedule {
         let sum_of = |counts: &mut dyn Iterator<Item = u32>| -> f64 {
             counts.enumerate().map(|(tile, count)| tile_sum(tile, count)).sum()
         };
-        // The models are scaled to the reported error, which is the larger of two estimates and may
-        // exceed their sum.
+        // The models are scaled to the reported error. It is the larger of two estimates and may
+        // exceed the sum of the models.
         let modelled = sum_of(&mut self.tiles.iter().map(|tile| tile.done));
         let scale = if modelled > 0.0 { square_sum(rmse) / modelled } else { 1.0 };
         let enough = square_sum(target) / scale;

@@ -27,8 +27,8 @@ impl Criterion {
     }
 }
 
-/// Stop criteria, of which the first that is reached ends the render. A render without any does not
-/// end.
+/// Stop criteria, of which the first that is reached ends the render. Without any, the render ends
+/// when no tile can get more samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
     /// Mean number of samples per pixel over both replicates, rounded up to an even number.
@@ -82,8 +82,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Creates settings that minimise the displayed error. A renderer replaces `rays_per_pixel`, 0,
-    /// by that of the scene.
+    /// Creates settings that minimise the displayed error. `rays_per_pixel` is 0; a renderer
+    /// replaces it by the value of the scene.
     pub fn new(adaptive: bool, stop: Stop) -> Self {
         Self { adaptive, criterion: Criterion::Levels, rays_per_pixel: 0, stop }
     }

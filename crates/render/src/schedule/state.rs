@@ -5,10 +5,10 @@
 //!
 //! - the criterion (u8), the numbers of samples and rays (u64 each), and the sample count of the
 //!   latest estimate in a uniform round (u32);
-//! - 1 if the allocation round ends with an estimate, otherwise 0 (u8), and the current replicate
+//! - 1 if the current round ends with an estimate, otherwise 0 (u8), and the current replicate
 //!   (u8);
 //! - the noise of the picture, and the points of the convergence fit;
-//! - the jobs of the current allocation round, those of them that remain, and the tiles.
+//! - the jobs of the current round, its jobs that remain to be traced, and the tiles.
 
 use crate::film::file::Fields;
 use crate::film::{Mse, Noise, TileNoise};

@@ -18,7 +18,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use zerkalo_scene::value::truncated;
 
-/// Bytes of the record of a tile without samples, the shortest.
+/// Number of bytes of the shortest tile record, which is the record of a tile without samples.
 const RECORD_BYTES: u64 = 8;
 
 /// Returns `true` if the file at `path` begins with the magic bytes of film files.
@@ -137,8 +137,8 @@ impl<R: Read> FilmReader<R> {
         self.visit_tiles(|_, _| Some(()))
     }
 
-    /// Calls `visit` with the records of each `TILE` chunk and the tiles' numbers; it returns
-    /// `None` for an invalid record. Returns the header.
+    /// Calls `visit` with the records of each `TILE` chunk and the numbers of its tiles; `visit`
+    /// returns `None` for an invalid record. Verifies all checksums. Returns the header.
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
@@ -177,8 +177,8 @@ impl<R: Read> FilmReader<R> {
     }
 }
 
-/// Decodes the `HEAD` chunk of a film file of `length` bytes. `None` if a field is invalid or the
-/// file too short for its tiles.
+/// Decodes the `HEAD` chunk of a film file of `length` bytes. Returns `None` if a field is invalid
+/// or the file is too short for its tiles.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
@@ -237,7 +237,7 @@ impl<R: Read> Input<R> {
         )
     }
 
-    /// Reads `length` bytes, the `part` of error messages.
+    /// Reads `length` bytes, which error messages call `part`.
     fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, FileError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
@@ -263,6 +263,7 @@ impl<R: Read> Input<R> {
         Ok(bytes)
     }
 
+    /// Reads the next chunk and verifies its checksum.
     fn chunk(&mut self) -> Result<Chunk, FileError> {
         let start = self.take(12, "a part")?;
         let (tag, length) = start.split_at(4);

@@ -92,7 +92,7 @@ fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
 /// Encodes the last chunk of a film file. `pieces` are the encoded header and tile chunks.
 fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
-    // Of a tile chunk the checksum covers only the checksum at its end.
+    // The checksum covers the whole header, but only the own checksum of each tile chunk.
     for (i, piece) in pieces.iter().enumerate() {
         let start = if i == 0 { 0 } else { piece.len() - CHECKSUM_BYTES };
         checksum.update(&piece[start..]);
