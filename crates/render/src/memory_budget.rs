@@ -87,9 +87,9 @@ pub struct Regions {
     pub bytes: u64,
 }
 
-/// Divides a picture into the fewest regions such that this process uses at most `cap` bytes for the
-/// program, the compiled scene and one region at a time. Fails with the smallest possible `cap` if
-/// not even one row of tiles fits, or if the process has already used more.
+/// Divides a picture into the fewest regions such that this process uses at most `cap` bytes for
+/// the program, the compiled scene and one region at a time. Fails with the smallest possible `cap`
+/// if not even one row of tiles fits, or if the process has already used more.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }

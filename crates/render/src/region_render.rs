@@ -159,8 +159,8 @@ impl RegionRender {
         Ok(())
     }
 
-    /// Returns the report on the finished regions and the region of `state`. Of this region, `share`
-    /// is done, after `seconds` seconds.
+    /// Returns the report on the finished regions and the region of `state`. Of this region,
+    /// `share` is done, after `seconds` seconds.
     fn report_with(
         &self,
         state: &RenderState,

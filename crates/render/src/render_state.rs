@@ -115,8 +115,8 @@ impl RenderState {
         })
     }
 
-    /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change, if
-    /// `scene` has faults or the samples are not valid for it.
+    /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change,
+    /// if `scene` has faults or the samples are not valid for it.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(weights) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;

@@ -20,13 +20,13 @@ pub struct Wave {
     pub replicate: usize,
     pub jobs: Vec<Job>,
     /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B set
-    /// it, because the estimate needs equally many samples of both, and B is traced after A.
+    /// it: the estimate needs equally many samples of both replicates, and B is traced after A.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Shortens each job to at most `longest` samples per pixel, and keeps the first jobs: just
-    /// enough to trace `pixel_samples` samples over all pixels, and at least one.
+    /// Shortens each job to at most `longest` samples per pixel, and discards the last jobs. At
+    /// least one job remains, and just enough for `pixel_samples` samples over all pixels.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -44,8 +44,8 @@ impl Wave {
 pub struct JobReport {
     /// Number of rays of every kind: the cost of the job, independent of the machine.
     pub rays: u64,
-    /// `true` if a path has made a random choice: a point of a glossy lobe or an emitter, a light,
-    /// or reflection against transmission.
+    /// `true` if a path has made a random choice: a direction of a glossy lobe, a point of an
+    /// emitter, a light, or whether to reflect or to transmit.
     pub glossy: bool,
     /// Estimated error of the tile, if [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,

@@ -34,7 +34,7 @@ pub struct Capabilities {
     pub colors: Colors,
     /// `true` if the terminal supports synchronised updates (mode 2026).
     pub synchronised: bool,
-    /// Name and version (XTVERSION).
+    /// Name and version of the terminal (XTVERSION).
     pub version: Option<String>,
     /// Background colour, 8-bit sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
@@ -51,7 +51,7 @@ pub struct Capabilities {
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to the first reply, of a multiplexer if there is one.
+    /// Time from the first request to the first reply, which a multiplexer sends if there is one.
     pub round_trip: Option<Duration>,
     /// Round-trip time to the terminal outside the multiplexer; `None` if the multiplexer passes no
     /// requests on.
@@ -79,7 +79,7 @@ impl Environment {
         }
     }
 
-    /// Returns the set of colours to expect by the environment alone.
+    /// Returns the set of colours that the environment alone suggests.
     pub fn colors(&self) -> Colors {
         /// Values of `TERM` with 24-bit colour, besides `*-direct` and `*-truecolor`.
         const TRUE: [&str; 8] = [

@@ -1,8 +1,8 @@
 //! Query of the terminal's capabilities before the first frame.
 //!
-//! All requests are sent in one write, and terminals reply in their order. Every terminal replies
-//! to the last one, for the device attributes, and this ends the query. A later reply is still
-//! decoded as a reply and not as keys.
+//! All requests are sent in one write, and terminals reply in the order of the requests. Every
+//! terminal replies to the last request, for the device attributes; this reply ends the query. A
+//! later reply is still decoded as a reply and not as keys.
 
 use crate::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::cells::Colors;
@@ -54,8 +54,8 @@ pub fn cursor_request(through: Option<Multiplexer>) -> &'static str {
 }
 
 /// Queries the capabilities, in about one round trip, or two inside a multiplexer over SSH. Keys
-/// that are pressed meanwhile are kept in `input`. `is_ending` returns `true` if the query should
-/// stop.
+/// that are pressed during the query are kept in `input`. `is_ending` returns `true` if the query
+/// should stop.
 ///
 /// The query does not wait for a terminal outside a local tmux, which may never reply. The caller
 /// passes such a late reply to [`Capabilities::learn`].

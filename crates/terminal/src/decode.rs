@@ -26,8 +26,8 @@ use crate::sequence::{Interpreter, console_key, single_shift, x10_mouse};
 use crate::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after the first two bytes of an escape sequence, which are a key pressed with Alt
-/// then.
+/// Longest pause after the first two bytes of an escape sequence. After a longer pause, the two
+/// bytes are a key pressed with Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
 /// Longest pause inside an escape sequence.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
@@ -107,7 +107,7 @@ impl Decoder {
     }
 
     /// Returns the longest time to wait for the next byte of the current sequence. Returns `None`
-    /// between sequences, and after a pause in a paste.
+    /// between sequences, and after a pause in a paste until more text arrives.
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,
@@ -137,6 +137,7 @@ impl Decoder {
         std::mem::take(&mut self.interpreter.events)
     }
 
+    /// Decodes one byte according to the state.
     fn byte(&mut self, byte: u8) {
         match self.state {
             State::Paste | State::PausedPaste => self.paste(byte),
@@ -158,6 +159,7 @@ impl Decoder {
         }
     }
 
+    /// Decodes a byte outside of sequences.
     fn character(&mut self, byte: u8) {
         match (self.state, byte) {
             (State::Ground, ESC) => {
@@ -189,6 +191,7 @@ impl Decoder {
         }
     }
 
+    /// Decodes the byte after ESC and `introducer`.
     fn introduced(&mut self, introducer: u8, byte: u8) {
         match (introducer, byte) {
             (b'[', b'[') => self.state = State::Console,
@@ -217,6 +220,7 @@ impl Decoder {
         }
     }
 
+    /// Decodes a byte inside a sequence or a control string.
     fn sequence(&mut self, byte: u8) {
         match (self.state, byte) {
             (State::ControlSequence, 0x20..=0x3f) => self.parse(&[byte]),
@@ -267,7 +271,7 @@ impl Decoder {
         self.taken.clear();
     }
 
-    /// Decodes `byte` as the first one of a new sequence, with a pending Alt modifier.
+    /// Decodes `byte` as the first byte of a new sequence. A pending Alt modifier applies to it.
     fn in_ground(&mut self, byte: u8) {
         let alt = self.interpreter.alt;
         self.restart();

@@ -39,7 +39,7 @@ impl InputReader {
         }
     }
 
-    /// Waits for events until `deadline`, at which the list is empty.
+    /// Waits for events, at most until `deadline`. The list is empty if none came until then.
     ///
     /// # Errors
     /// Fails if the terminal is closed.

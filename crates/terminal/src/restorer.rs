@@ -1,9 +1,9 @@
-//! Restoration of the terminal if the program ends without it, as after SIGKILL, an abort or
-//! SIGILL.
+//! Restoration of the terminal if the program ends without restoring it, as after SIGKILL, an abort
+//! or SIGILL.
 //!
 //! A helper process, a shell that reads from a pipe, continues when the program ends and the pipe
-//! closes. Signal handlers cannot replace it: SIGKILL has none, and after that of SIGABRT returns,
-//! the process ends at once.
+//! closes. Signal handlers cannot replace it: SIGKILL has none, and the process ends as soon as the
+//! handler of SIGABRT returns.
 
 use crate::LEAVE;
 use std::io::{self, Write};
@@ -12,7 +12,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 
 /// Script of the helper process. `$0` is [`LEAVE`], and `$1` the modes in the format of `stty -g`. A
 /// line from the program ends the script. The modes are set only if output processing is still off
-/// (`-opost`); otherwise the user's shell has already set its own.
+/// (`-opost`); otherwise the user's shell has already set its own modes.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit

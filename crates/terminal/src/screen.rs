@@ -92,6 +92,7 @@ impl Screen {
         Ok(screen)
     }
 
+    /// Starts full-screen use through `out`, and restores the terminal before a panic is reported.
     fn over(out: Box<dyn Write + Send>, modes_before: Option<Termios>) -> io::Result<Self> {
         let (leaving, left) = bounded(1);
         let tty = Arc::new(Tty {

@@ -82,7 +82,7 @@ impl Perform for Interpreter {
     }
 }
 
-/// Returns the key that types `c`; `None` for other control characters.
+/// Returns the key that types `c`; `None` for control characters that no key types.
 fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
@@ -119,7 +119,7 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
     Some(Event::Reply(reply))
 }
 
-/// Returns the key of a control sequence; `None` for a release.
+/// Returns the key of a control sequence; `None` for a release or an unknown key.
 fn key(params: &[&[u16]], last: char) -> Option<Key> {
     let number = params[0][0];
     let key = match (last, number) {
@@ -193,7 +193,7 @@ fn named(last: char) -> Option<Code> {
     })
 }
 
-/// Adds modifiers: 1 plus the sum of 1 for Shift, 2 for Alt, 4 for Control.
+/// Adds `modifiers` to `key`: 1 plus the sum of 1 for Shift, 2 for Alt, 4 for Control.
 fn modified(key: Key, modifiers: u16) -> Key {
     let bits = modifiers.saturating_sub(1);
     let is_character = matches!(key.code, Code::Char(_));
@@ -210,9 +210,9 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// Interprets a mouse report. The lowest two bits of `button` are its number or the direction of
-/// the wheel; the others are 4 for Shift, 8 for Alt, 16 for Control, 32 for motion and 64 for the
-/// wheel. `column` and `row` count from 1.
+/// Interprets a mouse report. The lowest two bits of `button` are the number of the button or the
+/// direction of the wheel. The other bits are 4 for Shift, 8 for Alt, 16 for Control, 32 for motion
+/// and 64 for the wheel. `column` and `row` count from 1.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {
         0 => Button::Left,

@@ -11,7 +11,7 @@ use std::thread;
 /// Number that is added to the number of a signal to form the exit status, as in shells.
 const SIGNALLED: i32 = 128;
 
-/// Exit status after the loss of the terminal, equal to that of SIGHUP.
+/// Exit status after the loss of the terminal, equal to the exit status after SIGHUP.
 pub const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 
 /// Meaning of a signal for the program.

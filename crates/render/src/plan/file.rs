@@ -39,7 +39,7 @@ impl Plan {
         text
     }
 
-    /// Returns the hash of all lines before the checksum. Plans with equal checksums count as equal.
+    /// Returns the hash of the lines before the checksum. Plans with equal hashes count as equal.
     pub fn checksum(&self) -> u64 {
         fnv1a64(self.body().as_bytes())
     }

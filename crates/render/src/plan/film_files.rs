@@ -290,8 +290,8 @@ impl FilmFiles {
         }
     }
 
-    /// Computes the sum of all usable films. If a file cannot be added, fails with its index and the
-    /// reason.
+    /// Computes the sum of all usable films. Fails if a file cannot be added, with its index and
+    /// the reason.
     pub(super) fn try_add(&mut self) -> Result<(), (usize, String)> {
         self.sum = None;
         let mut order: Vec<(u32, usize)> = Vec::new();

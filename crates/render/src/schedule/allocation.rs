@@ -107,9 +107,9 @@ struct TileModels {
 type Class = (u32, Option<i32>);
 
 /// Returns the length of the next block of a tile with `count` samples per pixel and replicate. A
-/// count below [`SAMPLE_ALIGNMENT`] grows to the next power of two. A larger count grows to the next
-/// multiple of [`SAMPLE_ALIGNMENT`]. A multiple grows by the largest power of two up to a quarter of
-/// `count`, at least [`SAMPLE_ALIGNMENT`]: such blocks of the sequence are well distributed.
+/// count below [`SAMPLE_ALIGNMENT`] grows to the next power of two. A larger count grows to the
+/// next multiple of [`SAMPLE_ALIGNMENT`]. A multiple grows by the largest power of two up to a
+/// quarter of it, at least [`SAMPLE_ALIGNMENT`]: such blocks of the sequence are well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;

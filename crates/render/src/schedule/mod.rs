@@ -115,7 +115,7 @@ impl Schedule {
     /// each light once; see [`WorldInfo::light_period`](zerkalo_world::WorldInfo::light_period).
     ///
     /// The error falls steeply at this number of samples. Estimates from fewer samples do not
-    /// predict the error, and are discarded once a tile has one from this many.
+    /// predict the error. They are discarded once a tile has an estimate from at least this number.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }
@@ -304,8 +304,8 @@ impl Schedule {
 
     /// Returns the number of samples by which a uniform round raises `done` samples per pixel and
     /// replicate, before it is rounded to [`SAMPLE_ALIGNMENT`]. Without an error target it is an
-    /// eighth of `done`. With an error target it is half of the estimated remaining samples, at most
-    /// `done`; if there is also a time limit, at most an eighth of `done`.
+    /// eighth of `done`. With an error target it is half of the estimated remaining samples, at
+    /// most `done`; if there is also a time limit, at most an eighth of `done`.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };

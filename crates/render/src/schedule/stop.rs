@@ -8,13 +8,13 @@ use crate::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 ///
 /// An estimate that is too low by chance ends a render too early. Ratio of true to reported RMSE at
 /// the end of simulated renders: 2.2 with 3 effective pixels, 1.49 with 6, 1.22 with 12. If the
-/// estimates before the latest three doublings must be below the target as well, it is 1.56, 1.23
-/// and 1.11.
+/// estimates before the latest three doublings must be below the target as well, the ratios are
+/// 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
 impl Schedule {
     /// Returns a lower and an upper estimate of the seconds left until the first stop criterion is
-    /// reached, after `seconds` seconds of rendering. Returns `None` if none can be extrapolated.
+    /// reached, after `seconds` seconds of rendering. `None` if no criterion can be extrapolated.
     pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
         let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
@@ -62,8 +62,8 @@ impl Schedule {
         Some(if seconds > 0.0 { seconds / (seconds + seconds_left) } else { 0.0 })
     }
 
-    /// Returns the error target with its measure: that which adaptive sampling minimises, if both
-    /// have targets.
+    /// Returns the error target with its measure. If both measures have targets, returns the one
+    /// that adaptive sampling minimises.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
         let levels = self.settings.stop.noise_levels.map(|t| (Criterion::Levels, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
@@ -91,9 +91,9 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns the estimate on which the end of the render depends. Below [`FEW_PIXELS_TO_STOP`] it
-    /// is the largest of the latest estimate and of those before each of the latest three doublings
-    /// of the samples, scaled to the present counts. Estimates on both sides of a doubling are
+    /// Returns the estimate on which the end of the render depends: the latest one. Below
+    /// [`FEW_PIXELS_TO_STOP`] its RMSE is at least that of the estimates before each of the latest
+    /// three doublings, scaled to the present counts. Estimates on both sides of a doubling are
     /// nearly independent. Returns `None` before the first estimate.
     pub(super) fn largest_recent_noise(&self) -> Option<Noise> {
         let latest = self.noise?;

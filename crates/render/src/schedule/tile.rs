@@ -11,15 +11,15 @@ pub(super) const DOUBLINGS: u32 = 3;
 pub(super) struct Tile {
     /// Number of the tile's pixels inside the picture.
     pub pixels: u32,
-    /// Samples per pixel in replicate B. Replicate A has as many between two rounds.
+    /// Samples per pixel in replicate B. Between two rounds, replicate A has equally many.
     pub done: u32,
     pub rays: u64,
     /// `true` if a path in the tile has made a random choice.
     pub glossy: bool,
     /// Latest noise estimate.
     pub error: Option<TileNoise>,
-    /// Noise estimates from which the slope is fitted, oldest first. From one to the next the
-    /// sample count at least doubles. The last may be the latest estimate.
+    /// Noise estimates from which the slope is fitted, oldest first. From one estimate to the next
+    /// the sample count at least doubles. The last one may be equal to `error`.
     pub history: Vec<TileNoise>,
 }
 
@@ -28,8 +28,8 @@ impl Tile {
         Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
     }
 
-    /// Records the report of a job. An estimate from at least `light_period` samples discards those
-    /// from fewer.
+    /// Records the report of a job. An estimate from at least `light_period` samples discards the
+    /// estimates from fewer samples.
     pub fn record(&mut self, report: &JobReport, light_period: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
@@ -85,9 +85,9 @@ impl Tile {
         })
     }
 
-    /// Returns the estimate before the latest `doublings` doublings of the sample count, or else
-    /// the oldest, scaled to the present count as [`USUAL_SLOPE`] predicts. Returns `None` before
-    /// the first estimate.
+    /// Returns the estimate before the latest `doublings` doublings of the sample count, scaled to
+    /// the present count as [`USUAL_SLOPE`] predicts. If there were fewer doublings, it is the
+    /// oldest estimate. Returns `None` before the first estimate.
     pub fn earlier_estimate(&self, doublings: usize) -> Option<TileNoise> {
         let latest = self.error?;
         let earlier = self.history.iter().rev().nth(doublings).or(self.history.first())?;
@@ -99,17 +99,17 @@ impl Tile {
     }
 
     /// Returns sample count and allocation estimate before and after the latest doubling. Returns
-    /// `None` before the first.
+    /// `None` before the first doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
         Some([before, after].map(|e| (f64::from(e.samples), criterion.of(e.allocation))))
     }
 
-    /// Returns the slope of the tile's error: the mean of the slope between its first and last
-    /// estimate, weighted by the number of doublings between them, and of `pooled`, the slope over
-    /// all similar tiles, with the weight of two doublings. The estimate of one tile is uncertain
-    /// by 5 to 35 %, a slope over one doubling therefore by 0.05 to 0.4. Returns `pooled` before
-    /// the first doubling, or if an error is 0.
+    /// Returns the slope of the tile's error, a weighted mean of two slopes. The slope between the
+    /// tile's first and last estimate has the number of doublings between them as weight. `pooled`,
+    /// the slope over all similar tiles, has the weight of two doublings. The estimate of one tile
+    /// is uncertain by 5 to 35 %, a slope over one doubling therefore by 0.05 to 0.4. Returns
+    /// `pooled` before the first doubling, or if an error is 0.
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [first, .., last] = self.history.as_slice() else { return pooled };

@@ -24,7 +24,7 @@ const SPEED_SECONDS: f64 = 1.0;
 const JOB_SECONDS: f64 = 0.005;
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
 /// Longest expected duration, in seconds, of a first-hit buffer that is traced before the first
-/// picture; others follow it.
+/// picture. A slower buffer is traced after the picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
 /// Assumed seconds per ray of a first-hit buffer until one has been measured: those of a small
 /// scene.
@@ -34,7 +34,7 @@ const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 pub(super) struct WorkContext {
     pub pool: rayon::ThreadPool,
     pub shared: Arc<Shared>,
-    /// Channel of one snapshot, both ends.
+    /// Sending end of the channel of the latest snapshot; `published` is the receiving end.
     pub publisher: Sender<Snapshot>,
     pub published: Receiver<Snapshot>,
     pub view: View,
@@ -97,8 +97,8 @@ impl ActiveRender {
         }
     }
 
-    /// Compiles `scene` and starts its render, in the memory of the film of `previous`. Returns the
-    /// first validation error of the scene.
+    /// Compiles `scene` and starts its render, in the memory of the film of `previous`. Fails with
+    /// the first validation error of the scene, or if there is not enough memory.
     pub fn start(
         scene: &Arc<Scene>,
         options: &Options,
@@ -142,8 +142,8 @@ impl ActiveRender {
         self.traced_for.as_secs_f64()
     }
 
-    /// Shows the samples as a picture of `scene` from now on and returns `true`, if they are valid
-    /// for it.
+    /// Makes the film a picture of `scene` and returns `true`. Returns `false`, without a change,
+    /// if the samples are not valid for it.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let weights = self.state.weights.clone();
         if !self.state.try_reuse(scene) {
@@ -176,8 +176,8 @@ impl ActiveRender {
         }
     }
 
-    /// Estimates the errors of all tiles again. If `cancel_wave` becomes `true` before the end,
-    /// returns `false` and changes nothing.
+    /// Estimates the errors of all tiles again and returns `true`. Returns `false`, without a
+    /// change, if `cancel_wave` becomes `true` before the end.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let RenderState { film, .. } = &self.state;
         let estimates = tile_estimates(film, self.state.estimator(), pool, cancel_wave);
@@ -188,7 +188,8 @@ impl ActiveRender {
         estimates.is_some()
     }
 
-    /// Traces `wave`, or only a piece of it, and adds the samples to the film.
+    /// Traces `wave`, or only a piece of it, and adds the samples to the film. Before the first
+    /// picture, traces the first pass and publishes a snapshot after each stage.
     pub fn trace(&mut self, wave: Wave, context: &WorkContext) {
         let flags = &context.shared;
         if self.first_picture_after.is_some() {

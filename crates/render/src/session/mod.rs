@@ -11,7 +11,8 @@
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
 //! pieces, so that clients see the picture improve. The pieces have no influence on the samples.
 //!
-//! No call blocks, except [`Session::with`] and [`Session::wait`].
+//! No call blocks, except [`Session::with`], [`Session::wait`] and the drop of a session that
+//! renders.
 //!
 //! [`Relighting`]: crate::Relighting
 
@@ -48,6 +49,7 @@ use zerkalo_scene::Scene;
 /// there is no film.
 type Task = Box<dyn FnOnce(Option<Picture>) + Send>;
 
+/// Command to the session's thread. The numbers are generations.
 enum Command {
     Scene(u64, Arc<Scene>),
     Resume(u64, Arc<Scene>, Box<Checkpoint>),
@@ -109,6 +111,7 @@ impl Session {
         Ok(session)
     }
 
+    /// Starts a thread that executes the function that `run` returns.
     fn start<F: FnOnce() + Send + 'static>(
         threads: usize,
         run: impl FnOnce(Receiver<Command>, WorkContext) -> F,
@@ -140,8 +143,8 @@ impl Session {
         self.begin(|generation| Command::Scene(generation, scene))
     }
 
-    /// Continues the render of `checkpoint` as a picture of `scene`, and returns its generation. If
-    /// this is not possible, reports have the state [`State::Failed`].
+    /// Continues the render of `checkpoint` as a picture of `scene`, and returns the generation of
+    /// `scene`. If this is not possible, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
@@ -151,7 +154,7 @@ impl Session {
         self.begin(Command::Restart)
     }
 
-    /// Sets the stop criteria. A finished render resumes if the new ones are not reached yet.
+    /// Sets the stop criteria. A finished render resumes if the new criteria are not reached yet.
     pub fn set_stop(&self, stop: Stop) {
         self.send(Command::Stop(stop));
     }
@@ -195,8 +198,8 @@ impl Session {
         receiver.recv().ok()
     }
 
-    /// Waits at most `limit` for a snapshot that has not been taken yet. Panics if the rendering
-    /// thread has panicked.
+    /// Waits at most `limit` for a snapshot that has not been taken yet; `None` after this time.
+    /// Panics if the rendering thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
         match self.snapshots.recv_timeout(limit) {
             Ok(snapshot) => Some(snapshot),

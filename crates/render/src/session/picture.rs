@@ -28,8 +28,8 @@ pub(super) enum Source<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// Creates the header of a film file, which also writes the picture as an image. `provenance`
-    /// gives the origin of a rendered scene; watched films state their own.
+    /// Creates the header with which the picture is written as a film file or an image.
+    /// `provenance` returns the origin of a rendered scene; watched films state their own origin.
     pub fn header(&self, provenance: impl FnOnce(&Scene) -> Provenance) -> FilmFileHeader {
         match self.source {
             Source::Render(render, _) => {

@@ -43,8 +43,8 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Returns the light weights with which this picture shows `scene`, which may be newer. Returns
-    /// `None` if `scene` needs new samples.
+    /// Returns the light weights with which this picture shows `scene`, which may be newer than the
+    /// snapshot. Returns `None` if `scene` needs new samples.
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }

@@ -20,8 +20,8 @@ const POLL: Duration = Duration::from_secs(1);
 /// With 2, checks take at most a third of the time.
 const REST: u32 = 2;
 
-/// State of the film files that a session watches. A film states size, display transform and scene
-/// file; before the first film they are those of the plan.
+/// State of the film files that a session watches. Size, display transform and scene file come from
+/// the films, or from the plan if there is no film yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchReport {
     /// Rows of [`FilmFiles::shards`].
@@ -112,7 +112,7 @@ impl Watcher {
         Some(Picture { film, weights: &header.weights, report, source: Source::Files(header) })
     }
 
-    /// Estimates the noise of the picture that the sum of all films shows.
+    /// Updates `shown`: estimates the noise of the sum of all films and reports on it.
     fn estimate(&mut self) {
         self.shown = self.films.sum.as_ref().and_then(|(header, film)| {
             let mut header = header.clone();

@@ -21,9 +21,9 @@ pub(super) struct Worker {
     settings: Settings,
     /// Newest scene that the client has set.
     newest: Option<Arc<Scene>>,
-    /// `true` if its render has not been started yet.
+    /// `true` if the render of `newest` has not been started yet.
     pending: bool,
-    /// `true` if it must start with an empty film, whatever samples there are.
+    /// `true` if the render of `newest` must start with an empty film, whatever samples there are.
     restart: bool,
     /// Scene to show, and the checkpoint from which its render continues.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
@@ -32,6 +32,7 @@ pub(super) struct Worker {
     /// Active render, or the reason why the newest scene cannot be rendered.
     work: Result<Option<ActiveRender>, String>,
     state: State,
+    /// `true` if there is no work until the next command.
     idle: bool,
 }
 
@@ -131,6 +132,7 @@ impl Worker {
         }
     }
 
+    /// Starts the newest scene: from a checkpoint, with the present samples, or with an empty film.
     fn start_newest(&mut self) {
         let Some(scene) = &self.newest else { return };
         let restart = std::mem::take(&mut self.restart);

@@ -1,8 +1,8 @@
 //! Ordered dithering to the 256-colour table: Thomas Knoll's pattern dithering.
 //!
 //! For each pixel a few colours of the table are chosen, whose mean in linear light approximates
-//! its colour. They are sorted by lightness, and the position of the pixel in an ordered pattern
-//! selects one of them.
+//! the colour of the pixel. They are sorted by lightness, and the position of the pixel in an
+//! ordered pattern selects one of them.
 
 use crate::cells::Raster;
 use crate::cells::oklab::{level, linear};

@@ -24,11 +24,11 @@ const SHADES: [char; 3] = ['░', '▒', '▓'];
 /// Background colours of mixtures, which leave the hue of the foreground unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
 /// Smallest decrease of the sum of both halves' OKLab errors for which a half block is preferred to
-/// a shading glyph. Without it, a changing picture would flicker between both.
+/// a shading glyph. With 0, a cell of a changing picture would flicker between the two.
 const HALVES_GAIN: f32 = 0.05;
 
-/// Returns the share of the cell that `glyph` covers, 0..=1; 0.5 for others than those of
-/// [`COVERAGE`], such as half blocks.
+/// Returns the share of the cell that `glyph` covers, 0..=1. Glyphs that are not in [`COVERAGE`],
+/// such as half blocks, have 0.5.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }

@@ -25,7 +25,7 @@ pub enum Colors {
     Indexed,
     /// The 16 ANSI colours, which users configure.
     Sixteen,
-    /// Glyphs alone make the picture.
+    /// No colours: glyphs alone make the picture.
     Mono,
 }
 
@@ -126,7 +126,7 @@ impl From<&Cell> for PictureCell {
 }
 
 /// Converts `raster` to cells of a terminal with `colors`. In 256 colours only a settled picture is
-/// dithered, because a changing one would flicker.
+/// dithered, because a changing picture would flicker.
 ///
 /// The last row of cells is half empty if the raster has an odd number of rows.
 pub fn picture_cells(raster: &Raster, colors: Colors, settled: bool) -> Buffer {

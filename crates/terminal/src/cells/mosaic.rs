@@ -3,7 +3,8 @@
 use crate::cells::oklab::{level, linear};
 
 /// Replaces the colour of each half cell by the mean, in linear light, of its block of `side` x
-/// `side` half cells. `pixels` is in rows of `width`. Half cells that are `None` do not count.
+/// `side` half cells. `pixels` has rows of `width` half cells. Half cells that are `None` do not
+/// count and stay `None`.
 pub fn blocks(pixels: &[Option<[u8; 3]>], width: usize, side: usize) -> Vec<Option<[u8; 3]>> {
     if width == 0 {
         return Vec::new();

@@ -1,6 +1,6 @@
-//! Encoding of cells in few bytes. Colours are sent only when they change. Of an upper half block
-//! and a lower one with exchanged colours, the one with fewer changes is sent. The cursor moves by
-//! the shortest sequence.
+//! Encoding of cells in few bytes. Colours are sent only when they change. An upper half block
+//! looks like a lower half block with exchanged colours; the one that needs fewer changes is sent.
+//! The cursor moves by the shortest sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
@@ -100,7 +100,7 @@ impl Encoder {
         // different.
         let is_explicit = upper != Color::Reset && lower != Color::Reset;
         let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
-            // The full block of some fonts leaves an edge of the background uncovered.
+            // The full block of some fonts does not cover the edge of the cell.
             (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
@@ -114,13 +114,14 @@ impl Encoder {
         candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)
     }
 
+    /// Writes the sequence (SGR) that sets colours and attributes to those of `pen`.
     fn set(&mut self, out: &mut Vec<u8>, pen: Pen) {
         if pen == self.pen {
             return;
         }
         let mut codes = Vec::new();
-        // The parameter 0 resets all attributes and colours; those that reset one attribute may
-        // affect another one.
+        // The parameter 0 resets all attributes and colours. A parameter that resets one attribute
+        // may affect another one.
         if !pen.modifier.contains(self.pen.modifier) || pen == Pen::default() {
             self.pen = Pen::default();
             codes.push("0".to_string());

@@ -3,8 +3,8 @@
 //! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
 //! largest first, within the byte budget of the frame. A new picture that does not fit is first
 //! sent as a mosaic of coarse blocks. While samples accumulate, a full comparison of all cells is
-//! due when their number per pixel has grown by a factor of 2^(1/4), or of 2^(1/2) from 64 on.
-//! Invisible differences are sent when the connection is idle.
+//! due when the number of samples per pixel has grown by a factor of 2^(1/4), or, from 64 samples
+//! on, of 2^(1/2). Invisible differences are sent when the connection is idle.
 
 mod encode;
 mod perceptual;
@@ -34,7 +34,7 @@ pub struct TargetFrame<'a> {
     pub picture: Rect,
     /// Row-major mask of the picture's area: `false` if text covers a cell.
     pub uncovered: &'a [bool],
-    /// Number that increases when the picture shows something else, but not with more samples.
+    /// Number that increases when the picture shows something else; more samples do not count.
     pub subject: u64,
     /// Number that increases when the picture may have changed for any reason.
     pub version: u64,
@@ -47,7 +47,7 @@ pub struct TargetFrame<'a> {
 /// Summary of an encoded frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
-    /// `true` if the frame contains cells of the picture.
+    /// `true` if the frame contains cells of the picture, or was encoded without a byte limit.
     pub picture: bool,
     /// Number of bytes that encode invisible differences.
     pub flushed: usize,
@@ -254,7 +254,7 @@ impl FrameDiff {
         room: usize,
         cell: impl Fn(usize) -> &'a Cell,
     ) -> Part {
-        // Equal gains are ordered by index, so that equal input gives equal frames.
+        // Equal differences are ordered by index, so that equal input gives equal frames.
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let encoded = |count: usize| {
             let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();
@@ -270,8 +270,8 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // The estimate assumes equal bytes for every cell. Those of a smaller selection are farther
-        // apart, so it is rarely too low.
+        // The next count assumes equal bytes for every cell. Cells of a smaller selection are
+        // farther apart and need more bytes, so the count is rarely too low.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {
@@ -312,7 +312,7 @@ struct Part {
 }
 
 impl TargetFrame<'_> {
-    /// Returns the index of a cell within the area of the picture.
+    /// Returns the index of a cell within the area of the picture; `None` outside the area.
     fn index(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
         let inside = area.contains(Position { x, y });

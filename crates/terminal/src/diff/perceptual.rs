@@ -42,7 +42,7 @@ impl PerceptualDiff {
         self.cells.clear();
     }
 
-    /// Sets the area of the picture. A new one has unknown contents.
+    /// Sets the area of the picture. The contents of a new area are unknown.
     pub fn fit(&mut self, area: Rect) {
         if self.area != area {
             self.area = area;
@@ -53,7 +53,7 @@ impl PerceptualDiff {
     }
 
     /// Marks the cells whose difference is above `threshold`. If `is_due` is `true`, all cells are
-    /// considered, otherwise those with `counts`.
+    /// considered, otherwise only the cells whose `counts` is `true`.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -109,9 +109,9 @@ impl PerceptualDiff {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Creates a mosaic of the target, blocks of `side` x `side` half cells, in the cells with a
-    /// visible difference. Also returns `(gain, index)` of each cell that it brings closer to the
-    /// target, the decrease in OKLab distance.
+    /// Creates a mosaic of the target in the cells with a visible difference, with blocks of `side`
+    /// x `side` half cells. Also returns `(gain, index)` of each cell that the mosaic brings closer
+    /// to the target. The gain is the decrease in OKLab distance.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);

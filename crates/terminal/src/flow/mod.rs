@@ -4,8 +4,8 @@
 //! later. After each frame the program therefore requests the cursor position. The reply
 //! acknowledges the frame, and its time gives the round trip and the rate. A frame holds at most
 //! what the connection carries in 100 ms, and only a few frames are in flight. Without replies from
-//! the terminal, the length of the kernel's TCP send queue is measured instead, and without that,
-//! bytes are sent at a fixed rate.
+//! the terminal, the length of the kernel's TCP send queue is measured instead. If the kernel does
+//! not report it, bytes are sent at a fixed rate.
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
@@ -39,10 +39,10 @@ const MIN_RATE: f64 = 2e3;
 const MAX_IN_FLIGHT: usize = 6;
 /// Largest sum of bytes of the frames in flight that contain only text.
 const MAX_TEXT: usize = 1500;
-/// Size below which the time of a frame is mostly latency: its acknowledgement may raise the
-/// measured rate, but not lower it.
+/// Number of bytes below which the time of a frame is mostly latency: its acknowledgement may raise
+/// the measured rate, but not lower it.
 const SMALL: usize = 1000;
-/// Time after which a missing acknowledgement is lost.
+/// Time after which a missing acknowledgement counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
 /// Number of consecutive losses after which no acknowledgements are requested.
 const MAX_LOSSES: u32 = 3;
@@ -50,7 +50,7 @@ const MAX_LOSSES: u32 = 3;
 const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
 /// Weight of a new measurement in the moving average of the rate.
 const NEW_WEIGHT: f64 = 0.3;
-/// Time after input during which the user is active.
+/// Time after input during which the user counts as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
 /// Interval at which the send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
@@ -111,11 +111,12 @@ pub struct FlowControl {
     start: InitialLink,
     /// Bytes per second, measured or fixed.
     rate: f64,
+    /// Shortest round trip since its latest measurement, at `round_trip_at`.
     round_trip: Option<Duration>,
     round_trip_at: Duration,
     /// Half of the rate at the last measurement of the round trip. With [`PacingMode::SendQueue`],
-    /// a lower rate causes a new one: a longer round trip may have lowered the rate, because the
-    /// limit of the queue is derived from it.
+    /// a lower rate causes a new measurement: a longer round trip may have lowered the rate,
+    /// because the limit of the queue is derived from the round trip.
     doubtful_rate: f64,
     /// Frames in flight, oldest first.
     in_flight: VecDeque<InFlight>,
@@ -230,7 +231,8 @@ impl FlowControl {
     }
 
     /// Returns the time from which the connection is silent, unless bytes are transmitted or input
-    /// arrives before. `blocked_since` is the start of a write that has not returned.
+    /// arrives before; `None` if no bytes wait. `blocked_since` is the start of a write that has
+    /// not returned.
     pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
         let is_measured = self.mode == PacingMode::SendQueue;
         let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
@@ -238,8 +240,8 @@ impl FlowControl {
         Some(since.max(self.active_until) + SILENT_AFTER)
     }
 
-    /// Returns the limits of a frame that may be sent now. `answers` is `true` if it shows the
-    /// effect of user input; it need not keep the usual interval then.
+    /// Returns the limits of a frame that may be sent now; `None` if none may be sent. `answers` is
+    /// `true` if the frame shows the effect of user input: it need not keep the usual interval.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // The round trip is measured by a small frame.
         let bytes = if self.needs_round_trip(now) { SMALL } else { self.budget() };
@@ -268,7 +270,7 @@ impl FlowControl {
             PacingMode::AckClocked(_) if now < self.active_until.min(self.clear_at) => {
                 frame.max(self.clear_at)
             }
-            // The oldest frame is acknowledged or lost then.
+            // By this time the oldest frame is acknowledged or lost.
             PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
             PacingMode::SendQueue => {
                 let due = self.measures_at(now).unwrap_or(now);
@@ -313,8 +315,8 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply, which acknowledges the oldest frame in flight. Returns `false` if no
-    /// frame was in flight.
+    /// Records a reply, which acknowledges the oldest frame in flight or resumes a suspended mode.
+    /// Returns `false` if there was neither.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
             // The connection has been interrupted.
@@ -341,8 +343,9 @@ impl FlowControl {
         true
     }
 
-    /// Updates the rate by the acknowledgement of `frame` at `at`. `last_acked` is the previous one,
-    /// and `known` the known round trip, if it is not too long.
+    /// Updates the rate by the acknowledgement of `frame` at `at`. `last_acked` has the times of
+    /// the frame acknowledged before. `known` is the known round trip; `None` if it is unknown or
+    /// longer than that of `frame`.
     fn measure_rate(
         &mut self,
         frame: InFlight,
@@ -351,8 +354,8 @@ impl FlowControl {
         known: Option<Duration>,
     ) {
         // The rate is the number of bytes divided by the time in which replies to them could
-        // arrive: from 0.9 to 1 round trips after the frame was sent, but not before the previous
-        // acknowledgement, to the acknowledgement. A round trip longer than that is not used.
+        // arrive. This time begins 0.9 to 1 round trips after the frame was sent, but not before
+        // the previous acknowledgement. It ends with this acknowledgement.
         let idle_start =
             |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
         let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
@@ -445,6 +448,7 @@ impl FlowControl {
         }
     }
 
+    /// Returns `true` if the connection can take another frame with cells of the picture.
     fn has_room(&self, now: Duration, answers: bool) -> bool {
         let is_active = now < self.active_until;
         // The first frame that shows the effect of input does not wait for frames sent before the
@@ -471,7 +475,7 @@ impl FlowControl {
             PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
                 let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
-                // The effect of an input then waits for fewer bytes.
+                // With a shorter queue, the effect of an input waits for fewer bytes.
                 let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 self.send_queue.bytes < self.max_queue() + extra - spare
             }
@@ -482,8 +486,8 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of bytes in the send queue above which no frame is sent: those of one
-    /// round trip and one frame.
+    /// Returns the number of bytes in the send queue above which no frame is sent: the bytes that
+    /// are transmitted in one round trip and [`FRAME_SPAN`].
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
@@ -496,8 +500,8 @@ impl FlowControl {
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip: if the rate has fallen by
-    /// half since the last measurement, or that is old and the user is not active.
+    /// Returns `true` if the next frame should measure the round trip. It should if the rate is
+    /// below `doubtful_rate`, or if the last measurement is old and the user is not active.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);
@@ -514,6 +518,8 @@ impl FlowControl {
         self.last_acked = None;
     }
 
+    /// Changes to `mode`, which requests no acknowledgements. A mode that requests them is
+    /// suspended.
     fn stop_requests(&mut self, mode: PacingMode, now: Duration) {
         if matches!(self.mode, PacingMode::AckClocked(_)) {
             self.suspended_mode = Some(self.mode);

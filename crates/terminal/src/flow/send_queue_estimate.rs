@@ -6,7 +6,8 @@ use std::time::Duration;
 /// Time in which the bytes of a frame may not have reached the queue, because another process, such
 /// as `sshd`, passes them on.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Time in which a queue is not believed to be empty, if the round trip is unknown.
+/// Time from the start of a busy period in which measurements do not count, if the round trip is
+/// unknown.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
 /// Shortest time over which the rate is measured.
 const SAMPLE: Duration = Duration::from_millis(100);
@@ -23,24 +24,25 @@ pub struct SendQueueEstimate {
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Beginning of a measurement of the rate that was shorter than [`SAMPLE`], which the next busy
-    /// period may continue.
+    /// Beginning, as in [`Busy`], of a measurement of the rate that was shorter than [`SAMPLE`]. The
+    /// next busy period may continue it.
     short_sample: Option<(Duration, f64)>,
 }
 
-/// Time in which the queue is not empty.
+/// Time in which the queue is not empty. The beginning of a measurement of the rate is a time, with
+/// the bytes that had left the queue in total.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Beginning of the measurement over the whole period, or over the previous one, too, if that
-    /// was too short and began less than [`SAMPLE`] before.
+    /// Beginning of the measurement over the whole period. It includes the previous period if that
+    /// was too short and began less than [`SAMPLE`] before this one.
     whole: (Duration, f64),
     /// Bytes of the only frame of the period; `None` for several.
     alone: Option<usize>,
     /// Beginning of the current measurement.
     sample: Option<(Duration, f64)>,
     /// `true` if the queue held as many bytes as flow control permits during the current
-    /// measurement. They leave it at the rate of the connection then.
+    /// measurement. Bytes then leave the queue at the rate of the connection.
     is_full: bool,
     /// Time at which bytes last left the queue.
     progress: Duration,
@@ -51,12 +53,12 @@ struct Busy {
 /// Result of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
-    /// Time until the queue was empty again, and bytes, of a frame that was the only one of a busy
-    /// period.
+    /// Time until the queue was empty again, and number of bytes, of the frame of a busy period
+    /// with only one frame.
     pub round_trip: Option<(Duration, usize)>,
     /// Bytes per second that left the queue.
     pub rate: Option<f64>,
-    /// `true` if `rate` is the rate of the connection, which may be faster otherwise.
+    /// `true` if `rate` is the rate of the connection; if `false`, the connection may be faster.
     pub is_full: bool,
 }
 
@@ -96,13 +98,13 @@ impl SendQueueEstimate {
         Some(self.measured_at.map_or(settled, |at| settled.max(at + interval)))
     }
 
-    /// Returns the time since which no bytes have left the queue; `None` if it is empty.
+    /// Returns the time since which no bytes have left the queue; `None` if the queue is empty.
     pub fn stalled_since(&self) -> Option<Duration> {
         self.busy.as_ref().map(|busy| busy.progress)
     }
 
     /// Records the measured length of the queue. `limit` is the number of bytes of a full queue,
-    /// and `round_trip` the shortest known one.
+    /// and `round_trip` the shortest known round trip.
     pub fn measured(
         &mut self,
         now: Duration,
@@ -115,7 +117,7 @@ impl SendQueueEstimate {
             self.bytes = bytes as f64;
             return QueueSample::default();
         };
-        // The other host cannot have acknowledged any bytes of this period before.
+        // Before this time, the other host cannot have acknowledged any bytes of this period.
         let filled_at = busy.since + round_trip.map_or(BELIEVED_AFTER, |time| time.mul_f64(0.9));
         if now < filled_at {
             return QueueSample::default();

@@ -29,7 +29,8 @@ const MARKS: [u32; 88] = [
 /// Largest number of rows that placeholders can encode.
 pub const MAX_ROWS: u16 = MARKS.len() as u16;
 
-/// Returns the text of each cell in row `row`. The terminal counts columns from the left.
+/// Returns the text of each cell in row `row` of the image. The terminal itself counts the columns
+/// from the left.
 pub fn placeholder(row: u16) -> String {
     let mark = MARKS.get(usize::from(row)).and_then(|mark| char::from_u32(*mark));
     [Some(PLACEHOLDER), mark].into_iter().flatten().collect()

@@ -13,7 +13,7 @@ use crate::{Capabilities, Multiplexer};
 use ratatui::layout::Rect;
 pub use transfer::Transfer;
 
-/// Largest width and height of a sixel image if the terminal reports no limit: that of xterm.
+/// Largest width and height of a sixel image if the terminal reports no limit: the limit of xterm.
 const SIXEL_PX: usize = 1000;
 /// Assumed width and height of a cell.
 const CELL_PX: [u16; 2] = [8, 16];
@@ -37,13 +37,13 @@ pub enum Protocol {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageViewport {
     pub protocol: Protocol,
-    /// Columns and rows; the last row shows a caption.
+    /// Columns and rows of the screen; the last row shows a caption.
     pub screen: [u16; 2],
     /// Width and height of a cell in pixels, if known.
     pub cell_px: Option<[u16; 2]>,
     /// Largest width and height of a sixel image in pixels, if known.
     pub sixel_px: Option<[u16; 2]>,
-    /// Approximate largest number of bytes. A larger image is scaled down.
+    /// Approximate largest number of bytes of the encoded image. A larger image is scaled down.
     pub max_bytes: Option<f64>,
 }
 
@@ -54,8 +54,8 @@ pub struct ImageLayout {
     pub size: [usize; 2],
     /// Width and height of the displayed image in pixels, at most `size`.
     pub shown: [usize; 2],
-    /// Columns and half rows of the preview in half blocks. It fills only cells that the image
-    /// covers fully, so that nothing of it shows beside the image.
+    /// Columns and half rows of the preview in half blocks. The preview fills only cells that the
+    /// image covers fully, so that no part of the preview shows beside the image.
     pub halves: [usize; 2],
     /// Cells that the image covers, at least in part.
     pub place: Rect,
@@ -102,7 +102,7 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns width and height of a cell in pixels, or in half blocks.
+    /// Returns width and height of a cell in pixels; [`Protocol::Blocks`] has a pixel per half block.
     fn cell(&self) -> [usize; 2] {
         match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -163,8 +163,8 @@ impl ImageViewport {
 }
 
 impl ViewerImage {
-    /// Encodes an image. `image` has the displayed size and `raster` that of the half blocks. `png`
-    /// encodes `image` as a PNG file, if the protocol sends one.
+    /// Encodes an image. `image` has the size `layout.shown`, and `raster` the size
+    /// `layout.halves`. `png` encodes `image` as a PNG file, if the protocol sends one.
     ///
     /// # Errors
     /// Fails if the image cannot be encoded.

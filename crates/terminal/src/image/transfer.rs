@@ -18,12 +18,12 @@ pub struct Transfer {
 }
 
 impl Transfer {
-    /// Returns the range of bytes to send after the first `sent`, at most `room`, and `true` if it
-    /// ends inside an escape sequence. The rest of this sequence, or ST, must then be sent before
-    /// any other output.
+    /// Returns the range of at most `room` bytes to send after the first `sent` bytes, and `true`
+    /// if the range ends inside an escape sequence. The rest of this sequence, or ST, must then be
+    /// sent before any other output.
     ///
-    /// If not even one sequence fits, a divisible one is cut, and an indivisible one is returned
-    /// whole.
+    /// If not even one sequence fits, a sixel sequence is cut; a sequence of kitty's protocol is
+    /// returned whole.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.is_sixel));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
