@@ -18,7 +18,7 @@ const SHARED_ABOVE: usize = 2;
 /// Traces the first sample of every pixel in the tiles of `wave`, in replicate A: first every 8th
 /// pixel in x and y, then in three stages the pixels between, with steps of 4, 2 and 1. Calls
 /// `on_stage` with the film after every stage except the last. A cancelled pass completes its first
-/// stage, starts no jobs of later ones, and returns `None`.
+/// stage, starts no jobs of later stages, and returns `None`.
 pub fn run<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,

@@ -12,8 +12,8 @@ pub struct Job {
     pub count: u32,
 }
 
-/// Jobs that are traced concurrently, at most one for each tile. All end before the next wave
-/// starts.
+/// Jobs that are traced concurrently, at most one for each tile. All jobs of a wave end before the
+/// next wave starts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wave {
     /// Replicate of the samples: 0 for A, 1 for B.

@@ -54,7 +54,6 @@ pub enum MouseKind {
     Scroll(i32),
 }
 
-/// Mouse button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
     Left,

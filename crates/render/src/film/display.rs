@@ -46,7 +46,6 @@ impl FromStr for Tone {
 pub struct Display {
     /// Exposure in stops; 0 leaves radiance as it is.
     pub exposure_ev: f64,
-    /// Tone curve.
     pub tone: Tone,
 }
 
@@ -56,7 +55,7 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Returns [`Display::levels`] rounded to 8 bits, several times faster, by a lookup table.
+    /// Returns [`Display::levels`] rounded to 8 bits. A lookup table makes it several times faster.
     pub fn levels_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }

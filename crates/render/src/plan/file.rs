@@ -216,6 +216,7 @@ impl<'a> Lines<'a> {
         })
     }
 
+    /// Reads the next line, which must be that of a tile.
     fn tile(&mut self) -> Result<PlannedTile, FileError> {
         let line = self.next_line().unwrap_or_default();
         let parse = || {

@@ -125,8 +125,8 @@ impl FilmFiles {
     /// Adds the film files of the plan at `path`. Fails if another plan was named before.
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
         let plan = Plan::read(path).map_err(|error| error.to_string())?;
-        // The base of a plan that continues an earlier one is the merged film of the earlier plan,
-        // whose name does not follow from that of the plan.
+        // The base of a plan that continues an earlier plan is the merged film of the earlier plan,
+        // whose file name does not follow from the name of this plan.
         let first = if plan.settings.base_plan.is_some() { BASE + 1 } else { BASE };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         self.files.extend((first..=plan.settings.shards).map(|shard| {
@@ -168,7 +168,8 @@ impl FilmFiles {
         between.unwrap_or_default().as_secs_f64()
     }
 
-    /// Returns the share, 0..=1, of the plan's samples that the films hold. `None` without a plan.
+    /// Returns the share, 0..=1, of the plan's samples that the films hold. `None` without a film
+    /// or a plan.
     pub fn progress(&self) -> Option<f64> {
         let ((_, film), plan) = (self.sum.as_ref()?, self.plan.as_ref()?);
         let pixels = (film.width() * film.height()) as f64;
@@ -386,6 +387,7 @@ impl FilmFile {
         self.part().is_some_and(|part| part.shards.iter().all(|shard| shard.complete))
     }
 
+    /// Returns the state of the file at the time `now`.
     fn row(&self, now: SystemTime) -> WatchedShards {
         // The clocks of two machines may differ: a modification in the future has the age 0.
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();

@@ -19,6 +19,7 @@ pub(super) struct ConvergenceFit {
 }
 
 impl ConvergenceFit {
+    /// Adds a point, or replaces the latest one. Ignores a point without rays or noise.
     pub fn record(&mut self, rays: f64, noise: f64) {
         if !(rays > 0.0 && noise > 0.0) {
             return;

@@ -69,7 +69,6 @@ impl StoppedBy {
     }
 }
 
-/// Settings of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// `true` if tiles may get different numbers of samples according to their noise.

@@ -73,6 +73,7 @@ impl Schedule {
         }
     }
 
+    /// Returns the criterion of error, cap or time that ends the render; `None` if it continues.
     pub(super) fn reason_to_stop(&self, seconds: f64) -> Option<StoppedBy> {
         let stop = &self.settings.stop;
         if let Some(noise) = self.largest_recent_noise().filter(|_| self.min_samples_reached()) {

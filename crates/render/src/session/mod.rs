@@ -7,7 +7,7 @@
 //! If several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples:
 //! its remaining jobs are traced when the render resumes.
 //!
-//! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
+//! A scene that differs from the active scene only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
 //! pieces, so that clients see the picture improve. The pieces have no influence on the samples.
 //!

@@ -14,7 +14,6 @@ pub struct Picture<'a> {
     pub film: &'a Film,
     /// Weight of each light group in the picture.
     pub weights: &'a LightWeights,
-    /// Report on the film.
     pub report: &'a Report,
     pub(super) source: Source<'a>,
 }

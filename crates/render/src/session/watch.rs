@@ -63,6 +63,7 @@ impl Watcher {
         Self { films, context, display: None, shown: None, downsample: None }
     }
 
+    /// Executes commands and checks the film files until the session ends.
     pub fn run(mut self, inbox: &Receiver<Command>, on_report: &dyn Fn(WatchReport)) {
         self.estimate();
         let mut changed = false;

@@ -88,6 +88,7 @@ impl Worker {
         ControlFlow::Continue(())
     }
 
+    /// Executes a command, or records it for the next piece of work. Returns `Break` for `Quit`.
     fn apply(&mut self, command: Command) -> ControlFlow<()> {
         match command {
             Command::Scene(generation, scene) => {

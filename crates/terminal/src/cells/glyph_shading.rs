@@ -6,8 +6,8 @@ use crate::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
 use ratatui::style::Color;
 use std::sync::LazyLock;
 
-/// Glyphs with the share of the cell that they cover: nominal for ░▒▓, the others measured in
-/// DejaVu Sans Mono.
+/// Glyphs with the share of the cell that they cover. The shares of ░▒▓ are nominal; the other
+/// shares were measured in DejaVu Sans Mono.
 const COVERAGE: [(char, f32); 9] = [
     (' ', 0.0),
     ('.', 0.025),

@@ -82,7 +82,7 @@ fn error_of_fewer_colors_is_bounded() {
 }
 
 /// Measures the time of the conversion of a picture to terminal cells:
-/// `cargo test --release --test application conversion_time -- --ignored --nocapture`.
+/// `cargo test --release -p zerkalo-terminal conversion_time -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn picture_conversion_time() {

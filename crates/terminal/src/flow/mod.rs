@@ -140,7 +140,6 @@ pub struct FlowControl {
     ack_sample: Option<AckSample>,
 }
 
-/// Frame in flight.
 #[derive(Clone, Copy, Debug)]
 struct InFlight {
     sent: Duration,

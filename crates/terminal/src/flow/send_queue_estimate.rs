@@ -24,8 +24,8 @@ pub struct SendQueueEstimate {
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Beginning, as in [`Busy`], of a measurement of the rate that was shorter than [`SAMPLE`]. The
-    /// next busy period may continue it.
+    /// Beginning, as in [`Busy`], of a measurement of the rate that was shorter than [`SAMPLE`].
+    /// The next busy period may continue it.
     short_sample: Option<(Duration, f64)>,
 }
 
@@ -53,8 +53,8 @@ struct Busy {
 /// Result of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
-    /// Time until the queue was empty again, and number of bytes, of the frame of a busy period
-    /// with only one frame.
+    /// Time until the queue was empty again, and number of bytes sent, in a busy period with a
+    /// single frame. `None` for other busy periods.
     pub round_trip: Option<(Duration, usize)>,
     /// Bytes per second that left the queue.
     pub rate: Option<f64>,

@@ -112,7 +112,7 @@ fn first_effect_of_input_does_not_wait_for_earlier_frames() {
     flow.record_input(now);
     assert!(flow.allowance(now, true).unwrap().picture);
     flow.sent(now, 8000, true, 0);
-    // The frame with the effect of the next input waits for those in flight.
+    // The frame with the effect of the next input waits for the frames in flight.
     flow.record_input(ms(110));
     assert!(!flow.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
 }

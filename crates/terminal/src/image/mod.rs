@@ -102,7 +102,7 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns width and height of a cell in pixels; [`Protocol::Blocks`] has a pixel per half block.
+    /// Returns width and height of a cell in pixels, or in half blocks of [`Protocol::Blocks`].
     fn cell(&self) -> [usize; 2] {
         match self.protocol {
             Protocol::Blocks => [1, 2],

@@ -218,6 +218,7 @@ fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     })
 }
 
+/// Decodes the `META` chunk. Returns `None` if it is invalid.
 fn decode_metadata(fields: &mut Fields) -> Option<Vec<(String, String)>> {
     let count = fields.u32()?;
     let entries = (0..count).map(|_| Some((fields.text()?, fields.text()?)));
@@ -305,22 +306,18 @@ impl<'a> Fields<'a> {
         Some(taken)
     }
 
-    /// Reads an unsigned 8-bit number.
     pub fn u8(&mut self) -> Option<u8> {
         self.take(1).map(|bytes| bytes[0])
     }
 
-    /// Reads an unsigned 32-bit number.
     pub fn u32(&mut self) -> Option<u32> {
         self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
     }
 
-    /// Reads an unsigned 64-bit number.
     pub fn u64(&mut self) -> Option<u64> {
         self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
     }
 
-    /// Reads a 64-bit floating-point number.
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }

@@ -64,7 +64,6 @@ const DONE: Tag = *b"DONE";
 /// Contents of a film file before the tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmFileHeader {
-    /// Properties of the film.
     pub film: Header,
     /// Weight of each light group in the picture.
     pub weights: LightWeights,

@@ -48,7 +48,7 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     }
     let start = out.len();
     let end = start + pixels.len() * bytes;
-    // Each sum is written with eight bytes; the next one overwrites the high ones, which are zero.
+    // Each sum is written with eight bytes. The next sum overwrites its high bytes, which are zero.
     out.resize(end + WORD, 0);
     for (n, sums) in pixels.iter().enumerate() {
         out[start + n * bytes..][..WORD].copy_from_slice(&sums[i].to_le_bytes());
