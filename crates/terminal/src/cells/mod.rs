@@ -3,11 +3,9 @@
 
 mod dither;
 mod glyph_shading;
-mod mosaic;
 mod oklab;
 mod palette_quantisation;
 
-pub use mosaic::blocks;
 pub use oklab::{Oklab, level, linear};
 pub use palette_quantisation::nearest_xterm;
 use palette_quantisation::xterm_rgb;

@@ -1,10 +1,11 @@
 //! Perceptual difference between the terminal and the target frame, in the cells of the picture.
 
-use crate::cells::{Oklab, PictureCell, blocks};
+use crate::cells::{Oklab, PictureCell, level, linear};
 use crate::diff::{TargetFrame, position};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
+use std::collections::HashMap;
 
 /// Difference of a cell with unknown contents, larger than that between black and white.
 const UNKNOWN: f32 = 2.0;
@@ -109,29 +110,29 @@ impl PerceptualDiff {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Creates a mosaic of the target in the cells with a visible difference, with blocks of `side`
-    /// x `side` half cells. Also returns `(gain, index)` of each cell that the mosaic brings closer
-    /// to the target. The gain is the decrease in OKLab distance.
+    /// Creates a mosaic of the target in the cells with a visible difference: blocks of `side` x
+    /// `side` half cells in their mean colours, in linear light. `side` is even. Also returns `(gain, index)` of each cell that it brings closer to the
+    /// target, the decrease in OKLab distance.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
-        let rows = usize::from(self.area.height);
-        let mut halves = vec![None; 2 * width * rows];
+        let block = |index: usize| (index % width / side, index / width / (side / 2));
+        let colors = |cell_colors: &CellColors| cell_colors.target.and_then(|cell| cell.colors());
+        // Sums in linear light, and numbers of half cells.
+        let mut blocks: HashMap<_, ([f32; 3], f32)> = HashMap::new();
         for (index, cell_colors) in self.cells.iter().enumerate() {
-            let Some([upper, lower]) = cell_colors.target.and_then(|cell| cell.colors()) else {
-                continue;
-            };
-            let (x, y) = (index % width, index / width);
-            halves[2 * y * width + x] = Some(upper);
-            halves[(2 * y + 1) * width + x] = Some(lower);
+            for half in colors(cell_colors).into_iter().flatten().map(linear) {
+                let (sum, count) = blocks.entry(block(index)).or_default();
+                (0..3).for_each(|c| sum[c] += half[c]);
+                *count += 1.0;
+            }
         }
-        let blocks = blocks(&halves, width, side);
         let mut cells: Vec<Cell> = Vec::with_capacity(self.cells.len());
         let mut improved = Vec::new();
         for (index, cell_colors) in self.cells.iter().enumerate() {
-            let (x, y) = (index % width, index / width);
-            let mean = blocks[2 * y * width + x];
             let mut cell = target.cells[position(self.area, index)].clone();
-            if let (Some([r, g, b]), true) = (mean, cell_colors.visible) {
+            if cell_colors.visible && colors(cell_colors).is_some() {
+                let (sum, count) = blocks[&block(index)];
+                let [r, g, b] = sum.map(|sum| level(sum / count));
                 let look = [Oklab::of([r, g, b]); 2];
                 cell = Cell::new(" ");
                 cell.set_bg(Color::Rgb(r, g, b));
@@ -154,4 +155,40 @@ impl PerceptualDiff {
 /// Returns the larger of the distances between upper and between lower halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_means_of_linear_light() {
+        let area = Rect::new(0, 0, 3, 1);
+        let mut cells = Buffer::empty(area);
+        for (x, fg, bg) in [(0, 255, 0), (1, 0, 0), (2, 255, 255)] {
+            cells[(x, 0)]
+                .set_char('▀')
+                .set_fg(Color::Rgb(fg, fg, fg))
+                .set_bg(Color::Rgb(bg, bg, bg));
+        }
+        let uncovered = [true; 3];
+        let target = TargetFrame {
+            cells: &cells,
+            cursor: None,
+            picture: area,
+            uncovered: &uncovered,
+            subject: 0,
+            version: 0,
+            samples: 1.0,
+            settled: false,
+        };
+        let mut difference = PerceptualDiff::default();
+        difference.fit(area);
+        difference.compare(&target, &Buffer::empty(area), true, 0.01);
+        let (cells, _) = difference.coarse(&target, 2);
+        // The mean of one white and three black half cells is a linear light of 0.25, which is the
+        // 8-bit level 137.
+        let levels = [137, 137, 255].map(|level| Color::Rgb(level, level, level));
+        assert_eq!([0, 1, 2].map(|x| cells[x].bg), levels);
+    }
 }
