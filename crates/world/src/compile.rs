@@ -334,9 +334,9 @@ fn culling<L: SimdFloat>(
     Culling { mode, all_candidates, light_buffers }
 }
 
-/// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths are
-/// inside of a solid only if they start there or are transmitted. `start` is a sphere around the
-/// origins of camera rays.
+/// Returns for each primitive whether it is a convex solid that rays hit only from outside. Paths
+/// are inside of a solid only if they start there or are transmitted. `start` is a sphere around
+/// the origins of camera rays.
 fn outside_only<L: SimdFloat>(
     forms: &[Form],
     primitives: &[PrimitiveId],

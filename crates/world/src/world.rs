@@ -20,8 +20,8 @@ pub(super) struct LightSource<T, S> {
     pub light: T,
     /// Index of the light group.
     pub group: usize,
-    /// Emission, colour times intensity, of a light that shares its group. `None` for a light with a
-    /// group of its own, whose samples are white.
+    /// Emission, colour times intensity, of a light that shares its group. `None` for a light with
+    /// a group of its own, whose samples are white.
     pub emission: Option<[S; 3]>,
     /// `true` if the camera and reflected rays see the light, which must have a size.
     pub visible: bool,

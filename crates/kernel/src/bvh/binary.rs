@@ -44,8 +44,8 @@ impl BinaryNode {
     }
 }
 
-/// Returns the index of the sibling of `node`, which must not be the root. Siblings are neighbours in
-/// the list of nodes; the first has an odd index, because the root has index 0.
+/// Returns the index of the sibling of `node`, which must not be the root. Siblings are neighbours
+/// in the list of nodes; the first has an odd index, because the root has index 0.
 pub fn sibling(node: usize) -> usize {
     ((node - 1) ^ 1) + 1
 }

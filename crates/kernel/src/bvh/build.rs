@@ -1,5 +1,5 @@
-//! Eight-wide BVH (BVH8): node layout and build. A node stores the bounds of its eight children as a
-//! structure of arrays. The build clusters the primitives into a binary BVH, optimises it by
+//! Eight-wide BVH (BVH8): node layout and build. A node stores the bounds of its eight children as
+//! a structure of arrays. The build clusters the primitives into a binary BVH, optimises it by
 //! reinsertion, and collapses it into wide nodes.
 
 use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
@@ -198,7 +198,7 @@ impl CollapsePlan {
         Self { splits }
     }
 
-    /// Appends to `out` the binary nodes that are the children of the wide node that replaces `node`.
+    /// Appends to `out` the binary nodes that become the children of the wide node for `node`.
     fn children(&self, nodes: &[BinaryNode], node: usize, out: &mut Vec<usize>) {
         let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {

@@ -19,8 +19,8 @@ pub struct SlabPacket<L> {
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares slab tests that enlarge boxes by `pad` on each side, to cover the rounding errors of
-    /// the primitives' own intersection tests.
+    /// Prepares slab tests that enlarge boxes by `pad` on each side, to cover the rounding errors
+    /// of the primitives' own intersection tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);

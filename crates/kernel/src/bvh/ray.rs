@@ -65,8 +65,8 @@ impl<L: SimdFloat> Hit<L> {
         self.triangle = L::select(lanes, other.triangle, self.triangle);
     }
 
-    /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is positive and
-    /// smaller than the distance in `self`.
+    /// Accepts a hit on `primitive` at distance `t` in the lanes of `mask` where `t` is positive
+    /// and smaller than the distance in `self`.
     #[inline(always)]
     pub fn keep_closer(&mut self, mask: L::Mask, t: L, primitive: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);

@@ -13,9 +13,9 @@ use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefe
 /// Node on a ray's stack, with the children that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Sort keys of the node's children: the bits of the distance at which the ray enters the child,
-    /// with the slot number in the last three bits. Slots without a child to visit have [`NO_KEY`]
-    /// or a larger key.
+    /// Sort keys of the node's children: the bits of the distance at which the ray enters the
+    /// child, with the slot number in the last three bits. Slots without a child to visit have
+    /// [`NO_KEY`] or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
     /// Number of children that the ray has still to visit.

@@ -1,5 +1,5 @@
-//! Implementations of the SIMD traits with one lane: `f32` and `f64`. Operations have the same order
-//! as with several lanes, so that results have identical bits.
+//! Implementations of the SIMD traits with one lane: `f32` and `f64`. Operations have the same
+//! order as with several lanes, so that results have identical bits.
 
 use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i64};
 

@@ -117,8 +117,8 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Returns `true` if the spheres may overlap, with a margin for the rounding errors of rays that
-    /// start in `other`.
+    /// Returns `true` if the spheres may overlap, with a margin for the rounding errors of rays
+    /// that start in `other`.
     pub fn overlaps(&self, other: &Self) -> bool {
         let errors = ray_error(self.center) + ray_error(other.center);
         self.center.distance(other.center)
@@ -156,8 +156,8 @@ impl BoundingVolume {
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some(HalfSpace { normal, offset }) = self.plane {
             // A ray from the apex with the direction c meets the plane at the depth `height` /
-            // (`toward` . c). The divisor, called the slope, is linear in c. If the rays through all
-            // corners meet the plane in front of the apex, the extreme depths are therefore at
+            // (`toward` . c). The divisor, called the slope, is linear in c. If the rays through
+            // all corners meet the plane in front of the apex, the extreme depths are therefore at
             // corners. `slack` and `slope_error` allow for rounding errors and for the tilt of the
             // lens towards the plane.
             let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
@@ -209,8 +209,8 @@ impl BoundingVolume {
     }
 
     /// Returns `true` if the object is flat, and a light and all points of the sphere `lit` are on
-    /// the same side of the object's plane. `above` returns the height of the light above the plane,
-    /// and the error of this height.
+    /// the same side of the object's plane. `above` returns the height of the light above the
+    /// plane, and the error of this height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn(HalfSpace) -> (f64, f64)) -> bool {
         let Some(plane) = self.plane else { return false };
         let height = plane.height(lit.center);
@@ -263,8 +263,8 @@ fn grown(ball: &BoundingSphere) -> BoundingSphere {
     BoundingSphere { radius, ..*ball }
 }
 
-/// Returns the distance between `point` and the convex hull of the spheres `a` and `b`, the union of
-/// all spheres interpolated between them; negative inside.
+/// Returns the distance between `point` and the convex hull of the spheres `a` and `b`, the union
+/// of all spheres interpolated between them; negative inside.
 fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64 {
     let axis = b.center - a.center;
     let length = axis.length().max(f64::MIN_POSITIVE);

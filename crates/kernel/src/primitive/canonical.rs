@@ -160,9 +160,9 @@ pub trait CanonicalShape {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
 
-    /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry; `None` if
-    /// it is unbounded along the unit vector `axis`. The default is the extent of the corners or of
-    /// the bounding box.
+    /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry; `None`
+    /// if it is unbounded along the unit vector `axis`. The default is the extent of the corners or
+    /// of the bounding box.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
         let heights = self.corners().into_iter().map(|corner| axis.dot(corner));
         if let Some(low) = heights.clone().reduce(f64::min) {

@@ -40,12 +40,12 @@ impl<L: SimdFloat> SurfacePoint<L> {
 
 /// Primitive compiled for the kernels of one SIMD type.
 pub trait Primitive<L: SimdFloat> {
-    /// Replaces `hit` in the lanes whose ray hits the primitive nearer than `hit`. `id` is the id of
-    /// the primitive.
+    /// Replaces `hit` in the lanes whose ray hits the primitive nearer than `hit`. `id` is the id
+    /// of the primitive.
     fn closest(&self, id: u32, ray: &Ray<L>, hit: &mut Hit<L>);
 
-    /// Returns the lanes whose ray hits the primitive at a distance between 0 and `limit`; `None` if
-    /// there are none. Lanes outside `wanted` are undefined.
+    /// Returns the lanes whose ray hits the primitive at a distance between 0 and `limit`; `None`
+    /// if there are none. Lanes outside `wanted` are undefined.
     fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask) -> Option<L::Mask>;
 
     /// See [`Aggregate::surface`](crate::primitive::Aggregate::surface).

@@ -57,8 +57,8 @@ pub(in crate::primitive) use form_enum;
 macro_rules! forms {
     ($($(#[$doc:meta])+ $kind:ident($form:ident, $noun:literal, $nouns:literal, convex: $convex:literal),)+) => {
         form_enum! {
-            /// Canonical form: the geometry of one object in double precision and scene coordinates.
-            /// Each variant is a kind of primitive.
+            /// Canonical form: the geometry of one object in double precision and scene
+            /// coordinates. Each variant is a kind of primitive.
             pub enum Form {
                 $($(#[$doc])+ $kind($form),)+
             }
@@ -72,7 +72,7 @@ macro_rules! forms {
                 }
             }
 
-            /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
+            /// Returns `true` if no ray that leaves the surface outwards hits the object again.
             pub fn is_convex(&self) -> bool {
                 match self {
                     $(Self::$kind(_) => $convex,)+
@@ -116,15 +116,15 @@ impl Form {
         !self.is_flat()
     }
 
-    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if there
-    /// is none. The unit of t is the length of `direction`.
+    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
+    /// there is none. The unit of t is the length of `direction`.
     pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let length = direction.length();
         Some(self.hit(origin, direction / length)?.0 / length)
     }
 
-    /// Returns the distance of the closest hit of a ray with the unit direction `direction`, and the
-    /// unit normal there; `None` for a miss.
+    /// Returns the distance of the closest hit of a ray with the unit direction `direction`, and
+    /// the unit normal there; `None` for a miss.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());
         let ray = Ray { origin: vector(origin), direction: vector(direction) };

@@ -1,6 +1,6 @@
-//! Tori. Rays are transformed into the space of a torus about the y axis, with a ring (the circle in
-//! the middle of the tube) of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, with rho^2
-//! = x^2 + z^2.
+//! Tori. Rays are transformed into the space of a torus about the y axis, with a ring (the circle
+//! in the middle of the tube) of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, with
+//! rho^2 = x^2 + z^2.
 //!
 //! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
 //! Newton's method finds these zeros of h in brackets. Let s be the distance along the line from
@@ -149,7 +149,7 @@ impl<S: Float> Torus<S> {
 /// which the ring has radius 1. The unit is the machine epsilon.
 const ROOM: f64 = 64.0;
 
-/// Largest number of steps of the search for one zero. Bisection alone needs 54 in double precision.
+/// Largest number of steps of the search for a zero. Bisection needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
 /// Line of a ray in the space in which the ring has radius 1. A position on the line is a signed
@@ -256,7 +256,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (height, slope + slope)
     }
 
-    /// Returns half the derivative of h at position `s` of the line, and the derivative of this half.
+    /// Returns half the derivative of h at position `s` of the line, and the derivative of that.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, inward } = self.place(s);

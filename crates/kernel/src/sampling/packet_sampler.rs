@@ -72,8 +72,8 @@ pub struct Sampler<L: SimdFloat> {
     first_lobe: usize,
     /// Number of surfaces on a path at which the sampled direction uses the joint set.
     joint_lobes: u32,
-    /// `low_bits[k][d]` holds the points 0..2^k in dimension d, repeated over the lanes, for packets
-    /// with 2^k samples of each pixel.
+    /// `low_bits[k][d]` holds the points 0..2^k in dimension d, repeated over the lanes, for
+    /// packets with 2^k samples of each pixel.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,

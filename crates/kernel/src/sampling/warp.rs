@@ -19,8 +19,8 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Returns the coefficients of sin(pi x / 4) / x for `first` = 1, and of cos(pi x / 4) for `first` =
-/// 0, as power series in x^2.
+/// Returns the coefficients of sin(pi x / 4) / x for `first` = 1, and of cos(pi x / 4) for `first`
+/// = 0, as power series in x^2.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);

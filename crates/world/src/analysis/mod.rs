@@ -1,5 +1,5 @@
-//! Judgements about a scene as a whole: precision, range of radiance, bias of truncated paths, reuse
-//! of samples after an edit, inventory.
+//! Judgements about a scene as a whole: precision, range of radiance, bias of truncated paths,
+//! reuse of samples after an edit, inventory.
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 

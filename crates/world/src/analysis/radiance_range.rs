@@ -365,8 +365,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range for surfaces at different distances from a light. `radiance_at` returns the
-    /// radiance of a white surface that faces the light, for the distance between them.
+    /// Returns the range for surfaces at different distances from a light. `radiance_at` returns
+    /// the radiance of a white surface that faces the light, for the distance between them.
     fn lit_by(
         &self,
         light: &LitBy,
@@ -412,8 +412,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range for surfaces that multiply `light`, the radiance of a white surface, by the
-    /// factors of `response`.
+    /// Returns the range for surfaces that multiply `light`, the radiance of a white surface, by
+    /// the factors of `response`.
     fn range_of(&self, light: f64, response: Response) -> RadianceRange {
         let Response { least, most, peak } = response;
         RadianceRange {

@@ -16,9 +16,9 @@ const MAX_TANGENT: f64 = 3.0;
 pub(crate) enum LightProjection<S> {
     /// For a point light that has primitives on several sides.
     CubeMap,
-    /// Perspective projection for a point light that has all primitives on one side, or orthographic
-    /// projection for a directional light. The third axis points away from the light. `low` and
-    /// `scale` map coordinates on the face to 0..=1.
+    /// Perspective projection for a point light that has all primitives on one side, or
+    /// orthographic projection for a directional light. The third axis points away from the light.
+    /// `low` and `scale` map coordinates on the face to 0..=1.
     Planar { is_perspective: bool, axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
 }
 

@@ -73,7 +73,7 @@ pub(crate) struct Culling<S> {
 
 impl<S: Float> Culling<S> {
     /// Returns the candidates of a rectangle of the picture \[pixels\] with the upper left corner
-    /// `origin` and the size `extent`. Returns `None` if rays must be tested against all primitives.
+    /// `origin` and the size `extent`. Returns `None` if all primitives are candidates.
     pub fn candidates<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,

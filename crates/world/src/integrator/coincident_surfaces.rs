@@ -238,7 +238,7 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the surface that the rays cross next among those that coincide with their start points.
+    /// Finds the surface that rays cross next among those that coincide with their start points.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -248,8 +248,8 @@ impl<S: Float> Contacts<S> {
         self.search(geometry, coincident, media, L::from_f64(L::MAX))
     }
 
-    /// Finds the surface that the rays cross first: the start surface in `coincident`, whose layer is
-    /// ignored, or one that coincides with it. `leaves` selects rays that run along the outward
+    /// Finds the surface that the rays cross first: the start surface in `coincident`, whose layer
+    /// is ignored, or one that coincides with it. `leaves` selects rays that run along the outward
     /// normal of the start surface.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,

@@ -81,8 +81,8 @@ type Trace<L> = fn(
     &mut Radiance<L>,
 );
 
-/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate the
-/// machine code of the kernels in this crate, so that other crates call it instead of generating
-/// their own.
+/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate
+/// the machine code of the kernels in this crate, so that other crates call it instead of
+/// generating their own.
 #[doc(hidden)]
 pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

@@ -237,8 +237,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces; `None` if `lanes` is empty. `media` are
-    /// the media of the rays, and `thin_index` is the index of refraction of thin surfaces.
+    /// Returns the hits of `lanes` on transmissive surfaces; `None` if `lanes` is empty. `media`
+    /// are the media of the rays, and `thin_index` is the index of refraction of thin surfaces.
     #[inline(never)]
     pub fn cross(
         &self,

@@ -48,9 +48,9 @@ pub(crate) fn add_background<L: SimdFloat>(
 }
 
 impl<L: SimdFloat> Vertex<'_, L> {
-    /// Adds the light that the surfaces emit and reflect. `emitters` is `true` if the world may have
-    /// emitters. `bouncing` are the lanes whose diffuse bounces compute their indirect light; `None`
-    /// if there are no bounces. `rays` returns the reflected rays that find emitters, too.
+    /// Adds the light that the surfaces emit and reflect. `emitters` is `true` if the world may
+    /// have emitters. `bouncing` are the lanes whose diffuse bounces compute their indirect light;
+    /// `None` if there are no bounces. `rays` returns the reflected rays that find emitters, too.
     #[inline(always)]
     pub fn shade<const SIMPLE: bool>(
         &mut self,
@@ -74,8 +74,8 @@ impl<L: SimdFloat> Vertex<'_, L> {
         }
     }
 
-    /// Replaces the rays of the paths by reflected rays, with directions sampled from the reflection
-    /// lobes. Returns the lanes whose paths continue: their new throughput is at least
+    /// Replaces the rays of the paths by reflected rays, with directions sampled from the
+    /// reflection lobes. Returns the lanes whose paths continue: their new throughput is at least
     /// [`min_weight`](World::min_weight). The density of the directions is computed only if
     /// `emitters` is `true`.
     #[inline(always)]

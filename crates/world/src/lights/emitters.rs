@@ -112,8 +112,8 @@ impl<S: Float> Emitters<S> {
         Self { sources, lights: lights_len, sampled, source_of, touching, lift: S::from_f64(lift) }
     }
 
-    /// Samples a point of the emitter with the number `index` for each of the receivers at `origin`.
-    /// `numbers` are uniform in [0, 1). Returns `None` if there is no such emitter.
+    /// Samples a point of the emitter with the number `index` for each of the receivers at
+    /// `origin`. `numbers` are uniform in [0, 1). Returns `None` if there is no such emitter.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -197,8 +197,8 @@ impl<S: Float> Emitters<S> {
         Some(&self.sources[source? as usize])
     }
 
-    /// Returns the visible lights with a size, which are not part of the geometry: rays pass through
-    /// them.
+    /// Returns the visible lights with a size, which are not part of the geometry: rays pass
+    /// through them.
     #[inline(always)]
     pub fn visible_lights(&self) -> impl Iterator<Item = (&Emitter<S>, &EmissiveSource<S>)> {
         let visible = self.sources[..self.lights].iter().filter(|source| source.visible);

@@ -420,8 +420,8 @@ impl<L: SimdFloat> Aggregate<L> {
         self.mesh(primitive).map_or(at.normal, |mesh| mesh.shading_normal(triangle, at, direction))
     }
 
-    /// Returns the colour that the mesh file of `primitive` gives to `triangle`. Returns `None` if the
-    /// primitive is not a mesh, or if the file has no colours.
+    /// Returns the colour that the mesh file of `primitive` gives to `triangle`. Returns `None` if
+    /// the primitive is not a mesh, or if the file has no colours.
     pub fn color(&self, primitive: u32, triangle: L) -> Option<Vec3<L>> {
         self.mesh(primitive)?.color(triangle)
     }

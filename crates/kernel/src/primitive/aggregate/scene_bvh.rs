@@ -49,8 +49,8 @@ impl SceneBvh {
     }
 
     /// Calls `leaf(primitive, limit)` for the primitives whose boxes a ray may enter at a distance
-    /// up to its `limit`, approximately from near to far. `primitive` is the index of the box in the
-    /// list given to [`SceneBvh::new`]. `leaf` returns the new limits. Lanes whose limit is not
+    /// up to its `limit`, approximately from near to far. `primitive` is the index of the box in
+    /// the list given to [`SceneBvh::new`]. `leaf` returns the new limits. Lanes whose limit is not
     /// positive are inactive.
     #[inline(always)]
     pub fn traverse<L: SimdFloat>(

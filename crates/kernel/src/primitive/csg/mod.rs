@@ -69,8 +69,8 @@ struct Compound<S> {
     depth: usize,
 }
 
-/// Part of a compound. Every part counts as a primitive, so that a hit identifies the part. Rays are
-/// intersected with the first part only, which stands for the whole compound.
+/// Part of a compound. Every part counts as a primitive, so that a hit identifies the part. Rays
+/// are intersected with the first part only, which stands for the whole compound.
 pub struct CompoundPart<S> {
     compound: Arc<Compound<S>>,
     part: usize,

@@ -1,6 +1,6 @@
-//! Meshes as primitives. A ray is transformed into the space of the mesh and traverses the mesh's BVH
-//! there. Coordinates of a mesh are in single precision for every SIMD type; computation has the
-//! precision of the lanes.
+//! Meshes as primitives. A ray is transformed into the space of the mesh and traverses the mesh's
+//! BVH there. Coordinates of a mesh are in single precision for every SIMD type; computation has
+//! the precision of the lanes.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3};
@@ -15,8 +15,8 @@ use crate::primitive::mesh::{Mesh, intersection};
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
-/// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single or
-/// double precision.
+/// Assumed ratio of a mesh's extent to the size of its smallest details, for the choice of single
+/// or double precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
 /// Image of a triangle mesh under an invertible affine map.

@@ -81,8 +81,8 @@ impl<L: SimdFloat> ShearedRay<L> {
     ///
     /// The corners are projected along the ray. A corner has the same projection in all triangles
     /// that share it, and the area that an edge spans with the ray's origin is computed with the
-    /// exact sign, or as 0. Hence no ray passes between two triangles that share an edge or a corner
-    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
+    /// exact sign, or as 0. Hence no ray passes between two triangles that share an edge or a
+    /// corner (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
     /// orthonormal frame for the shear).
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
@@ -255,8 +255,8 @@ pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet if
-/// `all` is `true`, otherwise separately.
+/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet
+/// if `all` is `true`, otherwise separately.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,

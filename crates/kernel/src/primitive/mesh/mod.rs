@@ -14,8 +14,8 @@ pub use normals::smooth;
 pub struct TriangleMesh {
     /// Vertex positions relative to `center`.
     pub positions: Vec<[f32; 3]>,
-    /// Offset that was subtracted from every vertex; nonzero only if single precision would lose the
-    /// shape of the mesh, because it is far from the origin.
+    /// Offset that was subtracted from every vertex; nonzero only if single precision would lose
+    /// the shape of the mesh, because it is far from the origin.
     pub center: [f64; 3],
     /// Vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
