@@ -256,7 +256,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (height, slope + slope)
     }
 
-    /// Returns half the derivative of h at position `s` of the line, and the derivative of that.
+    /// Returns half of the slope of h at position `s` of the line, and the derivative of this half.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let Place { beyond, y, speed, inward } = self.place(s);
