@@ -36,7 +36,7 @@ impl CanonicalShape for EllipsoidForm {
         let map = &self.scene_from_unit;
         let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
             .map(|a| a.length_squared());
-        // The Frobenius norm is at least the largest singular value, that is, the largest half-axis.
+        // The Frobenius norm is at least as large as the largest half-axis (singular value).
         BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
     }
 
