@@ -259,7 +259,7 @@ impl Tracer<'_> {
     /// Returns the factor by which the material's texture multiplies the albedo at a point.
     pub fn painted(&self, material: &Material, spot: &Spot) -> DVec3 {
         let Some(texture) = &material.texture else { return DVec3::ONE };
-        let mut uv = spot.uv(&texture.placement(), spot.point);
+        let mut uv = spot.uv(texture.placement(), spot.point);
         if self.mutation == Mutation::SidewaysTexture {
             uv = DVec2::new(uv.y, uv.x);
         }

@@ -95,8 +95,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
             let bump = material.bump.as_ref();
             Some(SurfaceTexture {
                 albedo: texture
-                    .and_then(|t| Some((mapping_of(&t.placement()), CompiledTexture::new(t)?))),
-                bump: bump.and_then(|b| Some((mapping_of(&b.placement()), BumpMap::new(b)?))),
+                    .and_then(|t| Some((mapping_of(t.placement()), CompiledTexture::new(t)?))),
+                bump: bump.and_then(|b| Some((mapping_of(b.placement()), BumpMap::new(b)?))),
             })
         });
         Self { of_primitive: of_primitive.collect() }
