@@ -121,13 +121,18 @@ impl Drop for Screen {
     }
 }
 
+/// Locks `mutex`, even after a panic, which restores the terminal.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Tty {
     /// Writes `bytes` in one call. Does nothing outside full-screen use.
     ///
     /// # Errors
     /// Fails if the terminal is closed.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
-        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut out = locked(&self.out);
         if self.entered.load(Ordering::Acquire) {
             out.write_all(bytes)?;
             out.flush()?;
@@ -137,9 +142,7 @@ impl Tty {
 
     /// Sets the bytes that are sent before [`LEAVE`].
     pub fn set_exit_sequence(&self, bytes: &[u8]) {
-        let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
-        exit_sequence.clear();
-        exit_sequence.extend(bytes);
+        *locked(&self.exit_sequence) = bytes.to_vec();
     }
 
     /// Ends full-screen use.
@@ -157,10 +160,8 @@ impl Tty {
         }
         // The terminal may have stopped reading.
         if let Some(mut out) = self.lock_within(PATIENCE) {
-            let mut exit_sequence =
-                self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
-            let bytes = [&*exit_sequence, LEAVE.as_bytes()].concat();
-            exit_sequence.clear();
+            let mut bytes = std::mem::take(&mut *locked(&self.exit_sequence));
+            bytes.extend(LEAVE.as_bytes());
             // A terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
@@ -180,7 +181,7 @@ impl Tty {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;
         }
-        let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut out = locked(&self.out);
         self.entered.store(true, Ordering::Release);
         out.write_all(ENTER.as_bytes())?;
         out.flush()

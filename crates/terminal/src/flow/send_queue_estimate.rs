@@ -65,29 +65,25 @@ pub struct QueueSample {
 impl SendQueueEstimate {
     /// Records that a frame was sent. `limit` is the number of bytes of a full queue.
     pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
-        match &mut self.busy {
-            Some(busy) => busy.alone = None,
-            None => {
-                let continued = self.short_sample.take();
-                self.busy = Some(Busy {
-                    since: now,
-                    whole: continued
-                        .filter(|(start, _)| now < *start + SAMPLE)
-                        .unwrap_or((now, self.sent)),
-                    alone: Some(bytes),
-                    sample: None,
-                    is_full: false,
-                    progress: now,
-                    most_drained: self.sent,
-                });
+        let alone = self.busy.is_none().then_some(bytes);
+        let busy = self.busy.get_or_insert_with(|| {
+            let continued = self.short_sample.take();
+            let continued = continued.filter(|(start, _)| now < *start + SAMPLE);
+            Busy {
+                since: now,
+                whole: continued.unwrap_or((now, self.sent)),
+                alone,
+                sample: None,
+                is_full: false,
+                progress: now,
+                most_drained: self.sent,
             }
-        }
+        });
         self.sent += bytes as f64;
         self.bytes += bytes as f64;
         self.sent_at = now;
-        if let Some(busy) = &mut self.busy {
-            busy.is_full |= self.bytes >= limit;
-        }
+        busy.alone = alone;
+        busy.is_full |= self.bytes >= limit;
     }
 
     /// Returns the time of the next measurement: `interval` after the last one, but at least
