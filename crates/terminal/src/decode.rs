@@ -65,8 +65,8 @@ enum State {
     X10Mouse,
     /// Control string, which began with ESC and this byte.
     String(u8),
-    /// ESC inside the control string that began with this byte. A backslash ends the string.
-    StringEscape(u8),
+    /// ESC inside a control string. A backslash ends the string.
+    StringEscape,
     Paste,
     /// Pasted text whose first part was reported after a pause.
     PausedPaste,
@@ -123,17 +123,13 @@ impl Decoder {
     /// Ends an incomplete sequence after a pause. Returns its events.
     pub fn give_up(&mut self) -> Vec<Event> {
         match self.state {
-            State::Escape => {
-                self.escape_given_up = true;
-                self.interpreter.press(Key::plain(Code::Esc));
+            State::Escape => self.give_up_escape(),
+            State::Paste | State::PausedPaste => self.pause_paste(),
+            _ => {
+                self.abandon();
+                self.restart();
             }
-            State::Paste | State::PausedPaste => {
-                self.pause_paste();
-                return std::mem::take(&mut self.interpreter.events);
-            }
-            _ => self.abandon(),
         }
-        self.restart();
         std::mem::take(&mut self.interpreter.events)
     }
 
@@ -149,8 +145,8 @@ impl Decoder {
             | State::X10Mouse
             | State::SingleShift(_)
             | State::String(_) => self.sequence(byte),
-            State::StringEscape(_) if byte == b'\\' => self.end_string(b"\x1b\\"),
-            State::StringEscape(_) => {
+            State::StringEscape if byte == b'\\' => self.end_string(b"\x1b\\"),
+            State::StringEscape => {
                 // Another sequence interrupts the string.
                 self.restart();
                 self.state = State::Escape;
@@ -245,7 +241,7 @@ impl Decoder {
             (State::SingleShift(modifiers), 0x40..=0x7e) => {
                 self.complete(single_shift(modifiers, byte));
             }
-            (State::String(introducer), ESC) => self.state = State::StringEscape(introducer),
+            (State::String(_), ESC) => self.state = State::StringEscape,
             (State::String(b']'), BEL) => self.end_string(b"\x07"),
             (State::String(_), CAN | SUB) => self.restart(),
             (State::String(b'P' | b'_'), 0x80..) => {}
@@ -319,13 +315,16 @@ impl Decoder {
         }
         self.restart();
         match key {
-            Some(ESC) => {
-                self.escape_given_up = true;
-                self.interpreter.press(Key::plain(Code::Esc));
-            }
+            Some(ESC) => self.give_up_escape(),
             Some(key) => self.byte(key),
             None => self.state = State::PausedPaste,
         }
+    }
+
+    fn give_up_escape(&mut self) {
+        self.restart();
+        self.escape_given_up = true;
+        self.interpreter.press(Key::plain(Code::Esc));
     }
 
     /// Ends an incomplete sequence. Its first two bytes alone are a key such as Alt-`[`.
