@@ -58,7 +58,8 @@ pub struct SceneErrors {
 #[derive(Default)]
 pub(super) struct FirstDiagnostics {
     found: Vec<(usize, Diagnostic)>,
-    more: usize,
+    /// Number of diagnostics that are not stored.
+    pub more: usize,
     /// Byte offset above which diagnostics are only counted; `None` as long as all are stored.
     last: Option<usize>,
 }
@@ -80,11 +81,6 @@ impl FirstDiagnostics {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
         skips
-    }
-
-    /// Adds `more` to the number of diagnostics that are not stored.
-    pub fn count_more(&mut self, more: usize) {
-        self.more += more;
     }
 
     fn keep_first(&mut self) {

@@ -115,9 +115,13 @@ impl SceneFile {
 
     /// Returns the text that saving the valid `scene` would write.
     pub fn text_of(&self, scene: &Scene) -> String {
+        self.described(scene).text().to_string()
+    }
+
+    fn described(&self, scene: &Scene) -> Document {
         let mut document = self.document.clone();
         document.apply(scene);
-        document.text().to_string()
+        document
     }
 
     /// Returns the path of the scene file; `None` if the scene has no file.
@@ -164,9 +168,7 @@ impl SceneFile {
         if !overwrite && self.state_of(&found) == DiskState::Changed {
             return Err(SaveError::Changed(path));
         }
-        let mut document = self.document.clone();
-        document.apply(scene);
-        self.write(document, &path, true)
+        self.write(self.described(scene), &path, true)
     }
 
     /// Writes the valid `scene` to the file at `path`, which becomes the scene's file. Fails if
@@ -193,9 +195,8 @@ impl SceneFile {
                 what: format!("from there \"{file}\", which the scene names, would not be found"),
             });
         }
-        let mut document = self.document.clone();
+        let mut document = self.described(scene);
         document.name = path.display().to_string();
-        document.apply(scene);
         self.write(document, path, overwrite)?;
         resolver.move_to(path);
         self.path = Some(path.to_path_buf());

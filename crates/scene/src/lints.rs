@@ -74,25 +74,19 @@ impl Scene {
         };
         let dark = &mut self.lights.iter().enumerate().filter_map(dark);
         add("Leave the light out, or write on = false.", dark);
-        let whole = |found: &str| (Vec::new(), found.to_string());
-        add(
-            "The picture will show nothing but the background. An object begins with [[object]].",
-            &mut self.objects.is_empty().then(|| whole("there is no object")).into_iter(),
-        );
-        let no_light = "there is no light, no ambient and no background";
-        add(
-            "The picture will be black. A light begins with [[light]].",
-            &mut self.is_dark().then(|| whole(no_light)).into_iter(),
-        );
-        problems
-    }
-
-    fn is_dark(&self) -> bool {
-        !self.objects.is_empty()
-            && self.lights.is_empty()
+        if self.objects.is_empty() {
+            let help = "The picture will show nothing but the background. An object begins with [[object]].";
+            problems.push(self.problem(&[], "there is no object".into(), help.into()));
+        } else if self.lights.is_empty()
             && self.ambient.color == Color::BLACK
             && self.background.color == Color::BLACK
             && !self.materials.values().any(Material::emits)
+        {
+            let found = "there is no light, no ambient and no background";
+            let help = "The picture will be black. A light begins with [[light]].";
+            problems.push(self.problem(&[], found.into(), help.into()));
+        }
+        problems
     }
 }
 

@@ -78,7 +78,7 @@ impl<'a> SourceScene<'a> {
         }
         let mut errors = FirstDiagnostics::default();
         locate(text, &source.parts, problems, &mut errors);
-        errors.count_more(more);
+        errors.more += more;
         Err(SceneErrors::new(errors.located((name, text))))
     }
 
