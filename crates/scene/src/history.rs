@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::Material;
-use crate::{Object, Scene, TransformOp};
+use crate::{Object, Scene};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -31,14 +31,6 @@ pub struct History {
 struct HistoryEntry {
     scene: Arc<Scene>,
     label: String,
-    bytes: usize,
-}
-
-impl HistoryEntry {
-    fn new(scene: Arc<Scene>, label: String) -> Self {
-        let bytes = bytes(&scene);
-        Self { scene, label, bytes }
-    }
 }
 
 impl History {
@@ -70,7 +62,7 @@ impl History {
                 self.open = false;
             }
         } else {
-            self.past.push_back(HistoryEntry::new(before, label.to_string()));
+            self.past.push_back(HistoryEntry { scene: before, label: label.to_string() });
             self.forget();
         }
         true
@@ -84,18 +76,18 @@ impl History {
     /// Undoes the last step of the history and returns its label; `None` if no step can be undone.
     pub fn undo(&mut self) -> Option<String> {
         self.open = false;
-        let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
+        let HistoryEntry { scene, label } = self.past.pop_back()?;
         let after = std::mem::replace(&mut self.now, scene);
-        self.future.push(HistoryEntry::new(after, label.clone()));
+        self.future.push(HistoryEntry { scene: after, label: label.clone() });
         Some(label)
     }
 
     /// Redoes the step undone last and returns its label; `None` if no step can be redone.
     pub fn redo(&mut self) -> Option<String> {
         self.open = false;
-        let HistoryEntry { scene, label, .. } = self.future.pop()?;
+        let HistoryEntry { scene, label } = self.future.pop()?;
         let before = std::mem::replace(&mut self.now, scene);
-        self.past.push_back(HistoryEntry::new(before, label.clone()));
+        self.past.push_back(HistoryEntry { scene: before, label: label.clone() });
         Some(label)
     }
 
@@ -117,23 +109,18 @@ impl History {
 
     /// Drops the oldest steps beyond the limits. The latest step is kept.
     fn forget(&mut self) {
-        let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
+        let mut total: usize = self.past.iter().map(|entry| bytes(&entry.scene)).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {
-            total -= self.past.pop_front().map_or(0, |entry| entry.bytes);
+            total -= self.past.pop_front().map_or(0, |entry| bytes(&entry.scene));
         }
     }
 }
 
-/// Returns the estimated memory of a scene in bytes.
+/// Returns the estimated memory of a scene in bytes. Name, material name and transform of an object
+/// count as 128, other names as 16 or 32.
 fn bytes(scene: &Scene) -> usize {
-    let objects: usize = scene
-        .objects
-        .iter()
-        .map(|o| o.name.len() + o.material.len() + o.transform.len() * size_of::<TransformOp>())
-        .sum();
     size_of::<Scene>()
-        + objects
-        + scene.objects.len() * size_of::<Object>()
+        + scene.objects.len() * (size_of::<Object>() + 128)
         + scene.lights.len() * (size_of::<Light>() + 16)
         + scene.materials.len() * (size_of::<Material>() + 32)
         + scene.cameras.len() * (size_of::<Camera>() + 32)
@@ -219,7 +206,7 @@ mod tests {
             large.trace.max_depth = depth;
             history.record(Arc::new(large.clone()), "deeper", false);
         }
-        let held: usize = history.past.iter().map(|entry| entry.bytes).sum();
+        let held: usize = history.past.iter().map(|entry| bytes(&entry.scene)).sum();
         assert!(held <= MAX_BYTES && history.past.len() > 3, "{held}");
         assert!(history.past.len() < 99);
     }
