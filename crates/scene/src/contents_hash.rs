@@ -10,7 +10,7 @@ impl Scene {
     /// Returns the hash of the contents of the files that the scene names, as they were read;
     /// `None` if none is loaded.
     pub fn contents_hash(&self) -> Option<u64> {
-        // A new field that may name files has to be added here.
+        // If a new field may name files, their contents have to be hashed below.
         let Self {
             film: _,
             trace: _,

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Diagnostic {
     /// Name of the scene file as the user gave it.
     pub file: String,
-    /// Line and column in characters, counted from 1; `None` if it concerns the whole file.
+    /// Line and column in characters, counted from 1; `None` for a diagnostic on the whole file.
     pub line_column: Option<(usize, usize)>,
     /// Table that the diagnostic is about, such as `object "queen"`; empty for the whole scene.
     pub subject: String,

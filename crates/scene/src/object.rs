@@ -53,7 +53,7 @@ impl Object {
         }
     }
 
-    /// Returns the validation errors of the object. It is not checked that its material exists.
+    /// Returns the validation errors of the object, without a check that its material exists.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator();
         let moved =

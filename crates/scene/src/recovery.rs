@@ -119,7 +119,8 @@ impl Recovery {
     }
 
     /// Writes the recovery file: the `text` that saving would write, and `base`, the fingerprint of
-    /// the scene file that saving would replace. If no folder is writable, the previous one stays.
+    /// the scene file that saving would replace. If no folder is writable, the previous recovery
+    /// file stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");

@@ -62,9 +62,8 @@ impl FileContents {
         self.error(FileLocation::Whole, found, expected)
     }
 
-    /// Returns the path of the file `name` to which this file refers, relative to its own folder;
-    /// `None` if `name` is empty or could lead out of the folder. The rule is in
-    /// docs/scene-format.md.
+    /// Returns the path of the file `name`, which this file names relative to its folder; `None` if
+    /// `name` is empty or could lead out of the folder. The rule is in docs/scene-format.md.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)

@@ -100,9 +100,9 @@ const RGBE: &str = "32-bit_rle_rgbe";
 
 /// Lines of a header.
 struct Lines<'a> {
-    /// Bytes of the file after the last line.
+    /// Bytes of the file after the line that was read last.
     rest: &'a [u8],
-    /// Number of the last line, counted from 1.
+    /// Number of the line that was read last, counted from 1.
     number: usize,
 }
 

@@ -120,7 +120,7 @@ impl RadianceMap {
         self.pixels.iter().flatten().copied().fold(0.0, f32::max).into()
     }
 
-    /// Returns the smallest positive value of a channel; `None` if the image is black.
+    /// Returns the smallest positive value among all channels; `None` if the image is black.
     pub fn min(&self) -> Option<f64> {
         let channels = self.pixels.iter().flatten().copied().filter(|x| *x > 0.0);
         channels.reduce(f32::min).map(f64::from)

@@ -125,8 +125,8 @@ impl PerspectiveCamera {
     }
 
     /// Returns the rays through points of a pixel, from the near plane. `base` is the pixel's
-    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from it, to the
-    /// right and downward \[pixels\].
+    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from this corner, to
+    /// the right and downward \[pixels\].
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> Ray<L> {
         let dx_axis = Vec3::of(self.dx_axis.to_array());

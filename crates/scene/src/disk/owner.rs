@@ -6,9 +6,9 @@ use std::fs::{self, Metadata};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// Returns `true` if a file in `folder` with this metadata belongs to the user of this process. It
-/// does so, too, if it has the owner that a new file in `folder` gets: some file systems, such as
-/// network mounts, give all files one owner.
+/// Returns `true` if a file in `folder` with this metadata belongs to the user of this process. A
+/// file also counts as theirs if it has the owner that a new file in `folder` gets: some file
+/// systems, such as network mounts, give all files one owner.
 pub fn is_own(metadata: &Metadata, folder: &Path) -> bool {
     let owner = metadata.uid();
     let owner_of_new_file = || {

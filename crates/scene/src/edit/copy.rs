@@ -114,7 +114,8 @@ fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) ->
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Removes the material `name` from all objects and parts. Returns a note that names them, if any.
+/// Removes the material `name` from all objects and parts. Returns a note that names them; `None`
+/// if there are none.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {

@@ -158,7 +158,7 @@ enum StepRule {
     Units { unit: f64, range: NumberRange },
     /// Step by 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// Step of a component by 0.05 P, where P is the power of ten just below the largest component.
+    /// Step of a component by 0.05 P; P is the largest power of ten up to the largest component.
     Direction,
     /// Geometric step: the magnitude moves along the rungs; the sign stays.
     Factor,
@@ -242,7 +242,7 @@ impl StepRule {
     }
 }
 
-/// Returns `x + steps * unit`, rounded to at most a hundredth of a fine step.
+/// Returns `x + steps * unit`, rounded to a hundredth of a fine step or finer.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
@@ -316,7 +316,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     format!("{next}e{}", e - 3).parse().unwrap_or(x)
 }
 
-/// Returns a colour with its brightness changed; black becomes a dark grey.
+/// Returns a colour with its brightness changed by `count` steps. Upwards, black becomes dark grey.
 fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };

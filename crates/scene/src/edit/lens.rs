@@ -15,8 +15,8 @@ const LAST_RADIUS: f64 = 5e-4;
 /// Smallest and largest f-number to which [`change_aperture`] leads.
 const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
 
-/// Sets the focus of the camera to `point`. A focus that is given as a distance is still given as
-/// one. Fails if `point` is the eye.
+/// Sets the focus of the camera to `point`. A focus that is given as a distance stays a distance.
+/// Fails if `point` is the eye.
 pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     let to = DVec3::from_array(point) - DVec3::from_array(camera.eye);
@@ -32,7 +32,8 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 
 /// Opens the lens by `stops`; negative stops close it. One stop doubles the area of the lens. A
 /// pinhole opens to a radius of a fiftieth of the distance of the plane in focus; a camera without
-/// one gets it. A lens that is given by its radius becomes a pinhole if it is closed far enough.
+/// such a plane gets one. A lens that is given by its radius becomes a pinhole if it is closed far
+/// enough.
 pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     if camera.focus.is_none() && camera.target.is_none() {

@@ -143,8 +143,8 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if the flat object `form` intersects a diagonal of a box (as every plane through
-/// its inside does), which is shrunk slightly.
+/// Returns `true` if the flat object `form` intersects a space diagonal of the slightly shrunk box,
+/// as every plane through its inside does.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);

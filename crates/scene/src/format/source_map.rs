@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Returns the line and the column [characters] of the byte offset `at`, both counted from 1.
+/// Returns the line and the column \[characters\] of the byte offset `at`, both counted from 1.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     LineCounter::new(text).line_column(at)
 }
@@ -58,7 +58,8 @@ fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     value.span()
 }
 
-/// Adds diagnostics for `problems` to `found`. The parts with problems are parsed again.
+/// Adds diagnostics for `problems` to `found`. The parts of the file with problems are parsed again
+/// to locate them.
 pub(crate) fn locate(
     text: &str,
     parts: &[Part],

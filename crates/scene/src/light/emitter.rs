@@ -294,7 +294,7 @@ impl<S: Float> Emitter<S> {
         };
         let PointSample { wi, distance, density, pdf } = point;
         let arrives = pdf.gt(L::zero());
-        // Finite, because an infinite irradiance times a black reflectance would be NaN.
+        // The irradiance is kept finite, because infinity times a black reflectance would be NaN.
         let irradiance = (L::splat(self.radiance) / pdf).min(L::from_f64(L::MAX));
         LightSample { wi, distance, irradiance: Vec3::gray(irradiance.masked(arrives)), density }
     }

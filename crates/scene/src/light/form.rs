@@ -108,7 +108,7 @@ impl EmissiveSurface {
         }
     }
 
-    /// Returns a length in proportion to the surface's details: the radius of a sphere or disk, the
+    /// Returns the size of the surface's smallest details: the radius of a sphere or disk, the
     /// shorter side of a rectangle, or the square root of the total area of triangles.
     pub fn thickness(&self) -> f64 {
         match self {

@@ -96,7 +96,7 @@ pub(super) struct FacesSeen<'a, L: SimdFloat> {
 }
 
 impl<'a, L: SimdFloat> FacesSeen<'a, L> {
-    /// Computes what receivers at `origin` see. `convex`: the triangles enclose a convex solid.
+    /// Computes what receivers at `origin` see. `convex` is `true` for triangles of a convex solid.
     #[inline(always)]
     pub fn new(
         triangles: &'a [Triangle<L::Scalar>],

@@ -91,8 +91,8 @@ impl<L: SimdFloat> Interface<L> {
         s / (L::one() + s) + p / (L::one() + p)
     }
 
-    /// Returns the factors of the radiance. `outer` has the lanes whose rays come from outside of a
-    /// solid, and `thin` the lanes of thin panes, which do not refract.
+    /// Returns the factors of reflected and transmitted radiance. `outer` has the lanes of rays
+    /// from outside of a solid, `thin` the lanes of thin panes, which do not refract.
     ///
     /// Without Fresnel's equations, a solid reflects only on its outer side and in total internal
     /// reflection. This prevents endless reflections between its inner walls.

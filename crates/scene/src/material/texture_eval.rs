@@ -151,7 +151,7 @@ impl BumpMap {
         (slopes.x, slopes.y)
     }
 
-    /// Returns the derivatives of [`BumpMap::gradient`] at one point.
+    /// Returns the derivatives of [`BumpMap::gradient`] at one pair of texture coordinates.
     fn slope_at(&self, u: f64, v: f64) -> [f64; 2] {
         let [width, height] = self.image.size();
         let wrap = self.wrap;

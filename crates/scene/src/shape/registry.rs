@@ -41,7 +41,7 @@ pub trait ShapeDesc: KeyNode {
         0.0
     }
 
-    /// Returns the transform step that makes the kind stand upright; `None` if it does without.
+    /// Returns the step that makes the kind stand upright; `None` if it does so without a step.
     fn upright(&self) -> Option<TransformOp> {
         None
     }

@@ -54,7 +54,7 @@ single_value! {
 }
 
 impl TransformOp {
-    /// One step of every kind, which changes nothing.
+    /// Steps that change nothing: one of every kind.
     pub const IDENTITIES: [Self; Self::FIELDS.len()] = [
         Self::Translate([0.0; 3]),
         Self::RotateX(0.0),

@@ -1,5 +1,5 @@
-//! Macros that declare the tables of scene files: [`description!`] a struct for a table of keys,
-//! [`choices!`] an enum for a key that accepts a set of words.
+//! Macros for the tables of scene files: [`description!`] declares a struct for a table of keys,
+//! [`choices!`] declares an enum for a key that accepts a set of words.
 
 use crate::value::{Color, Field, KeyNode, KeyValue, NumberRange, ValidationError, ValueType};
 

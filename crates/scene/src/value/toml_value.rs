@@ -59,7 +59,8 @@ fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// Converts `node` of the type `takes` to a TOML table, list or value. Absent keys are left out.
+/// Converts `node` of the type `takes` to a TOML table, list or value, without absent optional
+/// keys.
 pub(crate) fn written(takes: ValueType, node: &dyn KeyNode) -> Value {
     let list = |entry: ValueType| {
         let entries = (0..).map_while(|i: usize| node.child(&i.to_string()));
