@@ -69,8 +69,7 @@ impl FileContents {
         let inside = Path::new(&name)
             .components()
             .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        // A colon in the first component indicates a Windows drive such as `C:` or a URL such as
-        // `http:`.
+        // A colon in the first component indicates a Windows drive (`C:`) or a URL (`http:`).
         let drive = name.split('/').next().is_some_and(|first| first.contains(':'));
         let folder = self.path.parent().unwrap_or(Path::new(""));
         (inside && !drive && !name.is_empty()).then(|| folder.join(name))

@@ -165,8 +165,7 @@ impl RadianceMap {
     }
 }
 
-/// Returns the position of a direction in the image, 0 to 1 from left to right and from top to
-/// bottom.
+/// Returns the position of a direction in the image, 0 to 1 from left to right and top to bottom.
 fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
     let turns = (-x).atan2(z) / TAU;
     let column = if turns < 0.0 { turns + 1.0 } else { turns };

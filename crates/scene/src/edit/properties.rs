@@ -167,6 +167,7 @@ impl PropertyWalker<'_> {
         }
     }
 
+    /// Adds a row for the choice of a kind; `given` is the present kind.
     fn kind(&mut self, field: &'static Field, given: Option<&str>, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
         if let ValueType::OneOf(kinds) = field.takes {

@@ -51,6 +51,7 @@ pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     })
 }
 
+/// Moves an object as [`move_by`] describes, by its coordinates or its last transform step.
 pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
     match object.transform.last_mut() {
         None if !object.shape.anchor_points_mut().is_empty() => {
@@ -69,6 +70,7 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
     }
 }
 
+/// Moves a light as [`move_by`] describes.
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
     let handles = light.kind.handles();
     if let Some(position) = handles.position {

@@ -30,6 +30,7 @@ pub(super) struct Cone<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> Cone<L> {
+    /// Creates the cone to a sphere; `to_center` leads from the receiver to its centre.
     #[inline(always)]
     pub fn new(to_center: Vec3<L>, radius: L) -> Self {
         let distance2 = to_center.length_squared();

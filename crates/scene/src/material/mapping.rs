@@ -252,6 +252,7 @@ fn spherical<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
     TexCoord { u, v, grad_u: du, grad_v: Vec3::new(p.x * inward, across * per, p.z * inward) }
 }
 
+/// Returns the cylindrical projection around y, with v from 0 to 1 over `height`.
 fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     let (u, du, _) = around(p);
     let flat = height.le(L::zero());

@@ -68,8 +68,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Checks that the mesh stays within its limits if the given numbers of vertices and triangles
-    /// are added.
+    /// Checks that the mesh stays within its limits with so many more vertices and triangles.
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
@@ -235,8 +234,7 @@ impl<'a> Builder<'a> {
         if is_far { 0.5 * (low + high) } else { DVec3::ZERO }
     }
 
-    /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
-    /// triangles.
+    /// Removes triangles whose area is 0 from the mesh, and adds a note with their number.
     fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
         let before = self.triangles.len();
         let has_area = |t: &[u32; 3]| {

@@ -144,8 +144,7 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
         (None, None) => FileLocation::Whole,
     };
     let message = error.to_string();
-    // The first line of the message states the error. The other lines repeat the input and are
-    // dropped.
+    // The first line of the message states the error; the other lines repeat the input.
     let first = message.lines().next().unwrap_or_default();
     let first =
         first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);
