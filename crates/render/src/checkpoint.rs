@@ -1,5 +1,5 @@
-//! Checkpoints: film files from which a later process continues a render. The result is bit for bit
-//! that of a render without interruption.
+//! Checkpoints: film files from which a later process continues a render. The continued render
+//! gives, bit for bit, the film of a render without interruption.
 //!
 //! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
 //! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
@@ -63,8 +63,8 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if samples with these inputs are valid for `scene`, whose lights may differ
-    /// in colour and intensity if the film stores their light separately.
+    /// Returns `true` if samples with these inputs are valid for `scene`. Sources that have light
+    /// groups of their own may differ in colour, intensity and switch.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {

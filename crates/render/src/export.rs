@@ -104,8 +104,8 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces samples, noise and display transform in the metadata of a film file by those of `report`
-/// and of `header`.
+/// Updates the metadata of `header`: samples and noise from `report`, the display transform from
+/// `header` itself.
 pub fn update_metadata(header: &mut FilmFileHeader, report: &Report) {
     for (key, value) in film_entries(report) {
         header

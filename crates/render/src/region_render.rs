@@ -49,8 +49,8 @@ pub struct RegionRender {
 impl RegionRender {
     /// Compiles `scene`, which must be valid, for regions of `rows` rows, a multiple of
     /// [`TILE`](crate::film::TILE). Each region is rendered until a stop criterion is reached; a
-    /// time limit is divided among them. Fails if a thread cannot be started, or if there is not
-    /// enough memory for a region.
+    /// time limit is divided among the regions. Fails if a thread cannot be started, or if there is
+    /// not enough memory for a region.
     pub fn new(
         scene: &Arc<Scene>,
         options: &Options,

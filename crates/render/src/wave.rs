@@ -25,8 +25,8 @@ pub struct Wave {
 }
 
 impl Wave {
-    /// Shortens each job to at most `longest` samples per pixel, and discards the last jobs. At
-    /// least one job remains, and just enough for `pixel_samples` samples over all pixels.
+    /// Shortens each job to at most `longest` samples per pixel. Keeps only the first jobs: as many
+    /// as `pixel_samples` samples over all pixels need, and at least one.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;

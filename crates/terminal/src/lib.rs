@@ -40,7 +40,7 @@ pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 pub use signals::{HUNG_UP, SignalEvent, SignalQueue, Signals};
 
-/// Event to which terminal input is decoded.
+/// Event that was decoded from terminal input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     Key(Key),

@@ -39,7 +39,7 @@ pub struct Signals {
 
 impl SignalQueue {
     /// Registers handlers of the signals that concern a program in raw mode. Must be called before
-    /// raw mode begins, in which the default handlers would leave the terminal.
+    /// raw mode begins: the default handlers would end the program without leaving raw mode.
     pub fn of_terminal() -> io::Result<Self> {
         let signals = [SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH];
         Ok(Self(iterator::Signals::new(signals)?))

@@ -12,8 +12,8 @@ pub enum Tone {
     #[default]
     Clip,
     /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It subtracts at most
-    /// 0.04 from all channels, then compresses the colours whose largest channel is above 0.76. It
-    /// keeps hues.
+    /// 0.04 from all channels, then compresses the colours whose largest channel is still above
+    /// 0.76. It keeps hues.
     Neutral,
 }
 

@@ -54,7 +54,7 @@ pub struct IncrementalDownsample {
     parts: Vec<TilePart>,
 }
 
-/// Geometry of a downsampling.
+/// Geometry of a downsampling. `size` is the width and height of the film in pixels.
 struct Layout {
     cols: usize,
     rows: usize,
@@ -82,7 +82,7 @@ struct TilePart {
     /// [`IncrementalDownsample::stale`]. `None` if the tile had no samples.
     version: Option<(u64, [u32; 2], usize)>,
     /// Values of each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
-    /// inside the cell, then sums of this area times the pixel's mean. Empty without samples.
+    /// inside the cell, then sums of each pixel's area times its mean. Empty without samples.
     sums: Vec<f64>,
 }
 

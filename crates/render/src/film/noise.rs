@@ -217,7 +217,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Returns this estimate, with the larger value of both estimates as RMSE of the picture.
+    /// Returns this estimate with the larger RMSE of the picture, linear and displayed, of the two.
     pub(crate) fn larger(self, other: Self) -> Self {
         Self {
             rmse_linear: self.rmse_linear.max(other.rmse_linear),

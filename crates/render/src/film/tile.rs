@@ -244,7 +244,7 @@ fn saturated_sum(sum: i64) -> i64 {
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // The step is a power of two: no bit of its multiples below the bit of the step is set.
+    // The step is a power of two: in its multiples, all bits below the bit of the step are 0.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 

@@ -313,7 +313,7 @@ impl FilmFiles {
         Ok(())
     }
 
-    /// Adds the film of file `i` to `film`. Fails if it has other samples than its shards.
+    /// Adds the film of file `i` to `film`. Fails if its number of samples does not fit its shards.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;

@@ -120,7 +120,7 @@ fn block(count: u32) -> u32 {
     }
 }
 
-/// Round in progress.
+/// Allocation of the samples of one round to the tiles.
 pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
     /// Samples per pixel and replicate of each tile, traced or allocated.

@@ -38,7 +38,7 @@ const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of [`Noise::effective_pixels`] below which a noise estimate is unreliable. With k
 /// effective pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Divisor of the number of samples per pixel and replicate, except for smaller counts and after
+/// Divisor of all sample counts per pixel and replicate, except for smaller counts and counts after
 /// the last block of a tile. It is the width of the widest packets, on every processor, because the
 /// samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;

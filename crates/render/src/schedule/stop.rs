@@ -92,10 +92,10 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns the estimate on which the end of the render depends: the latest one. Below
-    /// [`FEW_PIXELS_TO_STOP`] its RMSE is at least that of the estimates before each of the latest
-    /// three doublings, scaled to the present counts. Estimates on both sides of a doubling are
-    /// nearly independent. Returns `None` before the first estimate.
+    /// Returns the latest estimate, on which the end of the render depends. With fewer effective
+    /// pixels than [`FEW_PIXELS_TO_STOP`], its RMSE is raised to the largest RMSE before each of
+    /// the latest three doublings, scaled to the present counts. Estimates on both sides of a
+    /// doubling are nearly independent. Returns `None` before the first estimate.
     pub(super) fn largest_recent_noise(&self) -> Option<Noise> {
         let latest = self.noise?;
         if self.settings.criterion.of(latest.effective_pixels) >= FEW_PIXELS_TO_STOP {

@@ -67,7 +67,7 @@ pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Returns the cell in 16 colours that approximates its halves.
+/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
@@ -85,7 +85,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     CELLS[shade]
 }
 
-/// Returns the cell without colours that approximates the lightness of its halves.
+/// Returns the cell without colours that approximates the lightness of `upper` and `lower`.
 pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
         COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()

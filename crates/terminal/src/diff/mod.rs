@@ -38,7 +38,7 @@ pub struct TargetFrame<'a> {
     pub subject: u64,
     /// Number that increases when the picture may have changed for any reason.
     pub version: u64,
-    /// Samples per pixel.
+    /// Mean number of samples per pixel of the picture.
     pub samples: f64,
     /// `true` if the picture changes rarely or only by user input.
     pub settled: bool,
@@ -73,7 +73,7 @@ pub struct FrameDiff {
     subject: Option<u64>,
     /// `true` until cells of a new picture have been sent, exactly or as a mosaic.
     fresh: bool,
-    /// Samples per pixel at which the next full comparison is due. The comparisons before consider
+    /// Samples per pixel at which the next full comparison is due. Earlier comparisons consider
     /// only cells that still differ visibly.
     next_samples: f64,
     version: u64,

@@ -500,7 +500,7 @@ impl FlowControl {
     }
 
     /// Returns `true` if the next frame should measure the round trip. It should if the rate is
-    /// below `doubtful_rate`, or if the last measurement is old and the user is not active.
+    /// below `doubtful_rate`, or if the last measurement is missing or old and the user inactive.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);

@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-/// Time in which the bytes of a frame may not have reached the queue, because another process, such
-/// as `sshd`, passes them on.
+/// Time after a frame was sent in which its bytes may not have reached the queue, because another
+/// process, such as `sshd`, passes them on.
 const SETTLING: Duration = Duration::from_millis(10);
 /// Time from the start of a busy period in which measurements do not count, if the round trip is
 /// unknown.

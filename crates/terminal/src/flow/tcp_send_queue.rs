@@ -19,7 +19,7 @@ impl TcpSendQueue {
         queue.bytes().is_some().then_some(queue)
     }
 
-    /// Returns the number of bytes in the send queue; `None` if the kernel does not list it.
+    /// Returns the number of bytes in the queue; `None` if the kernel does not list the connection.
     pub fn bytes(&self) -> Option<usize> {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))

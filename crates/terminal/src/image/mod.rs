@@ -102,7 +102,7 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns width and height of a cell in pixels, or in half blocks of [`Protocol::Blocks`].
+    /// Returns width and height of a cell in pixels; with [`Protocol::Blocks`], in half blocks.
     fn cell(&self) -> [usize; 2] {
         match self.protocol {
             Protocol::Blocks => [1, 2],

@@ -109,7 +109,7 @@ fn text(text: &str, out: &mut Vec<u8>) {
     out.extend(text.as_bytes());
 }
 
-/// Encodes a chunk, to which `contents` appends its contents.
+/// Encodes a chunk, whose contents `contents` appends to a buffer.
 fn chunk(tag: Tag, contents: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut out = [&tag[..], &[0; 8]].concat();
     contents(&mut out);
