@@ -3,7 +3,7 @@
 use crate::cells::Colors;
 use std::time::Duration;
 
-/// Terminal multiplexer: a program between zerkalo and the terminal.
+/// Terminal multiplexer: a program between the application and the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplexer {
     Tmux,
