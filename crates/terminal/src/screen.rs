@@ -2,11 +2,8 @@
 
 use crate::restorer::Restorer;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use rustix::io::retry_on_intr;
-use rustix::termios::{
-    OptionalActions, QueueSelector, Termios, Winsize, tcflush, tcgetattr, tcgetwinsize, tcsetattr,
-};
-use std::fs::File;
+use crossterm::terminal;
+use rustix::termios::{OptionalActions, QueueSelector, Termios, tcflush, tcgetattr, tcsetattr};
 use std::io::{self, Write};
 use std::panic;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,31 +47,34 @@ pub struct Tty {
 /// # Errors
 /// Fails if there is no terminal.
 pub fn size() -> io::Result<[u16; 2]> {
-    let Winsize { ws_col, ws_row, .. } = window_size()?;
-    Ok(if ws_col > 0 && ws_row > 0 { [ws_col, ws_row] } else { [80, 24] })
+    let size = terminal::window_size()?;
+    let is_known = size.columns > 0 && size.rows > 0;
+    Ok(if is_known { [size.columns, size.rows] } else { [80, 24] })
 }
 
 /// Returns the width and height of a cell in pixels, if the terminal reports them.
 pub fn cell_px() -> Option<[u16; 2]> {
-    let size = window_size().ok()?;
+    let size = terminal::window_size().ok()?;
     let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
-    Some([cell(size.ws_xpixel, size.ws_col)?, cell(size.ws_ypixel, size.ws_row)?])
+    Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-fn window_size() -> io::Result<Winsize> {
-    Ok(tcgetwinsize(File::open("/dev/tty")?)?)
+/// Repeats a change of modes that a signal interrupts.
+fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
+    loop {
+        match change() {
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            done => return done,
+        }
+    }
 }
 
-fn set_modes(modes: &Termios) -> io::Result<()> {
-    Ok(retry_on_intr(|| tcsetattr(io::stdin(), OptionalActions::Now, modes))?)
-}
-
-/// Sets raw mode. `modes_before` are those of the user's shell: programs may have changed the modes
-/// while this one was suspended.
+/// Sets raw mode. `modes_before`, which crossterm stores and later restores, are set first, because
+/// a shell may have changed the modes while the program was suspended.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
-    let mut raw = modes_before.clone();
-    raw.make_raw();
-    set_modes(&raw)
+    uninterrupted(terminal::disable_raw_mode)?;
+    uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
+    uninterrupted(terminal::enable_raw_mode)
 }
 
 impl Screen {
@@ -165,8 +165,8 @@ impl Tty {
             // A terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
-        if let Some(modes_before) = &self.modes_before {
-            let _ = set_modes(modes_before);
+        if self.modes_before.is_some() {
+            let _ = uninterrupted(terminal::disable_raw_mode);
             // The shell would read late replies.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
         }

@@ -3,6 +3,7 @@
 use crate::image::transfer::Transfer;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use crossterm::cursor::MoveTo;
 use ratatui::layout::Rect;
 
 /// Base64 characters in a chunk, a multiple of 4, at most 4096. A chunk of 1024 fits into the
@@ -50,7 +51,7 @@ pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) ->
     // The image appears at the cursor when the last chunk arrives.
     let cursor = match through_tmux {
         true => String::new(),
-        false => format!("\x1b[{};{}H", y + 1, x + 1),
+        false => MoveTo(x, y).to_string(),
     };
     let mut placement = if through_tmux { "U=1" } else { "C=1" }.to_string();
     if stretched || through_tmux {

@@ -2,6 +2,7 @@
 
 use crate::cells::Raster;
 use crate::image::transfer::Transfer;
+use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
 use ratatui::layout::Rect;
 
@@ -24,11 +25,11 @@ pub fn transfer(
     let options = EncodeOptions { max_colors: colors.clamp(2, 256), ..EncodeOptions::default() };
     let width = image.width;
     let strips = image.pixels.chunks(width.max(1) * cell_height * usize::from(rows));
-    for (strip, row) in strips.zip((place.y + 1..).step_by(usize::from(rows))) {
+    for (strip, row) in strips.zip((place.y..).step_by(usize::from(rows))) {
         let rgba: Vec<u8> = strip.iter().flat_map(|[r, g, b]| [*r, *g, *b, 255]).collect();
         let strip = sixel_encode(&rgba, width, strip.len() / width, &options)
             .map_err(|error| error.to_string())?;
-        transfer.add(format!("\x1b[{row};{}H{strip}", place.x + 1).as_bytes());
+        transfer.add(format!("{}{strip}", MoveTo(place.x, row)).as_bytes());
     }
     Ok(transfer)
 }
