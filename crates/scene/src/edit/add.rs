@@ -166,13 +166,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
     };
     let mut light = Light::new(placed);
-    let name = match kind {
-        "directional" => "sun",
-        "spot" => "spot",
-        "environment" => "sky",
-        _ => "lamp",
-    };
-    light.name = free_light(scene, name);
+    light.name = free_light(scene, light.kind.usual_name());
     // If a light is on already, the new light adds to it, and therefore gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);

@@ -53,6 +53,10 @@ impl LightDesc for Directional {
         self.validator().and(fault).errors()
     }
 
+    fn usual_name(&self) -> &'static str {
+        "sun"
+    }
+
     fn handles(&mut self) -> Handles<'_> {
         Handles { direction: Some(&mut self.direction), ..Handles::default() }
     }

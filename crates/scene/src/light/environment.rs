@@ -69,6 +69,10 @@ impl LightDesc for Environment {
         LightForm::Environment(self)
     }
 
+    fn usual_name(&self) -> &'static str {
+        "sky"
+    }
+
     fn handles(&mut self) -> Handles<'_> {
         Handles::default()
     }

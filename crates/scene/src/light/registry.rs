@@ -19,6 +19,11 @@ pub trait LightDesc: KeyNode {
     /// Returns the values that edits of position and direction change.
     fn handles(&mut self) -> Handles<'_>;
 
+    /// Returns the name of the first new light of this kind.
+    fn usual_name(&self) -> &'static str {
+        "lamp"
+    }
+
     /// Sets position, direction and size of the light by `placement`, as far as it has such keys.
     fn place(&mut self, _: &Placement) {}
 }

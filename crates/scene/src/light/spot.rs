@@ -42,6 +42,10 @@ impl LightDesc for Spot {
         self.validator().and(fault).errors()
     }
 
+    fn usual_name(&self) -> &'static str {
+        "spot"
+    }
+
     fn handles(&mut self) -> Handles<'_> {
         Handles {
             position: Some(&mut self.position),

@@ -5,6 +5,7 @@ use crate::lights::emissive_forms::is_sampled;
 use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 use zerkalo_scene::material::{Fresnel, Material, Texture};
+use zerkalo_scene::shape::Shape;
 use zerkalo_scene::{Object, RayTypes, Scene};
 
 /// Returns the largest fraction of light that a material reflects and transmits together.
@@ -30,13 +31,12 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
 /// Returns the largest diffuse albedo of `material` on `object`. It is infinite for meshes, because
 /// vertex colours have no bound.
 fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
-    let mut factor = 1.0f64;
-    if let Some(Texture::Checker(checker)) = &material.texture {
-        factor = factor.max(checker.even.largest()).max(checker.odd.largest());
-    }
-    if object.shape.key() == "mesh" {
-        factor = f64::INFINITY;
-    }
+    let factor = match &material.texture {
+        _ if matches!(object.shape, Shape::MeshDesc(_)) => f64::INFINITY,
+        Some(Texture::Checker(checker)) => checker.even.largest().max(checker.odd.largest()),
+        // Pixels of images are at most 1.
+        Some(Texture::Image(_)) | None => 1.0,
+    };
     let albedo = material.diffuse * material.color.largest();
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
