@@ -41,7 +41,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     // A continued render keeps its seed, sampler and precision.
     let (sampling, precision) = match &checkpoint {
         Some(checkpoint) => {
-            (checkpoint.sampling(), Precision::of_name(&checkpoint.header.film.precision))
+            let precision = Precision::from_name(&checkpoint.header.film.precision);
+            (checkpoint.sampling(), precision.unwrap_or_default())
         }
         None => {
             let sampling = SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol };

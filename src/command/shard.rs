@@ -153,7 +153,7 @@ fn start(
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
     }
-    let precision = Precision::of_name(&settings.precision);
+    let precision = Precision::from_name(&settings.precision).unwrap_or_default();
     let sampling = SampleSettings { seed: settings.seed, kind: settings.sampler };
     let options = Options::new(precision, sampling, settings.display);
     let mut state = RenderState::new(&Arc::new(scene), &options, None)

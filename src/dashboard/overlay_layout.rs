@@ -15,7 +15,7 @@ pub struct OverlayLayout {
     pub input: Rect,
     /// Area of a list, a form's fields or a text.
     pub list: Rect,
-    /// Area of help, of the reason why an input was refused, or of a question.
+    /// Area of text below the list: help, a question, or the reason why an input was refused.
     pub help: Rect,
 }
 

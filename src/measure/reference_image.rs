@@ -36,8 +36,8 @@ pub struct Errors {
     pub rmse_linear: f64,
     /// RMSE of the displayed picture, in unrounded 8-bit levels.
     pub rmse_levels: f64,
-    /// Relative uncertainty of `rmse_levels`, 0..=1: its relative standard deviation over other
-    /// references with equal noise.
+    /// Relative standard deviation of `rmse_levels`, 0..=1, if the reference were rendered again
+    /// with other seeds.
     pub spread: f64,
 }
 

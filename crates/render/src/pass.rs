@@ -94,8 +94,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     }
 
     /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. A
-    /// packet holds `WIDTH` samples of one pixel if its first index is a multiple of `WIDTH` and so
-    /// many samples remain; otherwise it holds samples of several pixels.
+    /// packet holds `WIDTH` samples of one pixel if its first index is a multiple of `WIDTH` and at
+    /// least `WIDTH` samples remain; otherwise it holds fewer samples of each of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent == [TILE; 2] {

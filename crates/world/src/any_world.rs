@@ -20,9 +20,13 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Returns the precision that [`AnyWorld::precision`] calls `name`.
-    pub fn of_name(name: &str) -> Self {
-        if name == "double" { Self::Double } else { Self::Single }
+    /// Returns the precision that film and plan files call `name`.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "single" => Some(Self::Single),
+            "double" => Some(Self::Double),
+            _ => None,
+        }
     }
 }
 

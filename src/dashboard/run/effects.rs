@@ -60,7 +60,8 @@ impl EffectRunner {
         Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
 
-    /// Starts the thread that reads `films`, which other processes write.
+    /// Creates the runner of `zerkalo watch`. Its session reads `films`, which other processes
+    /// write, in a thread of its own.
     pub fn watching(
         films: FilmFiles,
         threads: usize,

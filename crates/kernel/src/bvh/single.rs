@@ -89,7 +89,7 @@ pub fn traverse_rays<L: SimdFloat>(
     }
 }
 
-/// Prefetches the cache lines of a BVH node.
+/// Prefetches the bounds of a BVH node, one address for every 64 bytes.
 #[inline(always)]
 fn prefetch_node(node: &Bvh8Node) {
     let [a, _, b, _, c, _] = &node.bounds;

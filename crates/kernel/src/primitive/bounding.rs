@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 /// coordinate. The true displacement is a few times 2^-24.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
-/// Bounding sphere of geometry that rays may hit.
+/// Sphere that contains a form, a light, or the start points of camera rays.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingSphere {
     /// Centre.

@@ -1,5 +1,6 @@
 //! Trait of all canonical forms, the stage between the description in the scene file and the
-//! compiled primitive. A method has a default implementation only if that is right for most kinds.
+//! compiled primitive. Each default is valid for every form; a form overrides it where it can give
+//! a closer result.
 
 use crate::primitive::bounding::BoundingSphere;
 use glam::{DAffine3, DMat3, DVec3};

@@ -325,8 +325,8 @@ impl<L: SimdFloat> AnalyticPrimitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Projects onto the face above which `point` has the largest height: the lateral surface, the
-    /// base or the cap.
+    /// Projects `point` onto the face with the largest signed distance to it, positive outside. The
+    /// faces are the lateral surface, the base and the cap.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

@@ -78,8 +78,8 @@ struct Span {
 /// Contribution of a film tile to the cells that it overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// Film's epoch, [`Tile::counts`] and [`Tile::lattice_px`] at the latest call of
-    /// [`IncrementalDownsample::stale`]. `None` if the tile had no samples.
+    /// Film's epoch, sample counts and lattice of the tile at the latest refresh. `None` if the
+    /// tile had no samples.
     version: Option<(u64, [u32; 2], usize)>,
     /// Values of each cell, `[row][column][area, group 0 red, ...]`: the area of the sampled pixels
     /// inside the cell, then sums of each pixel's area times its mean. Empty without samples.
@@ -208,7 +208,8 @@ impl TilePart {
 }
 
 /// Adds every `step`-th pixel in row `y` of a tile to `line`, the values of one row of cells, laid
-/// out as in [`TilePart::sums`]. Pixels count with their full height.
+/// out as in [`TilePart::sums`]. The caller multiplies `line` by the
+/// covered height.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {

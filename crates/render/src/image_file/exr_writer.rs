@@ -48,7 +48,7 @@ pub(super) fn encode(
 enum Source {
     /// Radiance of all light groups, averaged over replicates.
     Mixed(Replicates, usize),
-    /// Radiance of the light group with this number.
+    /// Radiance of one light group: its number, then the colour.
     Group(usize, usize),
     /// Number of samples in both replicates.
     Count,

@@ -14,6 +14,7 @@ use std::path::Path;
 use std::str::FromStr;
 use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_scene::value::{fnv1a64, sanitized, truncated};
+use zerkalo_world::Precision;
 
 /// First line of a plan file.
 const TITLE: &str = "zerkalo plan 1";
@@ -132,7 +133,7 @@ impl Plan {
             seed: lines.setting("seed", "an integer from 0", number)?,
             sampler: lines.setting("sampler", "sobol or random", SamplerKind::from_name)?,
             precision: lines.setting("precision", "single or double", |text| {
-                ["single", "double"].contains(&text).then(|| text.to_string())
+                Precision::from_name(text).map(|_| text.to_string())
             })?,
             display: Display {
                 exposure_ev: lines.setting("exposure", "a number from -64 to 64", |text| {

@@ -83,8 +83,8 @@ pub struct Session {
     /// Channel of the latest snapshot that has not been taken yet.
     pub snapshots: Receiver<Snapshot>,
     generations: u64,
-    /// Rendering thread, whose end the handle awaits. `None` for a thread that watches: it may be
-    /// reading from a slow disk.
+    /// Rendering thread, which is joined when the handle is dropped. `None` for a thread that
+    /// watches: it is not joined, because it may be reading from a slow disk.
     thread: Option<JoinHandle<()>>,
 }
 
@@ -159,7 +159,7 @@ impl Session {
         self.send(Command::Stop(stop));
     }
 
-    /// Sets the display transform of the picture whose noise is estimated.
+    /// Sets the display transform in which the noise of the picture is estimated.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }

@@ -185,7 +185,8 @@ impl Camera {
         next
     }
 
-    /// Returns the camera with eye and target moved by `translation`.
+    /// Returns the camera with eye and target moved by `translation`. Changed coordinates are
+    /// rounded to a fine fraction of `distance`. An invalid result is discarded.
     fn shifted(&self, translation: DVec3, distance: f64) -> Self {
         let moved = |point: [f64; 3]| {
             std::array::from_fn(|i| match translation[i] {

@@ -28,7 +28,7 @@ pub enum Widget {
     Choice,
     /// Kind of a shape or a light, which determines the other properties.
     Kind,
-    /// List of transform steps, to which a word appends a step.
+    /// List of transform steps. A word that is chosen appends a step.
     List,
     #[default]
     Numbers,

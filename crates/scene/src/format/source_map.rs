@@ -25,7 +25,8 @@ impl<'a> LineCounter<'a> {
         Self { text, counted: 0, lines: 0 }
     }
 
-    /// Returns line and column of `at`, which must not be less than in the previous call.
+    /// Returns line and column, in characters, of the byte offset `at`, both counted from 1. Offsets
+    /// must not decrease from call to call.
     pub fn line_column(&mut self, at: usize) -> (usize, usize) {
         let mut at = at.min(self.text.len());
         while !self.text.is_char_boundary(at) {

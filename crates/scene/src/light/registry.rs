@@ -1,4 +1,4 @@
-//! Table of light kinds. A new kind needs a file of its own, its `mod` and one line in this table.
+//! Table of light kinds. CONTRIBUTING.md lists what a new kind needs.
 
 use crate::light::{
     Directional, DiskLight, Environment, LightForm, Point, RectangleLight, SphereLight, Spot,

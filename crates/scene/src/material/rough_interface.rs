@@ -237,7 +237,8 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the value and the density of [`Bsdf::eval_interface`] for the other lobes.
+    /// Returns the value and the density of [`Bsdf::eval_interface`] for lobes without microfacets:
+    /// mirror, cone and square.
     #[inline(always)]
     fn eval_spread_interface<L: SimdFloat<Scalar = S>>(
         &self,

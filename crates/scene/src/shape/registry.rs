@@ -1,4 +1,4 @@
-//! Table of shape kinds. A new kind needs a file of its own and one line in this table.
+//! Table of shape kinds. CONTRIBUTING.md lists what a new kind needs.
 
 use crate::shape::{
     Cone, CsgOperand, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection,

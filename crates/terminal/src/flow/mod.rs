@@ -388,9 +388,15 @@ impl FlowControl {
         if sample.bytes >= SMALL || rate > self.rate {
             let is_full = 2 * sample.bytes >= self.budget() || shortest > 2 * FRAME_SPAN;
             if is_full || rate > self.rate {
-                self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
+                self.average_rate(rate);
             }
         }
+    }
+
+    /// Includes `rate`, just measured, in the average.
+    fn average_rate(&mut self, rate: f64) {
+        let average = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
+        self.rate = average.max(MIN_RATE);
     }
 
     /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.
@@ -412,8 +418,7 @@ impl FlowControl {
         if let Some(rate) = sample.rate
             && (sample.is_full || rate > self.rate)
         {
-            let rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
-            self.rate = rate.max(MIN_RATE);
+            self.average_rate(rate);
         }
     }
 

@@ -41,8 +41,8 @@ struct Busy {
     alone: Option<usize>,
     /// Beginning of the current measurement.
     sample: Option<(Duration, f64)>,
-    /// `true` if the queue held as many bytes as flow control permits during the current
-    /// measurement. Bytes then leave the queue at the rate of the connection.
+    /// `true` if the queue has held as many bytes as flow control permits since the current
+    /// measurement began. Bytes then left the queue at the rate of the connection.
     is_full: bool,
     /// Time at which bytes last left the queue.
     progress: Duration,

@@ -16,8 +16,8 @@ pub(crate) struct ScreenBounds {
 /// precision.
 const MARGIN_PX: f64 = 0.25;
 
-/// Largest error of the point at which a ray crosses the plane at unit distance from the eye,
-/// divided by the distance of this point from the eye. The value is eight rounding errors in single
+/// Largest relative error of the point at which a ray crosses the plane at unit distance from the
+/// eye: its displacement, divided by its distance from the eye. Eight rounding errors in single
 /// precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 

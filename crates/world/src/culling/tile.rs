@@ -22,7 +22,7 @@ pub struct TileCandidates {
 pub(crate) struct Occluders {
     pub delta_lights: Vec<PrimitiveSet>,
     pub emitters: Vec<PrimitiveSet>,
-    /// Possible occluders of each stratum of the lights among which paths choose.
+    /// For each stratum of the world's light choice, the primitives that may occlude its lights.
     pub strata: Vec<PrimitiveSet>,
 }
 

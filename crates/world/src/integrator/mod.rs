@@ -29,8 +29,8 @@ use zerkalo_kernel::sampling::PacketSampler;
 pub(crate) struct Integrator<'a, L: SimdFloat> {
     pub world: &'a World<L>,
     pub sampler: &'a PacketSampler<'a, L>,
-    /// Primitives that the first rays, and the shadow rays from their hit points, are tested
-    /// against.
+    /// Candidates of camera rays, and of the shadow rays from their hit points. All later rays are
+    /// tested against all primitives.
     pub candidates: &'a TileCandidates,
     /// Largest number of surfaces on a path after the first.
     pub depth: u32,

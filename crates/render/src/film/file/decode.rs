@@ -17,6 +17,7 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use zerkalo_scene::value::truncated;
+use zerkalo_world::Precision;
 
 /// Number of bytes of the shortest tile record, which is the record of a tile without samples.
 const RECORD_BYTES: u64 = 8;
@@ -207,7 +208,7 @@ fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let (seed, precision) = (fields.u64()?, fields.text()?);
     let exposure_ev = fields.f64()?;
     let tone = fields.text()?.parse().ok()?;
-    let plain = ["single", "double"].contains(&precision.as_str()) && exposure_ev.is_finite();
+    let plain = Precision::from_name(&precision).is_some() && exposure_ev.is_finite();
     (plain && fields.is_empty()).then(|| FilmFileHeader {
         film: Header { width, height, scales, seed, precision },
         weights: LightWeights { weights },

@@ -329,7 +329,8 @@ impl Slice<'_> {
         })
     }
 
-    /// Returns the number that stands for 1 in texture coordinates.
+    /// Returns the stored number that means the texture coordinate 1: 255 or 65535 for integers, 1
+    /// for floats.
     fn largest(&self) -> f64 {
         match self.kind {
             DataType::U8 => 255.0,
