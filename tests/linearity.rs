@@ -78,7 +78,7 @@ fn many_lights() -> Scene {
     let mut scene = lit();
     let light = scene.lights[0].clone();
     for i in 0..12 {
-        let mut light = light.clone();
+        let mut light = Light { name: format!("lamp {i}"), ..light.clone() };
         let angle = f64::from(i);
         *light.position_mut().unwrap() = [3.0 * angle.sin(), 3.0, 3.0 * angle.cos()];
         light.color = Color([1.0, 0.1 * f64::from(i % 7), 0.5]);
