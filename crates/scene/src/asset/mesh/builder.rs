@@ -68,7 +68,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Checks that the mesh stays within its limits with so many more vertices and triangles.
+    /// Fails if the mesh, with `vertices` and `triangles` added to those it has, exceeds its limits.
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
