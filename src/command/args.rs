@@ -1,7 +1,7 @@
 //! Command-line arguments, parsed by clap. Doc comments of arguments are their help texts.
 
 use crate::dashboard::run::{Colors, TerminalSetup};
-use crate::measure::Experiment;
+use crate::measure::{EXPERIMENTS, Experiment};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -170,7 +170,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with = "plan", allow_negative_numbers = true)]
     pub memory: Option<u64>,
     /// Bits per channel of a PNG
-    #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
+    #[arg(long, default_value = "8", value_parser = choice(DEPTHS))]
     pub bits: Depth,
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
@@ -241,7 +241,7 @@ pub struct MergeArgs {
     #[arg(long)]
     pub partial: bool,
     /// Bits per channel of a PNG
-    #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
+    #[arg(long, default_value = "8", value_parser = choice(DEPTHS))]
     pub bits: Depth,
 }
 
@@ -253,9 +253,8 @@ pub struct MeasureArgs {
     /// Noise targets, in 8-bit levels
     #[arg(long, value_name = "LEVELS,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
     pub noise: Vec<f64>,
-    /// Compare only these settings, such as:
-    /// adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
-    #[arg(long, value_name = "SETTING,..", value_parser = Experiment::named, value_delimiter = ',', conflicts_with = "full")]
+    /// Compare only these settings
+    #[arg(long, value_name = "SETTING,..", value_parser = choice(EXPERIMENTS.each_ref().map(|e| (e.name, Some(e.title), e))), value_delimiter = ',', conflicts_with = "full")]
     pub only: Vec<&'static Experiment>,
     /// Compare all settings, which takes about five minutes
     #[arg(long)]
@@ -327,6 +326,8 @@ const COLORS: [Choice<ColorChoice>; 5] = [
     ("16", Some("The 16 colours of every terminal"), Some(Colors::Sixteen)),
     ("none", Some("No colours"), Some(Colors::Mono)),
 ];
+
+const DEPTHS: [Choice<Depth>; 2] = [("8", None, Depth::Eight), ("16", None, Depth::Sixteen)];
 
 const SAMPLERS: [Choice<SamplerKind>; 2] = [
     ("sobol", Some("Owen-scrambled Sobol points"), SamplerKind::Sobol),
@@ -440,14 +441,6 @@ fn svg_file(name: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
     let is_svg = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
     if is_svg { Ok(path) } else { Err("expected a name that ends in .svg".to_string()) }
-}
-
-fn bits(text: &str) -> Result<Depth, String> {
-    match text {
-        "8" => Ok(Depth::Eight),
-        "16" => Ok(Depth::Sixteen),
-        _ => Err("expected 8 or 16".to_string()),
-    }
 }
 
 #[cfg(test)]

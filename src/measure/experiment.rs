@@ -59,16 +59,6 @@ impl PartialEq for Experiment {
     }
 }
 
-impl Experiment {
-    /// Returns the experiment with the name `name`, or a message with all names.
-    pub fn named(name: &str) -> Result<&'static Self, String> {
-        EXPERIMENTS.iter().find(|experiment| experiment.name == name).ok_or_else(|| {
-            let names: Vec<_> = EXPERIMENTS.iter().map(|experiment| experiment.name).collect();
-            format!("setting `{name}` is not known; known: {}", names.join(", "))
-        })
-    }
-}
-
 /// Returns the variant with the precision that `auto` does not choose for the scene.
 fn other_precision(base: &Variant) -> Vec<Variant> {
     let (name, precision) = match AnyWorld::compile(&base.scene, &base.options.world) {
@@ -150,7 +140,7 @@ fn if_reflecting(base: &Variant, variants: impl Iterator<Item = Variant>) -> Vec
 }
 
 /// Settings of one render of an experiment.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Variant {
     pub experiment: &'static Experiment,
     /// Value of the varied setting, such as `uniform` or `depth 4`.
@@ -183,11 +173,11 @@ impl Variant {
 }
 
 /// Plan of a measurement.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Plan {
     pub targets: Vec<f64>,
     pub experiments: Vec<&'static Experiment>,
-    /// Smallest number of timed renders of each variant.
+    /// Smallest number of timed renders of each variant, at least 1.
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
@@ -224,15 +214,8 @@ mod tests {
     use zerkalo_scene::Scene;
 
     fn names(experiment: &str, threads: usize) -> Vec<String> {
-        let plan = Plan {
-            targets: vec![0.5],
-            experiments: vec![Experiment::named(experiment).unwrap()],
-            repetitions: 3,
-            seconds: 1.0,
-            threads,
-            seed: 0,
-            display: Display::default(),
-        };
+        let experiments = EXPERIMENTS.iter().filter(|e| e.name == experiment).collect();
+        let plan = Plan { experiments, threads, ..Plan::default() };
         let text = include_str!("../../scenes/mirror-room.toml");
         let all = plan.variants(&Arc::new(Scene::parse(text, "mirror-room.toml").unwrap()));
         assert_eq!((all[0].experiment, all[0].threads), (&DEFAULT, threads));

@@ -50,11 +50,11 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
 /// Returns the experiments with their variants, each of which has a panel that also shows the
 /// default settings. They have a panel of their own only if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(&'static Experiment, &[Measured])> {
-    let changed = measurement.measured.get(1..).unwrap_or_default();
-    let panels = changed.chunk_by(|a, b| a.experiment == b.experiment);
+    let changed = &measurement.measured[1..];
+    let panels = changed.chunk_by(|a, b| a.variant.experiment == b.variant.experiment);
     match changed {
         [] => vec![(&experiment::DEFAULT, changed)],
-        _ => panels.map(|variants| (variants[0].experiment, variants)).collect(),
+        _ => panels.map(|variants| (variants[0].variant.experiment, variants)).collect(),
     }
 }
 
@@ -128,9 +128,9 @@ fn panel(
     experiment: &Experiment,
     variants: &[Measured],
 ) -> Drawn {
-    let all = measurement.measured.first().into_iter().chain(variants);
+    let all = std::iter::once(measurement.default()).chain(variants);
     let curves: Vec<(&str, Vec<(f64, f64)>)> =
-        all.map(|measured| (measured.name.as_str(), points(measured))).collect();
+        all.map(|measured| (measured.variant.name.as_str(), points(measured))).collect();
     let numbers = || curves.iter().flat_map(|(_, points)| points);
     let (seconds, levels) = (range(numbers().map(|p| p.0)), range(numbers().map(|p| p.1)));
     let mut chart = ChartBuilder::on(area)

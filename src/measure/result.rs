@@ -2,7 +2,7 @@
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
-use crate::measure::experiment::Experiment;
+use crate::measure::experiment::{Experiment, Variant};
 use crate::measure::reference_image::Bias;
 use serde::Serialize;
 
@@ -17,8 +17,6 @@ pub struct TimeToTarget {
     pub spread: f64,
     /// Mean number of samples per pixel.
     pub spp: f64,
-    /// `true` if the first point of the curve had reached the target: `seconds` is an upper bound.
-    pub at_most: bool,
 }
 
 /// Extrapolated time to a noise target that the default settings did not reach. The fields are keys
@@ -42,10 +40,7 @@ pub struct Median {
 /// Results of one variant of the settings.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    pub experiment: &'static Experiment,
-    /// Value of the varied setting, such as `uniform` or `depth 4`.
-    pub name: String,
-    pub threads: usize,
+    pub variant: Variant,
     /// Error curve, in ascending order of sample count.
     pub points: Vec<Point>,
     /// Bias at the end of the error curve. `None` for experiments that are unbiased.
@@ -55,6 +50,8 @@ pub struct Measured {
 /// Results of all variants of the settings on one scene.
 pub struct Measurement {
     pub size: [u32; 2],
+    /// Name of the SIMD type, such as `f32x8`.
+    pub lanes: &'static str,
     /// Samples per pixel of the reference; 0 if it was read from a file.
     pub reference_spp: f64,
     /// Error of the reference itself, in 8-bit levels.
@@ -72,15 +69,6 @@ pub struct Measurement {
     pub idle: Vec<&'static Experiment>,
     /// Results of the variants, the default first.
     pub measured: Vec<Measured>,
-}
-
-/// Reliability of the reported times.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Steadiness {
-    /// Smallest number of repetitions behind a reported time.
-    pub repetitions: usize,
-    /// Largest relative spread of a reported time.
-    pub spread: f64,
 }
 
 /// Largest relative uncertainty that the error of the reference may cause in a measured error.
@@ -144,7 +132,8 @@ impl Measured {
         }
     }
 
-    /// Returns the time at which `error` fell to `levels`, interpolated in log-log coordinates.
+    /// Returns the time at which `error` fell to `levels`, interpolated in log-log coordinates. It is
+    /// that of the first point if its error is smaller already: there is no earlier picture.
     fn interpolated_time(
         &self,
         levels: f64,
@@ -168,7 +157,6 @@ impl Measured {
             seconds: median(&seconds),
             spread: spread(&seconds),
             spp: between(from.spp, to.spp),
-            at_most: after == 0,
         })
     }
 
@@ -191,23 +179,15 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Returns how steady the measured times are: those of the default settings to each target, and
-    /// those of all variants to the noise at which they are compared.
-    pub fn steadiness(&self) -> Steadiness {
-        let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0 };
-        for (i, measured) in self.measured.iter().enumerate() {
-            let targets = self.targets.iter().filter(|_| i == 0).copied();
-            for levels in targets.chain([self.compared_at]) {
-                let Some(time_to) = measured.true_time_to(levels) else { continue };
-                all.spread = all.spread.max(time_to.spread);
-                let repetitions = measured.points.first().map_or(0, |p| p.seconds.len());
-                all.repetitions = all.repetitions.min(repetitions);
-            }
-        }
-        if all.repetitions == usize::MAX {
-            all.repetitions = 0;
-        }
-        all
+    /// Returns the results of the default settings, which are always measured.
+    pub fn default(&self) -> &Measured {
+        &self.measured[0]
+    }
+
+    /// Returns the smallest number of renders of which a reported time is the median.
+    pub fn repetitions(&self) -> usize {
+        let points = self.measured.iter().filter_map(|measured| measured.points.first());
+        points.map(|point| point.seconds.len()).min().unwrap_or(0)
     }
 
     /// Returns the largest relative uncertainty that the error of the reference causes in the
@@ -222,8 +202,9 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::experiment::DEFAULT;
+    use crate::measure::Plan;
     use crate::measure::reference_image::Errors;
+    use std::sync::Arc;
     use zerkalo_render::film::testing::Rng;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
@@ -235,11 +216,10 @@ mod tests {
             estimated_levels: Some(2.0 * levels),
             errors: Errors { rmse_linear: levels / 255.0, rmse_levels: *levels, spread: 0.0 },
         };
+        let points = points.iter().enumerate().map(point).collect();
         Measured {
-            experiment: &DEFAULT,
-            name: String::new(),
-            threads: 1,
-            points: points.iter().enumerate().map(point).collect(),
+            variant: Plan::default().variants(&Arc::default()).remove(0),
+            points,
             bias: None,
         }
     }
@@ -253,8 +233,8 @@ mod tests {
             (target.spp - 32.0).abs() < 1e-9 && (target.seconds - 0.064).abs() < 1e-12,
             "{target:?}"
         );
-        assert!(!target.at_most && (target.spread - 1.0).abs() < 1e-12);
-        assert!(curve.time_to(3.0).unwrap().at_most);
+        assert!((target.spread - 1.0).abs() < 1e-12);
+        assert_eq!(curve.time_to(3.0).unwrap().spp, 16.0, "no earlier picture");
         assert_eq!(curve.time_to(0.4), None);
         let bias = Some(Bias { z: 0.0, levels: 0.0, least_levels: 0.0 });
         let biased = Measured { bias, ..curve.clone() };
@@ -289,30 +269,6 @@ mod tests {
             let near = (0..2000).map(|_| (times(), times())).filter(near).count();
             assert!(near > 1560, "{n} repetitions: {near} of 2000");
         }
-    }
-
-    #[test]
-    fn steadiness_is_that_of_the_reported_times() {
-        let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        for point in &mut curve.points {
-            let first = point.spp * 1e-3;
-            point.seconds = (0..9).map(|i| first * [1.0, 1.0, 1.0, 1.1][i % 4]).collect();
-        }
-        let measurement = Measurement {
-            size: [1, 1],
-            reference_spp: 0.0,
-            reference_levels: 0.0,
-            reference_linear: 0.0,
-            reference_seconds: 0.0,
-            compared_at: 0.5,
-            targets: vec![1.0, 0.25],
-            expected: Vec::new(),
-            idle: Vec::new(),
-            measured: vec![curve],
-        };
-        let steady = measurement.steadiness();
-        assert_eq!(steady.repetitions, 9);
-        assert!((steady.spread - 0.05).abs() < 1e-9, "1 seven times, 1.1 twice: {steady:?}");
     }
 
     /// Checks that a measured error never counts as having reached a target if the reference

@@ -4,7 +4,7 @@
 use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
-use crate::measure::result::{Expected, Measured, Measurement, spread};
+use crate::measure::result::{Expected, Measured, Measurement};
 use std::io;
 use std::sync::Arc;
 use std::time::Instant;
@@ -30,13 +30,9 @@ const COMPARED_AT: f64 = 0.5;
 /// Longest duration of a render with a changed setting, in units of the time in which the default
 /// settings reach the noise at which settings are compared.
 const MAX_SLOWDOWN: f64 = 5.0;
-/// Largest relative spread of steady times.
-const STEADY: f64 = 0.05;
-/// Number of rounds after which steady times are not measured again, unless the plan requests more.
-/// A round repeats the render of each variant once.
-const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of rounds, unless the plan requests more.
-const MAX_ROUNDS: usize = 31;
+/// Largest number of rounds, unless the plan requests more. A round repeats the render of each
+/// variant once.
+const MAX_ROUNDS: usize = 15;
 
 /// Measures `scene`, which must be valid. Without a `reference`, one is rendered with another
 /// random seed. Returns the error of the system if a thread cannot be started.
@@ -47,22 +43,24 @@ pub fn measure(
     report: Observer,
 ) -> io::Result<Measurement> {
     let (variants, started) = (plan.variants(scene), Instant::now());
-    let mut course = Course { plan, variants, started, report, keep_going: true };
-    let default = course.variants[0].clone();
+    let mut course = Course { plan, variants: variants.len(), started, report, keep_going: true };
+    let default = &variants[0];
     course.announce("reference", 0);
     let mut warm_up = default.start()?;
     while warm_up.seconds < WARM_UP_SECONDS && warm_up.step().is_none() {}
+    let lanes = warm_up.state.world.info().lanes;
     drop(warm_up);
     let least = plan.targets.iter().copied().fold(COMPARED_AT, f64::min);
     let reference = match reference {
         Some(given) => given,
-        None => render_reference(&default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
+        None => render_reference(default, REFERENCE_SHARE * least, REFERENCE_TIME * plan.seconds)?,
     };
     let idle = |experiment: &&'static Experiment| {
-        !course.variants.iter().any(|variant| variant.experiment == *experiment)
+        !variants.iter().any(|variant| variant.experiment == *experiment)
     };
     let mut measurement = Measurement {
         size: scene.film.size,
+        lanes,
         reference_spp: reference.spp,
         reference_levels: reference.noise_levels(),
         reference_linear: reference.noise_linear(),
@@ -73,7 +71,7 @@ pub fn measure(
         idle: plan.experiments.iter().copied().filter(idle).collect(),
         measured: Vec::new(),
     };
-    course.follow_all(&reference, least, &mut measurement)?;
+    course.follow_all(variants, &reference, least, &mut measurement)?;
     course.repeat_all(&mut measurement)?;
     Ok(measurement)
 }
@@ -81,7 +79,8 @@ pub fn measure(
 /// Measurement in progress.
 struct Course<'a> {
     plan: &'a Plan,
-    variants: Vec<Variant>,
+    /// Number of variants to measure.
+    variants: usize,
     started: Instant,
     report: Observer<'a>,
     keep_going: bool,
@@ -89,7 +88,7 @@ struct Course<'a> {
 
 impl Course<'_> {
     fn announce(&mut self, step: &str, done: usize) {
-        let total = 1 + self.variants.len() * self.plan.repetitions.max(1);
+        let total = 1 + self.variants * self.plan.repetitions;
         self.keep_going &= (self.report)(step, done.min(total), total);
     }
 
@@ -97,13 +96,14 @@ impl Course<'_> {
     /// and the others to the noise at which settings are compared.
     fn follow_all(
         &mut self,
+        variants: Vec<Variant>,
         reference: &Reference,
         least: f64,
         measurement: &mut Measurement,
     ) -> io::Result<()> {
         let plan = self.plan;
         let mut longest = DEFAULT_TIME * plan.seconds;
-        for (i, variant) in self.variants.clone().iter().enumerate() {
+        for (i, variant) in variants.into_iter().enumerate() {
             if i > 0 && !self.keep_going {
                 break;
             }
@@ -111,24 +111,18 @@ impl Course<'_> {
             let levels = if i == 0 { least } else { measurement.compared_at };
             let use_estimate = !variant.experiment.is_unbiased;
             let end = End { levels, seconds: longest, use_estimate };
-            let (points, render) = follow(variant, reference, end)?;
+            let (points, render) = follow(&variant, reference, end)?;
             let bias =
                 use_estimate.then(|| reference.bias(&render.state.film, &render.state.weights));
-            let result = Measured {
-                experiment: variant.experiment,
-                name: variant.name.clone(),
-                threads: variant.threads,
-                points,
-                bias,
-            };
+            let result = Measured { variant, points, bias };
             if i == 0 {
                 let missed =
                     plan.targets.iter().filter(|levels| result.time_to(**levels).is_none());
                 measurement.expected =
                     missed.filter_map(|levels| extrapolate(&render, *levels)).collect();
                 let seconds_left = plan.seconds - self.started.elapsed().as_secs_f64();
-                let runs = plan.repetitions.max(1) * (self.variants.len() - 1);
-                let default_seconds = (plan.repetitions.max(1) - 1) as f64 * render.seconds;
+                let runs = plan.repetitions * (self.variants - 1);
+                let default_seconds = (plan.repetitions - 1) as f64 * render.seconds;
                 let seconds_per_run = (seconds_left - default_seconds) / (2 * runs.max(1)) as f64;
                 let compared_at = comparison_noise(&result, &plan.targets, seconds_per_run);
                 longest = MAX_SLOWDOWN * result.time_to(compared_at).map_or(longest, |c| c.seconds);
@@ -140,25 +134,21 @@ impl Course<'_> {
     }
 
     /// Repeats the renders of all variants in rounds: at least `plan.repetitions`, and further ones
-    /// until times are steady or time is up.
+    /// until time is up.
     fn repeat_all(&mut self, measurement: &mut Measurement) -> io::Result<()> {
         let (mut round, mut round_seconds) = (1, 0.0);
         while self.keep_going {
             let passed = self.started.elapsed().as_secs_f64();
-            let steady = measurement.measured.iter().all(|m| is_steady(m, measurement.compared_at));
-            let useful = round < MAX_ROUNDS && (round < MAX_STEADY_ROUNDS || !steady);
             let fits = round == 1 || passed + round_seconds <= self.plan.seconds;
-            if round >= self.plan.repetitions && !(useful && fits) {
+            if round >= self.plan.repetitions && !(fits && round < MAX_ROUNDS) {
                 break;
             }
-            let variants = self.variants.clone();
-            for (i, (variant, result)) in variants.iter().zip(&mut measurement.measured).enumerate()
-            {
-                self.announce(&variant.name, 1 + variants.len() * round + i);
+            for (i, measured) in measurement.measured.iter_mut().enumerate() {
+                self.announce(&measured.variant.name, 1 + self.variants * round + i);
                 if !self.keep_going {
                     break;
                 }
-                repeat(variant, &mut result.points)?;
+                repeat(&measured.variant, &mut measured.points)?;
             }
             round_seconds = self.started.elapsed().as_secs_f64() - passed;
             round += 1;
@@ -184,17 +174,9 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     levels.retain(|level| *level >= COMPARED_AT);
     levels.sort_by(f64::total_cmp);
     let reached: Vec<_> = levels.iter().filter_map(|level| default.time_to(*level)).collect();
-    let in_time = reached.iter().find(|c| c.seconds <= seconds && !c.at_most);
-    let any = || reached.iter().rev().find(|c| !c.at_most).or(reached.first());
+    let in_time = reached.iter().find(|c| c.seconds <= seconds);
     let end = || default.points.last().map_or(COMPARED_AT, |p| p.errors.rmse_levels);
-    in_time.or_else(any).map_or_else(end, |c| c.levels)
-}
-
-/// Returns `true` if the times to the noise `levels`, or to the end of a curve that does not reach
-/// it, have a relative spread of at most [`STEADY`].
-fn is_steady(measured: &Measured, levels: f64) -> bool {
-    let end = || measured.points.last().map_or(0.0, |p| spread(&p.seconds));
-    measured.true_time_to(levels).map_or_else(end, |c| c.spread) <= STEADY
+    in_time.or(reached.last()).map_or_else(end, |c| c.levels)
 }
 
 /// Renders a reference with another random seed, until its noise is at most `levels` 8-bit levels
@@ -217,7 +199,6 @@ fn render_reference(default: &Variant, levels: f64, seconds: f64) -> io::Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::DEFAULT;
     use crate::measure::error_curve::Point;
     use crate::measure::reference_image::Errors;
 
@@ -232,11 +213,10 @@ mod tests {
             estimated_levels: Some(*levels),
             errors: Errors { rmse_linear: 0.0, rmse_levels: *levels, spread: 0.0 },
         };
+        let points = points.iter().map(point).collect();
         Measured {
-            experiment: &DEFAULT,
-            name: String::new(),
-            threads: 1,
-            points: points.iter().map(point).collect(),
+            variant: Plan::default().variants(&Arc::default()).remove(0),
+            points,
             bias: None,
         }
     }
@@ -248,24 +228,16 @@ mod tests {
         assert_eq!(comparison_noise(&default, &targets, 9.0), 0.5, "at least COMPARED_AT");
         assert_eq!(comparison_noise(&default, &targets, 2.0), 1.0);
         assert_eq!(comparison_noise(&default, &targets, 0.3), 4.0, "coarser than the targets");
-        assert_eq!(comparison_noise(&default, &targets, 0.01), 4.0, "reached by the second point");
+        assert_eq!(comparison_noise(&default, &targets, 0.01), 8.0, "the largest");
         assert_eq!(
             comparison_noise(&results(&[(1.0, 0.2)]), &targets, 9.0),
             0.5,
-            "an upper bound is better than none"
+            "reached by the only point"
         );
         assert_eq!(
             comparison_noise(&results(&[(1.0, 30.0), (2.0, 20.0)]), &targets, 9.0),
             20.0,
             "the last noise"
         );
-    }
-
-    #[test]
-    fn results_are_steady_when_their_repetitions_agree() {
-        let mut results = results(&[(1.0, 1.0), (2.0, 0.5)]);
-        assert!(is_steady(&results, 0.5) && is_steady(&results, 0.1));
-        results.points[1].seconds = vec![2.0, 2.4, 2.0];
-        assert!(!is_steady(&results, 0.5) && !is_steady(&results, 0.1) && is_steady(&results, 1.0));
     }
 }

@@ -1,7 +1,7 @@
 //! Results of `zerkalo measure` as JSON and CSV. Scripts rely on the keys.
 
 use crate::command::measure::table::MeasureReport;
-use crate::measure::{Measured, Measurement, median, spread};
+use crate::measure::{Measured, Measurement, Variant, median, spread};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -20,7 +20,7 @@ struct Point {
 
 /// First columns of a line of CSV, before the fields of [`Point`].
 #[derive(Serialize)]
-struct Variant<'a> {
+struct FirstColumns<'a> {
     setting: &'static str,
     name: &'a str,
     threads: usize,
@@ -41,11 +41,12 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
 
 fn variation(measured: &Measured, targets: &[f64]) -> Value {
     let (speed, slope) = (measured.samples_per_second(), measured.slope());
+    let Variant { experiment, name, threads, .. } = &measured.variant;
     let crossings = targets.iter().filter_map(|levels| measured.time_to(*levels));
     json!({
-        "setting": measured.experiment.name,
-        "name": measured.name,
-        "threads": measured.threads,
+        "setting": experiment.name,
+        "name": name,
+        "threads": threads,
         "samples_per_second": speed.map(|s| s.value),
         "samples_per_second_spread": speed.map(|s| s.spread),
         "slope": slope.map(|s| s.value),
@@ -68,8 +69,8 @@ pub fn json(report: &MeasureReport) -> String {
         "version": env!("CARGO_PKG_VERSION"),
         "machine": report.machine(),
         "size": m.size,
-        "lanes": report.lanes,
-        "threads": report.threads,
+        "lanes": m.lanes,
+        "threads": m.default().variant.threads,
         "reference_spp": m.reference_spp,
         "reference_levels": m.reference_levels,
         "reference_linear": m.reference_linear,
@@ -77,8 +78,6 @@ pub fn json(report: &MeasureReport) -> String {
         "compared_at_levels": m.compared_at,
         // Largest relative uncertainty that the noise of the reference causes in a measured error.
         "errors_spread": m.reference_uncertainty(),
-        // Largest relative spread of a time over the repetitions of its render.
-        "times_spread": m.steadiness().spread,
         // Noise targets that were not reached, with ranges of extrapolated times.
         "expected": m.expected,
         "variations": m.measured.iter().map(|v| variation(v, &m.targets)).collect::<Vec<_>>(),
@@ -90,13 +89,10 @@ pub fn json(report: &MeasureReport) -> String {
 pub fn csv(measurement: &Measurement) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for measured in &measurement.measured {
+        let Variant { experiment, name, threads, .. } = &measured.variant;
         for point in points(measured) {
-            let variant = Variant {
-                setting: measured.experiment.name,
-                name: &measured.name,
-                threads: measured.threads,
-            };
-            writer.serialize((variant, point)).expect("a vector takes everything");
+            let first = FirstColumns { setting: experiment.name, name, threads: *threads };
+            writer.serialize((first, point)).expect("a vector takes everything");
         }
     }
     writer.into_inner().expect("a vector takes everything")

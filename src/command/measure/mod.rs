@@ -13,7 +13,6 @@ use std::sync::Arc;
 use zerkalo_render::film::Display;
 use zerkalo_render::image_file;
 use zerkalo_scene::disk::{self, check_writable};
-use zerkalo_world::{self as world, AnyWorld};
 
 /// Experiments without `--only` and `--full`.
 const SHORT: [&str; 3] = ["adaptivity", "precision", "threads"];
@@ -31,9 +30,6 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let reference = reference.map(|path| given_reference(path, scene.film.size, &display));
     let reference = reference.transpose()?;
     let plan = plan(args);
-    let world = AnyWorld::compile(&scene, &world::Options::default());
-    let lanes = world.info().lanes;
-    drop(world);
     let signals = handle_signals()?;
     let bar = ProgressBar::new(1).with_style(style("measuring {bar:30} {msg}"));
     let measurement =
@@ -45,12 +41,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         })?;
     bar.finish_and_clear();
 
-    let report = table::MeasureReport {
-        scene: &args.scene,
-        threads: plan.threads,
-        lanes,
-        measurement: &measurement,
-    };
+    let report = table::MeasureReport { scene: &args.scene, measurement: &measurement };
     let printed = print_line(&report.to_string());
     if let Some(path) = &args.json {
         disk::write(path, data::json(&report).as_bytes())?;

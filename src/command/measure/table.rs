@@ -8,15 +8,14 @@ use std::path::Path;
 /// Measurement with its scene and settings, displayed as a text table.
 pub struct MeasureReport<'a> {
     pub scene: &'a Path,
-    pub threads: usize,
-    pub lanes: &'static str,
     pub measurement: &'a Measurement,
 }
 
 impl MeasureReport<'_> {
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
-        format!("{}, {width} x {height}, {} threads", self.scene.display(), self.threads)
+        let threads = self.measurement.default().variant.threads;
+        format!("{}, {width} x {height}, {threads} threads", self.scene.display())
     }
 
     /// Returns the model of the processor and the number of cores.
@@ -44,26 +43,22 @@ fn percent(share: f64) -> String {
 }
 
 fn reached(target: &TimeToTarget) -> String {
-    let bound = if target.at_most { "< " } else { "" };
-    format!("{bound}{} {}", time(target.seconds), percent(target.spread))
+    format!("{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Spread of a time over repeated renders above which the table warns.
-const UNSTEADY: f64 = 0.1;
 impl fmt::Display for MeasureReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
         self.conditions(f)?;
-        let Some(default) = m.measured.first() else { return Ok(()) };
-        self.times(f, default)?;
+        self.times(f)?;
         let mut last = &DEFAULT;
         for measured in &m.measured[1..] {
-            if measured.experiment != last {
-                last = measured.experiment;
+            if measured.variant.experiment != last {
+                last = measured.variant.experiment;
                 self.heading(f, last)?;
-                self.row(f, &default.name, default)?;
+                self.row(f, m.default())?;
             }
-            self.row(f, &measured.name, measured)?;
+            self.row(f, measured)?;
         }
         for experiment in &m.idle {
             writeln!(f, "\n{}: nothing to compare in this scene", experiment.title)?;
@@ -80,7 +75,7 @@ impl fmt::Display for MeasureReport<'_> {
 }
 
 impl MeasureReport<'_> {
-    /// Writes machine, reference and steadiness of the measurement.
+    /// Writes machine, reference and repetitions of the measurement.
     fn conditions(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
         let [width, height] = m.size;
@@ -88,8 +83,8 @@ impl MeasureReport<'_> {
             f,
             "{}: {width} x {height} pixels, {}, {} threads on {}; zerkalo {}",
             self.scene.display(),
-            self.lanes,
-            self.threads,
+            m.lanes,
+            m.default().variant.threads,
             self.machine(),
             env!("CARGO_PKG_VERSION")
         )?;
@@ -104,28 +99,13 @@ impl MeasureReport<'_> {
                 (100.0 * m.reference_uncertainty()).max(0.1)
             )?;
         }
-        let steadiness = m.steadiness();
-        writeln!(
-            f,
-            "Times are medians of {} runs or more, ± their spread.",
-            steadiness.repetitions
-        )?;
-        if steadiness.spread > UNSTEADY {
-            writeln!(
-                f,
-                "Do not trust these times beyond their spread, up to {}: there were too few runs, other programs \
-                 used the\nprocessors, or the speed of the machine varies (a virtual machine, heat, a battery).\n\
-                 Measure again when the machine has nothing else to do, or longer (--seconds). Errors and\n\
-                 samples per pixel do not depend on that.",
-                percent(steadiness.spread)
-            )?;
-        }
-        Ok(())
+        writeln!(f, "Times are medians of {} runs or more, ± their spread.", m.repetitions())
     }
 
     /// Writes the times in which the default settings reached each noise target.
-    fn times(&self, f: &mut fmt::Formatter, default: &Measured) -> fmt::Result {
+    fn times(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
+        let default = m.default();
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;
         writeln!(f, "  {:>7}  {:>18}  {:>18}", "levels", "time", "samples per pixel")?;
         for target in &m.targets {
@@ -174,9 +154,10 @@ impl MeasureReport<'_> {
     }
 
     /// Writes the line of one variant in the table of its experiment.
-    fn row(&self, f: &mut fmt::Formatter, name: &str, measured: &Measured) -> fmt::Result {
+    fn row(&self, f: &mut fmt::Formatter, measured: &Measured) -> fmt::Result {
         let levels = self.measurement.compared_at;
-        let default = self.measurement.measured[0].time_to(levels);
+        let name = &measured.variant.name;
+        let default = self.measurement.default().time_to(levels);
         let reached_at = measured.true_time_to(levels);
         let followed = || measured.points.last().map_or(0.0, |p| median(&p.seconds));
         let (bound, seconds, time) = match &reached_at {
