@@ -75,11 +75,10 @@ impl CheckpointWriter {
         written
     }
 
-    /// Writes the last checkpoint and returns its path.
-    pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
+    /// Writes the last checkpoint.
+    pub fn finish(self, session: &Session) -> Result<(), WriteError> {
         // An earlier checkpoint must not replace the last one.
         self.written.as_ref().map(Receiver::recv);
-        let written = self.request(session).recv().unwrap_or(Ok(()));
-        written.map(|()| self.path)
+        self.request(session).recv().unwrap_or(Ok(()))
     }
 }

@@ -70,9 +70,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         disk::write(path, stats.as_bytes())?;
     }
     printed?;
-    if let Some(Err(error)) = rendered.kept {
-        return Err(error.into());
-    }
+    rendered.kept?;
     end.map(drop).map_err(Failure::Signalled)
 }
 
@@ -100,8 +98,8 @@ pub struct Rendered {
     /// Time from the start of the program to the compilation of the scene.
     pub set_after: Duration,
     pub write_seconds: f64,
-    /// Path of the last checkpoint, or the error of writing it. `None` without `--checkpoint`.
-    kept: Option<Result<PathBuf, WriteError>>,
+    /// Result of writing the last checkpoint, if there is to be one.
+    kept: Result<(), WriteError>,
 }
 
 /// Renders a picture whose film fits into memory.
@@ -119,8 +117,9 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         CheckpointWriter::new(path, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // An error of the last checkpoint is returned only after the picture has been written.
-    let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
+    // The checkpoint comes first: the picture can be written again from its samples, if the program
+    // is killed soon after a signal. Its error is returned after the picture has been written.
+    let kept = checkpoints.map_or(Ok(()), |checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
     let (depth, output) = (args.bits, output.clone());
     let results = session.with(move |state, report| {
@@ -161,7 +160,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
             let traced = report.seconds + report.compile_seconds;
             let write_seconds = (started.elapsed() - set_after).as_secs_f64() - traced;
             let end = Ok(stopped_by);
-            Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
+            Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: Ok(()) })
         }
         (Err(_), Some(status)) => {
             warn(&format!(
