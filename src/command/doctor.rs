@@ -1,11 +1,11 @@
 //! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, and how to
 //! improve them.
 
+use crate::command::edit::obstacle;
 use crate::command::{Failure, print_line};
 use crate::dashboard::run::{Colors, TerminalReport, diagnose};
 use crate::dashboard::text::wrapped;
 use std::env;
-use std::io::{self, IsTerminal};
 use std::time::Duration;
 use zerkalo_scene::value::sanitized;
 use zerkalo_terminal::flow::PacingMode;
@@ -20,14 +20,7 @@ const NAME: usize = 17;
 pub fn run() -> Result<(), Failure> {
     let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
     let environment = Environment::of(variable);
-    let obstacle = if environment.term == "dumb" {
-        Some("it supports no control sequences, and the dashboard does not open in it")
-    } else if !io::stdin().is_terminal() || !io::stdout().is_terminal() {
-        Some("stdin or stdout is no terminal")
-    } else {
-        None
-    };
-    let diagnosis = match obstacle {
+    let diagnosis = match obstacle(&environment) {
         Some(reason) => Err(reason),
         None => Ok(diagnose(environment.clone())
             .map_err(|error| format!("the terminal cannot be used: {error}"))?),
@@ -269,7 +262,7 @@ mod tests {
         let diagnosis = TerminalReport { terminal, mode: PacingMode::Unlimited, cells: [120, 36] };
         DoctorReport {
             environment,
-            diagnosis: if queried { Ok(diagnosis) } else { Err("stdin or stdout is no terminal") },
+            diagnosis: if queried { Ok(diagnosis) } else { Err("no terminal") },
             locale: Some(("LANG", "en_US.UTF-8".into())),
         }
     }
@@ -347,7 +340,11 @@ mod tests {
     #[test]
     fn report_without_a_terminal_uses_the_environment() {
         let report = report(&[("TERM", "linux"), ("NO_COLOR", "1")], false);
-        check(&report, &["not queried: stdin", "no colour: NO_COLOR is set"], &["round trip"]);
+        check(
+            &report,
+            &["not queried: no terminal", "no colour: NO_COLOR is set"],
+            &["round trip"],
+        );
     }
 
     #[test]

@@ -4,10 +4,10 @@ use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
-use crate::dashboard::run::{DEFAULT_STOP, Ended, Setup, run as run_dashboard};
+use crate::dashboard::run::{DEFAULT_STOP, Ended, FaultyFile, Setup, run as run_dashboard};
 use std::env;
 use std::io::{self, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::Display;
@@ -17,26 +17,31 @@ use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::asset::Assets;
 use zerkalo_scene::disk::open_regular;
 use zerkalo_scene::value::sanitized;
-use zerkalo_scene::{Recovery, SceneErrors, SceneFile, state_folder};
+use zerkalo_scene::{Recovery, SceneFile, state_folder};
 use zerkalo_terminal::Environment;
 use zerkalo_world::Precision;
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
-    let environment = terminal_environment().map_err(|reason| {
-        let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
-        let remedy = format!("`zerkalo render {scene} -o PICTURE.png` renders without one");
-        Failure::Usage(format!("{reason}; {remedy}"))
-    })?;
+    let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
+    let environment = terminal_environment(&format!(
+        "`zerkalo render {scene} -o PICTURE.png` renders without one"
+    ))?;
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
     let film = args.scene.as_deref().filter(|path| is_film_file(path));
     let checkpoint = film.map(Checkpoint::read).transpose()?;
+    let assets = reporter.assets.clone();
     let file = match (&checkpoint, &args.scene) {
-        (Some(checkpoint), _) => Ok(scene_of(checkpoint, reporter.assets.clone())?),
-        (None, Some(path)) => open(path, reporter.assets.clone(), state.as_deref())?,
-        (None, None) => SceneFile::untitled(OPENING.to_string(), OPENING_NAME)
-            .map_err(|errors| (PathBuf::new(), errors)),
+        (Some(checkpoint), _) => Ok(scene_of(checkpoint, assets)?),
+        (None, Some(path)) => SceneFile::open_with(path, assets)
+            .map_err(|errors| FaultyFile { path: path.clone(), errors }),
+        (None, None) => Ok(SceneFile::untitled(OPENING.to_string(), OPENING_NAME)?),
     };
+    if let Err(FaultyFile { path, errors }) = &file
+        && open_regular(path).is_err()
+    {
+        return Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state.as_deref())));
+    }
     reporter.mute();
     // A continued render keeps its seed, sampler and precision.
     let (sampling, precision) = match &checkpoint {
@@ -94,15 +99,24 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     }
 }
 
-/// Returns the environment of the terminal, or the reason why it cannot show the dashboard.
-pub fn terminal_environment() -> Result<Environment, &'static str> {
-    let environment = Environment::of(|name| env::var(name).ok());
+/// Returns the reason why the terminal with `environment` cannot show the dashboard.
+pub fn obstacle(environment: &Environment) -> Option<&'static str> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
-        return Err("the dashboard needs a terminal");
+        return Some("the dashboard needs a terminal at stdin and stdout");
     }
-    match environment.term.as_str() {
-        "dumb" => Err("TERM=dumb: the dashboard needs a terminal that can position text"),
-        _ => Ok(environment),
+    let is_dumb = environment.term == "dumb";
+    is_dumb.then_some("the dashboard needs a terminal that can position text, and TERM is dumb")
+}
+
+/// Returns the environment of the terminal.
+///
+/// # Errors
+/// Fails if the terminal cannot show the dashboard. `remedy` is a part of the message.
+pub fn terminal_environment(remedy: &str) -> Result<Environment, Failure> {
+    let environment = Environment::of(|name| env::var(name).ok());
+    match obstacle(&environment) {
+        Some(reason) => Err(Failure::Usage(format!("{reason}; {remedy}"))),
+        None => Ok(environment),
     }
 }
 
@@ -119,25 +133,6 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
         return Ok(file);
     }
     Ok(SceneFile::untitled(checkpoint.inputs.scene.clone(), source)?)
-}
-
-/// Opens the scene file at `path`. The inner error is for the dashboard, which shows it until the
-/// user has corrected the file.
-///
-/// # Errors
-/// Fails if the file cannot be read.
-fn open(
-    path: &Path,
-    assets: Arc<Assets>,
-    state: Option<&Path>,
-) -> Result<Result<SceneFile, (PathBuf, SceneErrors)>, Failure> {
-    match SceneFile::open_with(path, assets) {
-        Ok(file) => Ok(Ok(file)),
-        Err(errors) => match open_regular(path).is_ok() {
-            true => Ok(Err((path.to_path_buf(), errors))),
-            false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),
-        },
-    }
 }
 
 /// Returns a note about unsaved edits of the unreadable scene file `path`; empty if there are none.
@@ -158,6 +153,7 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
 
     /// Writer on which every write fails, as on a terminal that was closed.
     struct Gone;

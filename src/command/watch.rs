@@ -8,10 +8,8 @@ use std::io;
 use zerkalo_render::plan::FilmFiles;
 
 pub fn run(args: &WatchArgs) -> Result<(), Failure> {
-    let environment = terminal_environment().map_err(|reason| {
-        let remedy = "`zerkalo merge --partial FILE.zk.. -o PICTURE.png` writes a picture of parts";
-        Failure::Usage(format!("{reason}; {remedy}"))
-    })?;
+    let remedy = "`zerkalo merge --partial FILE.zk.. -o PICTURE.png` writes a picture of parts";
+    let environment = terminal_environment(remedy)?;
     let films = FilmFiles::open(&args.files)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let ended = watch_films(films, threads, args.terminal.setup(environment))?;

@@ -236,7 +236,7 @@ fn watch_needs_a_terminal_and_files() {
     let run = desk.run(&["watch", "job-1.zk"]);
     assert_eq!(run.status, 2, "{}", run.err);
     assert!(
-        run.err.contains("the dashboard needs a terminal; `zerkalo merge --partial"),
+        run.err.contains("a terminal at stdin and stdout; `zerkalo merge --partial"),
         "{}",
         run.err
     );

@@ -36,8 +36,7 @@ pub use diagnose::{TerminalReport, diagnose};
 
 /// Parameters of a dashboard.
 pub struct Setup {
-    /// Scene file. For an unreadable one, its path and errors.
-    pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
+    pub file: Result<SceneFile, FaultyFile>,
     /// Checkpoint from which the render continues.
     pub checkpoint: Option<Checkpoint>,
     /// Folder for recovery files that cannot be written beside their scene file.
@@ -49,6 +48,12 @@ pub struct Setup {
     pub terminal: TerminalSetup,
     /// Path of the CSV file for input latencies; `None` to measure none.
     pub trace: Option<PathBuf>,
+}
+
+/// Scene file with errors, which the dashboard shows until the user has corrected the file.
+pub struct FaultyFile {
+    pub path: PathBuf,
+    pub errors: SceneErrors,
 }
 
 /// Settings of the terminal.
@@ -78,7 +83,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
     let (scene, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document.scene().clone())), Ok(file)),
-        Err((path, errors)) => (Err(errors), Err(path)),
+        Err(FaultyFile { path, errors }) => (Err(errors), Err(path)),
     };
     let (path, name) = match &file {
         Ok(file) => (file.path().map(PathBuf::from), file.document.name.clone()),
