@@ -57,11 +57,10 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         Some(_) => saved(&args.output, &part)?,
         None => None,
     };
-    if let Some((_, rays, true)) = saved {
+    if let Some(SavedShard { is_complete: true, rays, .. }) = saved {
         return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
     let signals = handle_signals()?;
-    let saved = saved.map(|(film, rays, _)| (film, rays));
     let mut render = start(args, &document, &part, saved)?;
     let signal = trace(&mut render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
@@ -112,9 +111,16 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Reads the film file of an earlier run of the same shard. Returns the film, its number of rays,
-/// and `true` if the shard is complete. Returns `None` if the file does not exist or is damaged.
-fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
+/// Film of an earlier run of a shard.
+struct SavedShard {
+    film: Film,
+    rays: u64,
+    is_complete: bool,
+}
+
+/// Reads the film file of an earlier run of the same shard. Returns `None` if the file does not
+/// exist or is damaged.
+fn saved(path: &Path, part: &Part) -> Result<Option<SavedShard>, Failure> {
     if !path.exists() {
         return Ok(None);
     }
@@ -135,8 +141,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     if shard.number != part.shards[0].number {
         return Err(failed(&format!("holds shard {}", shard.number)));
     }
-    let film = reader.read().inspect_err(report);
-    Ok(film.ok().map(|(_, film)| (film, found.rays, shard.complete)))
+    let film = reader.read().inspect_err(report).ok().map(|(_, film)| film);
+    Ok(film.map(|film| SavedShard { film, rays: found.rays, is_complete: shard.complete }))
 }
 
 /// Creates the render of the shards of `part`, which continues `saved`.
@@ -144,7 +150,7 @@ fn start(
     args: &RenderArgs,
     document: &Document,
     part: &Part,
-    saved: Option<(Film, u64)>,
+    saved: Option<SavedShard>,
 ) -> Result<ShardRender, Failure> {
     let plan = &part.plan;
     let settings = &plan.settings;
@@ -159,14 +165,14 @@ fn start(
     let mut state = RenderState::new(&Arc::new(scene), &options, None)
         .map_err(|fault| format!("{}: {fault}", args.scene.display()))?;
     let mut rays = 0;
-    if let Some((film, saved_rays)) = saved {
-        if film.header != state.film.header {
+    if let Some(saved) = saved {
+        if saved.film.header != state.film.header {
             return Err(Failure::Failed(format!(
                 "{} is the film of another scene; remove it or name another file",
                 args.output.display()
             )));
         }
-        (state.film, rays) = (film, saved_rays);
+        (state.film, rays) = (saved.film, saved.rays);
     }
     let ranges = match part.shards[..] {
         [one] => plan.ranges(one.number),
