@@ -1,7 +1,7 @@
 //! Output of films that belong to a plan.
 
 use crate::command::Failure;
-use crate::command::progress::noise;
+use crate::command::progress::{counts, noise};
 use std::path::{Path, PathBuf};
 use zerkalo_render::RenderState;
 use zerkalo_render::export::{Provenance, film_header};
@@ -63,6 +63,5 @@ pub fn write(output: &FilmOutput, state: &RenderState, part: &Part) -> Result<Re
 
 /// Formats sample counts and noise, such as `212 spp (32-900) noise 0.250 8-bit levels`.
 pub fn summary(report: &Report) -> String {
-    let spp = &report.spp;
-    format!("{:.0} spp ({}-{})  {}", spp.mean, spp.min, spp.max, noise(report))
+    format!("{}  {}", counts(report), noise(report))
 }
