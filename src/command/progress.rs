@@ -81,8 +81,8 @@ fn status(report: &Report) -> String {
     if let Some(noise) = report.noise {
         text += &format!("  noise {:.2}", noise.rmse_levels);
     }
-    if let Some((low, high)) = report.eta_seconds {
-        text += &format!("  {} left", durations(low, high));
+    if let Some(left) = report.eta_seconds {
+        text += &format!("  {} left", durations(left));
     }
     text
 }

@@ -27,7 +27,7 @@ pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> St
         return seconds.map_or("reached".to_string(), |s| format!("reached after {}", duration(s)));
     }
     match report.quality_seconds[at] {
-        Some((from, to)) => format!("{} more", durations(from, to)),
+        Some(left) => format!("{} more", durations(left)),
         None => "not known yet".to_string(),
     }
 }
@@ -36,6 +36,7 @@ pub fn cost(report: Option<&Report>, convergence: &Convergence, at: usize) -> St
 mod tests {
     use super::*;
     use crate::dashboard::testing::report;
+    use zerkalo_render::schedule::Interval;
 
     #[test]
     fn reached_targets_show_time_and_others_the_rest() {
@@ -45,7 +46,7 @@ mod tests {
         }
         let mut now = report(1, 80, Some(0.4));
         convergence.add(&now);
-        now.quality_seconds[4] = Some((0.2, 0.3));
+        now.quality_seconds[4] = Some(Interval { low: 0.2, high: 0.3 });
         // The simulated reports arrive after 10, 20, 40 and 80 ms. Their noise is 2, 1, 0.5 and 0.4
         // levels.
         let costs = [0, 1, 2, 3, 4, 5].map(|at| cost(Some(&now), &convergence, at));

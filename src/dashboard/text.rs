@@ -4,6 +4,7 @@
 use std::borrow::Cow;
 use std::time::Duration;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+use zerkalo_render::schedule::Interval;
 
 pub fn columns(text: &str) -> usize {
     text.width()
@@ -94,8 +95,8 @@ pub fn duration(seconds: f64) -> String {
 }
 
 /// Formats a range of durations, such as `3–5 s`.
-pub fn durations(from: f64, to: f64) -> String {
-    let ((from, _), (to, unit)) = (in_unit(from, to), in_unit(to, to));
+pub fn durations(Interval { low, high }: Interval) -> String {
+    let ((from, _), (to, unit)) = (in_unit(low, high), in_unit(high, high));
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
@@ -163,6 +164,7 @@ mod tests {
         let expected =
             ["0 s", "0.4 s", "3 s", "35 s", "1.7 min", "10 min", "1.7 h", "2.5 h", "12 days"];
         assert_eq!(times.map(duration), expected);
+        let durations = |low, high| durations(Interval { low, high });
         assert_eq!([durations(3.0, 5.0), durations(20.0, 150.0)], ["3–5 s", "0.3–2.5 min"]);
         assert_eq!(durations(3.01, 3.02), "3 s");
         let ages = [59, 60, 3599, 7200, 86_399, 172_800].map(|s| age(Duration::from_secs(s)));

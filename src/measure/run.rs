@@ -9,6 +9,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Instant;
 use zerkalo_render::SyncRender;
+use zerkalo_render::schedule::Interval;
 use zerkalo_scene::Scene;
 
 /// Observer of a measurement. It gets the render in progress, which is `reference` or the name of a
@@ -160,7 +161,7 @@ impl Course<'_> {
 /// Returns the extrapolated time to `levels` 8-bit levels. Returns `None` if it cannot be
 /// extrapolated.
 fn extrapolate(render: &SyncRender, levels: f64) -> Option<Expected> {
-    let (low, high) = render.schedule.seconds_to_noise(levels, render.seconds)?;
+    let Interval { low, high } = render.schedule.seconds_to_noise(levels, render.seconds)?;
     let seconds = render.seconds;
     Some(Expected { levels, seconds_low: seconds + low, seconds_high: seconds + high })
 }

@@ -9,7 +9,7 @@ use crate::export::{Provenance, film_header, metadata};
 use crate::film::file::FilmFileHeader;
 use crate::film::{Film, Header, Noise, TileNoise};
 use crate::image_file::{Bands, Depth, ImageOutput};
-use crate::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
+use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::session::{Report, State};
 use crate::{Options, RenderState, threads};
 use std::io;
@@ -187,7 +187,7 @@ impl RegionRender {
             rays: finished.rays + schedule.rays,
             seconds,
             noise: schedule.noise,
-            eta_seconds: share.filter(|_| done > 0.0).map(|_| (left, left)),
+            eta_seconds: share.filter(|_| done > 0.0).map(|_| Interval::exact(left)),
             progress: Some(done),
             bad_samples: finished.bad_samples + film.bad_samples().count,
             saturated_samples: finished.saturated_samples + film.saturated_samples(),

@@ -69,10 +69,9 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     );
     let target = model.stop.noise_levels.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // The expected time is the mean of its bounds.
     let reached = match (target, eta) {
-        (Some(target), Some((from, to))) if target < last.noise_levels => {
-            Some((last.seconds + 0.5 * (from + to), target))
+        (Some(target), Some(left)) if target < last.noise_levels => {
+            Some((last.seconds + left.mean(), target))
         }
         _ => None,
     };

@@ -151,8 +151,8 @@ fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec
         }
         None => text.push(dim(" levels")),
     }
-    if let (Some((from, to)), State::Tracing) = (report.eta_seconds, &report.state) {
-        let left = if to < 1.0 { "under 1 s".to_string() } else { durations(from, to) };
+    if let (Some(left), State::Tracing) = (report.eta_seconds, &report.state) {
+        let left = if left.high < 1.0 { "under 1 s".to_string() } else { durations(left) };
         text.push((format!(" in {left}"), theme.text()));
     }
     text

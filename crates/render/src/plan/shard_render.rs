@@ -1,7 +1,7 @@
 //! Render of the samples of one shard, in steps between which the film can be saved.
 
 use crate::film::TILE_PIXELS;
-use crate::schedule::{SAMPLE_ALIGNMENT, Spp};
+use crate::schedule::{Interval, SAMPLE_ALIGNMENT, Spp};
 use crate::session::{Report, State};
 use crate::wave::{Job, Wave};
 use crate::{RenderState, threads};
@@ -134,7 +134,7 @@ impl ShardRender {
             samples: traced,
             rays: self.rays,
             seconds,
-            eta_seconds: Some((left, left)),
+            eta_seconds: Some(Interval::exact(left)),
             progress: Some(self.progress()),
             recent_samples_per_second: speed,
             lanes: self.state.world.info().lanes,

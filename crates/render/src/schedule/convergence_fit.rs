@@ -1,6 +1,7 @@
 //! Convergence fit: the RMSE of the whole picture over the number of rays, extrapolated to an error
 //! target.
 
+use crate::schedule::Interval;
 use crate::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
 /// Largest number of points of the fit. From one point to the next, except to the latest one, the
@@ -37,15 +38,14 @@ impl ConvergenceFit {
         }
     }
 
-    /// Returns a lower and an upper estimate of the total number of rays at which the RMSE falls to
-    /// `target`. Three slopes are fitted: over the latest two, four and six steps between points.
+    /// Returns an estimate of the total number of rays at which the RMSE falls to `target`. Three slopes are fitted: over the latest two, four and six steps between points.
     /// The steepest slope gives the lower estimate, the flattest slope the upper one. Before the
     /// first two steps, [`STEEPEST`] and [`FLATTEST`] are used. Returns `None` before the first
     /// point.
-    pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
+    pub fn rays_needed(&self, target: f64) -> Option<Interval> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
-            return Some((rays, rays));
+            return Some(Interval::exact(rays));
         }
         let slopes = [2, 4, 6].into_iter().filter_map(|back| {
             let (rays0, noise0) = *self.points.get(self.points.len().checked_sub(back + 1)?)?;
@@ -56,7 +56,10 @@ impl ConvergenceFit {
             .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
             .unwrap_or((FLATTEST, STEEPEST));
         let additional = |p: f64| rays * ((noise / target).powf(1.0 / p) - 1.0);
-        Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
+        Some(Interval {
+            low: rays + additional(steep) * (1.0 - SPREAD),
+            high: rays + additional(flat) * (1.0 + SPREAD),
+        })
     }
 
     /// Returns the slope p of the fit RMSE ~ rays^-p, through the first and the last point. Returns

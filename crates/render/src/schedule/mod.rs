@@ -25,6 +25,7 @@ use crate::wave::{Job, JobReport, Wave};
 use convergence_fit::ConvergenceFit;
 pub use prediction::{PlannedTile, Prediction, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
+pub use stop::Interval;
 use tile::{FLATTEST, Tile, clamp_slope};
 
 /// Samples per pixel and replicate before adaptive sampling and noise estimates start. Estimates

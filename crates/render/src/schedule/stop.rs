@@ -12,31 +12,45 @@ use crate::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 /// 1.56, 1.23 and 1.11.
 const FEW_PIXELS_TO_STOP: f64 = 64.0;
 
+/// Lower and upper estimate of a number of seconds or rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Interval {
+    /// Returns the interval of a number that is known.
+    pub fn exact(value: f64) -> Self {
+        Self { low: value, high: value }
+    }
+
+    /// Returns the number that is expected.
+    pub fn mean(self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+}
+
 impl Schedule {
-    /// Returns a lower and an upper estimate of the seconds left until the first stop criterion is
+    /// Returns an estimate of the seconds left until the first stop criterion is
     /// reached, after `seconds` seconds of rendering. `None` if no criterion can be extrapolated.
-    pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
+    pub fn eta_seconds(&self, seconds: f64) -> Option<Interval> {
         let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
             let total = 2.0 * f64::from(spp.div_ceil(2)) * self.pixels() as f64;
-            let seconds_left = (total / self.samples as f64 - 1.0).max(0.0) * seconds;
-            (seconds_left, seconds_left)
+            Interval::exact((total / self.samples as f64 - 1.0).max(0.0) * seconds)
         });
-        let by_time =
-            self.settings.stop.seconds.map(|s| ((s - seconds).max(0.0), (s - seconds).max(0.0)));
-        [by_noise, by_spp, by_time]
-            .into_iter()
-            .flatten()
-            .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
+        let by_time = self.settings.stop.seconds.map(|s| Interval::exact((s - seconds).max(0.0)));
+        let estimates = [by_noise, by_spp, by_time].into_iter().flatten();
+        estimates.reduce(|a, b| Interval { low: a.low.min(b.low), high: a.high.min(b.high) })
     }
 
-    /// Returns a lower and an upper estimate of the seconds left until the displayed RMSE falls to
-    /// `levels` 8-bit levels, whatever the stop criteria are. Returns `None` before the first
-    /// estimate.
-    pub fn seconds_to_noise(&self, levels: f64, seconds: f64) -> Option<(f64, f64)> {
+    /// Returns an estimate of the seconds left until the displayed RMSE falls to `levels` 8-bit
+    /// levels, whatever the stop criteria are. Returns `None` before the first estimate of the noise.
+    pub fn seconds_to_noise(&self, levels: f64, seconds: f64) -> Option<Interval> {
         let noise = self.noise?;
         if noise.rmse_levels <= levels {
-            return Some((0.0, 0.0));
+            return Some(Interval::exact(0.0));
         }
         let target = match self.settings.criterion {
             Criterion::Levels => levels,
@@ -45,20 +59,19 @@ impl Schedule {
         self.seconds_to_error(target, seconds)
     }
 
-    /// Returns a lower and an upper estimate of the seconds left until the error falls to `target`,
-    /// in the unit of the criterion. Returns `None` before the first estimate.
-    fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<(f64, f64)> {
-        let (low, high) = self.convergence.rays_needed(target)?;
+    /// Returns an estimate of the seconds left until the error falls to `target`, in the unit of the
+    /// criterion. Returns `None` before the first estimate of the noise.
+    fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<Interval> {
+        let Interval { low, high } = self.convergence.rays_needed(target)?;
         let per_ray = seconds / self.rays.max(1) as f64;
         let seconds_until = |rays: f64| (rays - self.rays as f64).max(0.0) * per_ray;
-        Some((seconds_until(low), seconds_until(high)))
+        Some(Interval { low: seconds_until(low), high: seconds_until(high) })
     }
 
     /// Returns the share of the render that is done, 0..=1: elapsed time over expected total time.
     /// Returns `None` if the total cannot be estimated.
     pub fn progress(&self, seconds: f64) -> Option<f64> {
-        let (low, high) = self.eta_seconds(seconds)?;
-        let seconds_left = 0.5 * (low + high);
+        let seconds_left = self.eta_seconds(seconds)?.mean();
         Some(if seconds > 0.0 { seconds / (seconds + seconds_left) } else { 0.0 })
     }
 

@@ -1,7 +1,7 @@
 //! Progress report of a render session.
 
 use crate::film::{Display, Film, LightWeights, Noise};
-use crate::schedule::{Spp, StoppedBy};
+use crate::schedule::{Interval, Spp, StoppedBy};
 use std::sync::Arc;
 
 /// Noise targets that a user can choose, in 8-bit levels.
@@ -37,11 +37,11 @@ pub struct Report {
     /// Seconds from the start of the compilation to the first complete picture.
     pub first_picture_seconds: Option<f64>,
     pub noise: Option<Noise>,
-    /// Lower and upper estimate of the seconds left until the render ends.
-    pub eta_seconds: Option<(f64, f64)>,
-    /// Lower and upper estimates of the seconds left until each of the [`QUALITIES`] is reached,
+    /// Estimate of the seconds left until the render ends.
+    pub eta_seconds: Option<Interval>,
+    /// Estimates of the seconds left until each of the [`QUALITIES`] is reached,
     /// whatever the stop criteria are.
-    pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
+    pub quality_seconds: [Option<Interval>; QUALITIES.len()],
     /// Share of the render that is done, 0..=1: of the expected time, or of the samples of a plan.
     pub progress: Option<f64>,
     /// Number of samples that were NaN or negative and count as black.

@@ -2,7 +2,7 @@
 //! sphere, where every path is long.
 
 use crate::film::Noise;
-use crate::schedule::{Criterion, Spp, Stop, StoppedBy};
+use crate::schedule::{Criterion, Interval, Spp, Stop, StoppedBy};
 use crate::session::*;
 use std::time::{Duration, Instant};
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
@@ -236,7 +236,7 @@ fn reports_hold_noise_and_time_left() {
     let running = wait_for(&session, |s| s.report.noise.is_some()).report;
     let Noise { rmse_levels, .. } = running.noise.unwrap();
     assert!(rmse_levels > 0.0 && rmse_levels < 255.0);
-    let (low, high) = running.eta_seconds.expect("a time");
+    let Interval { low, high } = running.eta_seconds.expect("a time");
     assert!(low > 0.0 && high >= low);
     assert!(running.progress.is_some_and(|p| p > 0.0 && p < 1.0));
     assert!(running.samples_per_second() > 0.0);

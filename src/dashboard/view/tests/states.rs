@@ -12,7 +12,7 @@ use crate::dashboard::{
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo_render::film::{Display, LightWeights, PixelProbe};
-use zerkalo_render::schedule::{Spp, Stop, StoppedBy};
+use zerkalo_render::schedule::{Interval, Spp, Stop, StoppedBy};
 use zerkalo_render::session::{
     Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
 };
@@ -42,15 +42,9 @@ pub fn tracing(screen: [u16; 2]) -> Model {
         model.convergence.add(&with_spread(report(1, spp, Some(noise))));
     }
     let last = Report {
-        eta_seconds: Some((0.9, 1.6)),
-        quality_seconds: [
-            Some((0.0, 0.0)),
-            Some((0.0, 0.0)),
-            Some((0.0, 0.0)),
-            Some((0.9, 1.6)),
-            Some((3.4, 5.8)),
-            Some((13.0, 25.0)),
-        ],
+        eta_seconds: Some(Interval { low: 0.9, high: 1.6 }),
+        quality_seconds: [(0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.9, 1.6), (3.4, 5.8), (13.0, 25.0)]
+            .map(|(low, high)| Some(Interval { low, high })),
         progress: Some(0.4),
         ..with_spread(report(1, 212, Some(0.9)))
     };

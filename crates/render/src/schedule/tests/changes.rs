@@ -105,7 +105,7 @@ fn new_estimates_replace_the_old_ones() {
     assert_eq!(schedule.samples, samples);
     // The convergence of the new picture is unknown. The estimated range is wide, but contains the
     // true time.
-    let (low, high) = schedule.eta_seconds(1.0).unwrap();
+    let Interval { low, high } = schedule.eta_seconds(1.0).unwrap();
     assert!(high > 2.0 * low, "{low}..{high}");
     let rays = schedule.rays as f64;
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Noise);

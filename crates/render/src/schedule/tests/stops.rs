@@ -147,7 +147,7 @@ fn estimated_time_left_is_a_range_that_holds() {
             let end = seconds(&schedule);
             let late = estimates.iter().filter(|(now, _)| *now > 0.05 * end && *now < 0.8 * end);
             let mut checked = 0;
-            for (now, (low, high)) in late {
+            for (now, Interval { low, high }) in late {
                 let seconds_left = end - now;
                 assert!(
                     low <= high && *low < seconds_left * 1.02 && *high > seconds_left * 0.98,
@@ -168,7 +168,7 @@ fn estimated_time_left_is_a_range_that_holds() {
         schedule.complete(&wave, &report);
     }
     // 32 of 100 samples took one second.
-    let (low, high) = schedule.eta_seconds(1.0).unwrap();
+    let Interval { low, high } = schedule.eta_seconds(1.0).unwrap();
     assert!((low - 68.0 / 32.0).abs() < 1e-9 && low == high);
     assert!((schedule.progress(1.0).unwrap() - 0.32).abs() < 1e-9);
 }
