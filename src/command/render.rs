@@ -36,7 +36,11 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let document = read_scene(&args.scene)?;
     let warnings = document.warnings.clone();
     let hash = scene_hash(document.text(), document.scene());
-    let scene = sized(document.into_scene(), args)?;
+    let mut scene = document.into_scene();
+    if let Some(acceleration) = args.acceleration {
+        scene.trace.acceleration = acceleration;
+    }
+    args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     // Faulty paths are reported before the render starts.
     check_outputs(args, &output)?;
     let checkpoint = read_checkpoint(args)?;
@@ -215,15 +219,6 @@ fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
             "note: the lights of the scene differ from those of the checkpoint; its samples are kept",
         );
     }
-}
-
-/// Returns `scene` with the acceleration structure and the size of the command line.
-fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
-    if let Some(acceleration) = args.acceleration {
-        scene.trace.acceleration = acceleration;
-    }
-    args.picture.resize(&mut scene).map_err(Failure::Usage)?;
-    Ok(scene)
 }
 
 /// Checks that the files of `--output`, `--stats` and `--checkpoint` differ and can be written.

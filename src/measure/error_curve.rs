@@ -23,29 +23,19 @@ pub struct Point {
     pub errors: Errors,
 }
 
-/// Target error and time limit of an error curve.
-#[derive(Clone, Copy, Debug)]
-pub struct End {
-    /// Target error in 8-bit levels.
-    pub levels: f64,
-    /// Time limit in seconds of tracing.
-    pub seconds: f64,
-    /// `true` to compare the estimated error with the target, `false` to compare the true error.
-    /// The true error of biased settings does not converge to 0.
-    pub use_estimate: bool,
-}
-
 /// Ratio of the estimated errors of consecutive points: about 2^(-1/4), so that a curve has four
 /// points for each halving of the error.
 const POINT_RATIO: f64 = 0.84;
 
-/// Renders with the settings of `variant` until `end`, or until further samples cannot change the
-/// picture. Returns the error curve and the render, or the error of the system if a thread cannot be
-/// started.
+/// Renders with the settings of `variant` until the error is at most `target` 8-bit levels, until
+/// `seconds` seconds of tracing have passed, or until further samples cannot change the picture. The
+/// error is the estimated one for biased settings, whose true error does not converge to 0. Returns
+/// the error curve and the render, or the error of the system if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
     reference: &Reference,
-    end: End,
+    target: f64,
+    seconds: f64,
 ) -> io::Result<(Vec<Point>, SyncRender)> {
     let mut render = variant.start()?;
     let mut points: Vec<Point> = Vec::new();
@@ -53,7 +43,7 @@ pub fn follow(
     for step in 1.. {
         let done = render.step().is_some();
         let estimate = render.noise_levels();
-        let timed_out = render.seconds >= end.seconds;
+        let timed_out = render.seconds >= seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
         // Further samples do not change a picture without noise.
         let noiseless = estimate == Some(0.0);
@@ -70,9 +60,9 @@ pub fn follow(
                     errors,
                 });
             }
-            let reached = if end.use_estimate { estimate } else { Some(errors.rmse_levels) };
-            if reached.is_some_and(|levels| levels <= end.levels) || done || timed_out || noiseless
-            {
+            let is_unbiased = variant.experiment.is_unbiased;
+            let error = if is_unbiased { Some(errors.rmse_levels) } else { estimate };
+            if error.is_some_and(|levels| levels <= target) || done || timed_out || noiseless {
                 break;
             }
         }

@@ -3,7 +3,7 @@
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
 use crate::measure::experiment::{Experiment, Variant};
-use crate::measure::reference_image::Bias;
+use crate::measure::reference_image::{Bias, Reference};
 use serde::Serialize;
 
 /// Time at which a render reached a noise target. The fields are keys of JSON files.
@@ -52,13 +52,7 @@ pub struct Measurement {
     pub size: [u32; 2],
     /// Name of the SIMD type, such as `f32x8`.
     pub lanes: &'static str,
-    /// Samples per pixel of the reference; 0 if it was read from a file.
-    pub reference_spp: f64,
-    /// Error of the reference itself, in 8-bit levels.
-    pub reference_levels: f64,
-    /// Error of the reference itself, in linear radiance.
-    pub reference_linear: f64,
-    pub reference_seconds: f64,
+    pub reference: Reference,
     /// Noise at which all settings are compared, in 8-bit levels. The default settings reached it.
     pub compared_at: f64,
     /// Noise targets in 8-bit levels, in descending order.

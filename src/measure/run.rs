@@ -1,7 +1,7 @@
 //! Course of a measurement: renders the reference, follows the error curve of every variant, and
 //! repeats the renders for the medians of the times.
 
-use crate::measure::error_curve::{End, follow, repeat};
+use crate::measure::error_curve::{follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
 use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement};
@@ -62,17 +62,14 @@ pub fn measure(
     let mut measurement = Measurement {
         size: scene.film.size,
         lanes,
-        reference_spp: reference.spp,
-        reference_levels: reference.noise_levels(),
-        reference_linear: reference.noise_linear(),
-        reference_seconds: reference.seconds,
+        reference,
         compared_at: COMPARED_AT,
         targets: plan.targets.clone(),
         expected: Vec::new(),
         idle: plan.experiments.iter().copied().filter(idle).collect(),
         measured: Vec::new(),
     };
-    course.follow_all(variants, &reference, least, &mut measurement)?;
+    course.follow_all(variants, least, &mut measurement)?;
     course.repeat_all(&mut measurement)?;
     Ok(measurement)
 }
@@ -98,7 +95,6 @@ impl Course<'_> {
     fn follow_all(
         &mut self,
         variants: Vec<Variant>,
-        reference: &Reference,
         least: f64,
         measurement: &mut Measurement,
     ) -> io::Result<()> {
@@ -110,11 +106,10 @@ impl Course<'_> {
             }
             self.announce(&variant.name, 1 + i);
             let levels = if i == 0 { least } else { measurement.compared_at };
-            let use_estimate = !variant.experiment.is_unbiased;
-            let end = End { levels, seconds: longest, use_estimate };
-            let (points, render) = follow(&variant, reference, end)?;
-            let bias =
-                use_estimate.then(|| reference.bias(&render.state.film, &render.state.weights));
+            let reference = &measurement.reference;
+            let (points, render) = follow(&variant, reference, levels, longest)?;
+            let bias = || reference.bias(&render.state.film, &render.state.weights);
+            let bias = (!variant.experiment.is_unbiased).then(bias);
             let result = Measured { variant, points, bias };
             if i == 0 {
                 let missed =

@@ -88,14 +88,14 @@ impl MeasureReport<'_> {
             self.machine(),
             env!("CARGO_PKG_VERSION")
         )?;
-        if m.reference_spp > 0.0 {
+        if m.reference.spp > 0.0 {
             writeln!(
                 f,
                 "Errors are against a reference of {:.0} samples per pixel, whose own error is {:.3} 8-bit levels ({}); \
                  against another\none they would be the same within {:.1} %.",
-                m.reference_spp,
-                m.reference_levels,
-                time(m.reference_seconds),
+                m.reference.spp,
+                m.reference.noise_levels(),
+                time(m.reference.seconds),
                 (100.0 * m.reference_uncertainty()).max(0.1)
             )?;
         }
