@@ -1,5 +1,5 @@
 //! Tests of the program other than those of pictures: scene files, editing, sessions, the command
-//! line, the dashboard, and the rules for the source.
+//! line, the dashboard, measurements, and the rules for the source.
 
 mod command_line;
 mod fuzz;
@@ -12,4 +12,5 @@ mod prose;
 mod pty;
 mod scene_editing;
 mod scene_files;
+mod slopes;
 mod stories;

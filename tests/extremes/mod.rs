@@ -1,6 +1,5 @@
 //! Extreme sizes, places and proportions, at which renderers often fail: the thirty numbered tests
-//! (`audit.rs` lists the file of each), the choice of precision, scaled and shifted scenes, and the
-//! rate at which the error falls.
+//! (`audit.rs` lists the file of each), the choice of precision, scaled and shifted scenes.
 
 mod audit;
 mod brightness;
@@ -19,7 +18,6 @@ mod on_surface;
 mod precision;
 mod scaled;
 mod shadow;
-mod slopes;
 mod sphere;
 mod tapered;
 mod volumes;

@@ -11,7 +11,7 @@ const FIRST: u32 = 64;
 const LAST: u32 = 2048;
 /// Number of samples of the reference, divided by [`LAST`], the largest number of samples of the
 /// compared pictures.
-const REFERENCE: u32 = 16;
+const REFERENCE: u32 = 8;
 
 /// Returns the slope of the logarithm of the RMSE against the logarithm of the number of samples,
 /// over pictures with several seeds.
