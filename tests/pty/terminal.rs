@@ -5,7 +5,7 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_p
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -22,8 +22,10 @@ struct Output {
     ended: bool,
 }
 
-/// Lock that lets one program run at a time, because each uses all processors.
-static TURN: Mutex<()> = Mutex::new(());
+/// Locks that let two programs run at a time: each uses all processors, but waits half of the time.
+static TURNS: [Mutex<()>; 2] = [Mutex::new(()), Mutex::new(())];
+/// Number of programs that have asked for a turn.
+static ASKED: AtomicUsize = AtomicUsize::new(0);
 
 /// Writer of keys and replies to the program.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
@@ -80,7 +82,8 @@ impl Terminal {
             .iter()
             .filter(|(request, _)| additional.iter().all(|other| other.0 != *request));
         let table: Vec<RequestReply> = defaults.chain(additional).copied().collect();
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = &TURNS[ASKED.fetch_add(1, Ordering::Relaxed) % TURNS.len()];
+        let turn = turn.lock().unwrap_or_else(PoisonError::into_inner);
         Self::open(start, table, Some(turn))
     }
 
