@@ -144,7 +144,7 @@ fn arrow_steps_stop_at_range_ends() {
             }
             for component in std::iter::once(None).chain((0..row.components.len()).map(Some)) {
                 for (steps, times) in
-                    [(1.0, 10), (-1.0, 10), (0.1, 5), (-0.1, 5), (50.0, 100), (-50.0, 100)]
+                    [(1.0, 5), (-1.0, 5), (0.1, 3), (-0.1, 3), (50.0, 100), (-50.0, 100)]
                 {
                     let mut now = scene.clone();
                     for _ in 0..times {

@@ -7,7 +7,7 @@ use crate::dashboard::view::tests::states::{Named, STATES, tracing};
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(250))]
     #[test]
     fn every_state_draws_without_control_characters(
         width in 0u16..=300, height in 0u16..=100, state in 0..STATES.len(), colors in 0usize..4,
@@ -32,7 +32,7 @@ fn every_state_draws_at_threshold_sizes() {
     let draw = |states: &[Named]| {
         for (_, make) in states {
             for width in (0..46).chain([71, 72, 73, 99, 100]) {
-                for height in (width % 3..20).step_by(3) {
+                for height in (width % 5..20).step_by(5) {
                     let mut model = tracing([width, height]);
                     make(&mut model);
                     drawn(&model);
