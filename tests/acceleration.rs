@@ -17,8 +17,8 @@ fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
 #[test]
 fn shipped_scenes_are_equal_under_every_acceleration() {
     for (name, scene) in all_shipped() {
-        same(&name, &sized(scene.clone(), SIZE), Precision::Single, 5);
-        same(&name, &sized(scene, [24, 18]), Precision::Double, 5);
+        same(&name, &sized(scene.clone(), SIZE), Precision::Single, 3);
+        same(&name, &sized(scene, [24, 18]), Precision::Double, 3);
     }
 }
 

@@ -119,8 +119,8 @@ fn extreme_29_stopped_and_resumed() {
 }
 
 /// Checks that packets of one pixel and of several pixels trace the same samples. A wave is a set
-/// of concurrent tracing jobs. Waves of one sample make packets of several pixels; a wave of
-/// sixteen samples makes packets of one pixel.
+/// of concurrent tracing jobs. Waves of few samples make packets of several pixels; a wave of sixteen
+/// samples makes packets of one pixel.
 #[test]
 fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
     let pool = pool(2);
@@ -130,7 +130,7 @@ fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
         let scene = sized(scene, [18, 17]);
         for precision in PRECISIONS {
             let expected = film_of_samples(&scene, precision, 16).bytes();
-            for counts in [&[1u32; 16] as &[u32], &[1, 1, 2, 4, 8], &[8, 8], &[5, 11]] {
+            for counts in [&[1u32, 1, 2, 4, 8] as &[u32], &[5, 11]] {
                 let mut rendering = begin(&scene, SEED, precision);
                 let mut first = 0;
                 for count in counts {

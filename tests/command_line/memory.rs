@@ -39,7 +39,7 @@ fn regions_equal_the_picture_as_a_whole() {
         let picture = |name: &str| fs::read(desk.path(name)).unwrap();
         let args = ["render", "scene.toml", "-o", &whole, "--bits", bits];
         assert_eq!(desk.run(&[&args[..], &UNIFORM].concat()).status, 0);
-        for threads in ["1", "2", "5"] {
+        for threads in ["1", "5"] {
             let more = ["--bits", bits, "--threads", threads, "--stats", "stats.json"];
             let least = least(&desk, "scene.toml", &more);
             let mut counts = Vec::new();

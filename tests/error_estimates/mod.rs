@@ -256,11 +256,10 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     mean(outcomes.iter().map(|o| o.levels_ratio))
 }
 
-/// Compares estimated with true errors for both pixel filters and for 32, 128 and 512 samples per
-/// pixel.
+/// Compares estimated with true errors for both pixel filters and for 32 and 256 samples per pixel.
 fn assert_always_honest(adaptive: bool) {
     let filters = [Filter::Point, Filter::Box].into_iter();
-    let cases = filters.flat_map(|filter| [32, 128, 512].map(|spp| (filter, spp)));
+    let cases = filters.flat_map(|filter| [32, 256].map(|spp| (filter, spp)));
     let ratios: Vec<f64> = cases.map(|(f, spp)| assert_honest(f, adaptive, spp)).collect();
     let (low, high) = ratios.iter().fold((f64::INFINITY, 0f64), |(l, h), r| (l.min(*r), h.max(*r)));
     let sampling = if adaptive { "adaptive" } else { "uniform" };
@@ -301,7 +300,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
         picture(rendering, Replicates::Both).iter().flat_map(|rgb| display.levels(*rgb)).collect()
     };
     let mut reference = begin(&scene, 1000, Precision::Auto);
-    let reference_spp = 1408;
+    let reference_spp = 704;
     let stop = spp_stop(reference_spp);
     assert_eq!(follow(&mut reference, settings(true, 0, stop), &pool), StoppedBy::Spp);
     let own = reference.film.noise(&reference.weights, &display).unwrap().rmse_levels;
@@ -313,7 +312,7 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
         let stop = noise_stop(0.5);
         assert_eq!(follow(&mut rendering, settings(true, 0, stop), &pool), StoppedBy::Noise);
         let spp = rendering.film.samples() / (240 * 180);
-        assert!(64 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
+        assert!(32 * spp <= u64::from(reference_spp), "{spp} spp need a better reference");
         let got = levels(&rendering);
         let sum: f64 = got.iter().zip(&reference).map(|(g, r)| (g - r).powi(2)).sum();
         let achieved = (sum / got.len() as f64 - own * own).max(0.0).sqrt();

@@ -166,7 +166,7 @@ fn assert_honest(outcomes: &[Outcome]) {
 
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
-    let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 25, 35];
+    let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 15, 35];
     // A smaller noise target needs a reference with more samples.
     let reference_count = |number| (96.0 / target_of(number)) as u32;
     let outcomes = cheap.map(|number| examine(number, reference_count(number), 1, 1));
@@ -297,9 +297,10 @@ fn adaptive_mean_of_a_closed_room_is_unbiased() {
         let squares: f64 = means.iter().map(|m| (m - mean).powi(2)).sum();
         (mean, (squares / (seeds * (seeds - 1)) as f64).sqrt())
     };
-    // Uniform pictures have a smaller error, and take more time.
+    // Uniform pictures have a smaller error, and take more time. With 20 of them the standard error of
+    // the difference falls by a sixth only.
     let (adaptive, sigma) = mean_and_error(true, 16, 0, 48);
-    let (uniform, sigma_uniform) = mean_and_error(false, 64, 1000, 20);
+    let (uniform, sigma_uniform) = mean_and_error(false, 64, 1000, 8);
     let z = (adaptive - uniform) / sigma.hypot(sigma_uniform);
     println!(
         "adaptive {adaptive:.5} ± {sigma:.1e}, uniform {uniform:.5} ± {sigma_uniform:.1e}, z {z:.2}"

@@ -159,10 +159,10 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
 
 /// Checks random trees of set operations with at most 8 levels. Rays must enter and leave the solid
 /// alternately. A point between two hits must be inside or outside of the solid, as the set
-/// operations on the parts say. A hundred thousand rays are traced in each precision.
+/// operations on the parts say. Fifty thousand rays are traced in each precision.
 #[test]
 fn extreme_08_parity() {
-    check_parity(1_000);
+    check_parity(500);
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
 #[test]
 fn extreme_09_csg_algebra() {
     let mut most = 0;
-    let lines = lines(9, 20_000);
+    let lines = lines(9, 10_000);
     let mut numbers = Numbers::new(90);
     for n in 0..12 {
         let (a, b) = (random_solid(&mut numbers), random_solid(&mut numbers));

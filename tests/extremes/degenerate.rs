@@ -208,7 +208,7 @@ fn check_finite<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
     let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
-    let lines: Vec<Line> = (0..4_000).map(|_| any_line(&mut numbers, form)).collect();
+    let lines: Vec<Line> = (0..2_000).map(|_| any_line(&mut numbers, form)).collect();
     for (n, (line, hit)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
         let Some(hit) = hit else { continue };
         let context = || format!("{name}, {}, ray {n} of seed {seed}: {line:?} {hit:?}", L::NAME);

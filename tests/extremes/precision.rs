@@ -5,7 +5,7 @@
 
 use crate::harness::*;
 
-const SIZE: [u32; 2] = [24, 18];
+const SIZE: [u32; 2] = [20, 15];
 /// Picture size in pixels for scenes of a [`Family`].
 const FAMILY_SIZE: [u32; 2] = [32, 24];
 /// Number of samples per pixel in each replicate. Rounding diverts some paths, as often to one side

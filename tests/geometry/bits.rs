@@ -78,7 +78,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
 fn packets_and_single_rays_give_the_same_bits() {
     for (i, (name, form)) in forms().into_iter().enumerate() {
         let mut numbers = Numbers::new(100 + i as u64);
-        let lines: Vec<Line> = (0..4_000).map(|_| any_line(&mut numbers, &form)).collect();
+        let lines: Vec<Line> = (0..2_000).map(|_| any_line(&mut numbers, &form)).collect();
         let forms = [form];
         compare::<Single, f32>(&name, &forms, false, &lines);
         compare::<Double, f64>(&name, &forms, false, &lines);
@@ -94,7 +94,7 @@ fn packets_and_single_rays_agree_among_all_kinds() {
     let again: Vec<Form> = all.iter().filter(|f| f.bounds().is_some()).cloned().collect();
     all.extend(again);
     let mut numbers = Numbers::new(99);
-    let lines: Vec<Line> = (0..16_000)
+    let lines: Vec<Line> = (0..8_000)
         .map(|_| {
             let form = &all[numbers.below(all.len())];
             any_line(&mut numbers, form)

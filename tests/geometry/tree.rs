@@ -95,7 +95,7 @@ fn trees_boxes_and_lists_give_identical_hits() {
         let seed = seed as u64;
         let mut numbers = Numbers::new(seed);
         let forms = crowd(&mut numbers, count);
-        let rays = if count > 300 { 4_000 } else { 10_000 };
+        let rays = if count > 300 { 2_000 } else { 5_000 };
         let lines: Vec<Line> = (0..rays)
             .map(|_| {
                 if numbers.below(2) == 0 {

@@ -29,7 +29,7 @@ fn noise_estimate_after_light_change_is_accurate() {
     bright.lights[0].intensity = 2.5;
     bright.lights[1].intensity = 0.05;
     bright.ambient.color = Color([0.2, 0.1, 0.0]);
-    let mut other = new_session(2, 1000, spp_stop(16384), false);
+    let mut other = new_session(2, 1000, spp_stop(4096), false);
     finish(&mut other, &bright);
     let (reference, own) = levels(&other);
     let error = |picture: &[[f64; 3]]| {

@@ -176,7 +176,7 @@ fn closed_form_11_a_slab_with_all_orders() {
             )
         };
         let slab = object("box = { center = [0, 0, -2], size = [9, 9, 1] }");
-        let count = 1 << 13;
+        let count = 1 << 12;
         let orders = 1.0 - (f * a).powi(2);
         let expected = [(1.0 - f).powi(2) * a / orders, f + f * ((1.0 - f) * a).powi(2) / orders];
         let check = |all: Vec<Vector>| {

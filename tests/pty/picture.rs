@@ -104,11 +104,11 @@ fn shown_picture_matches_render() {
     let fixture = Fixture::with_room();
     let mut terminal = fixture.open(&["room.toml"], SIZE);
     wait_for_picture(&terminal);
-    restart_rendering(&mut terminal, 64);
+    restart_rendering(&mut terminal, 32);
     // The dashboard allocates samples by the displayed picture.
-    let args = ["room.toml", "--spp", "64", "--noise", "1e-9"];
+    let args = ["room.toml", "--spp", "32", "--noise", "1e-9"];
     let written = Picture::of_png(&fixture.rendered(&args, "room.png"));
-    let error = terminal.wait_for("the picture of 64 samples", |screen| {
+    let error = terminal.wait_for("the picture of 32 samples", |screen| {
         distance(screen, &room_layout(), &written).filter(|d| *d <= 0.01)
     });
     // A black picture, by contrast, has a large distance from the screen.
@@ -125,7 +125,7 @@ fn export_matches_render() {
     let fixture = Fixture::with_room();
     let mut terminal = fixture.open(&["room.toml"], SIZE);
     wait_for_picture(&terminal);
-    restart_rendering(&mut terminal, 64);
+    restart_rendering(&mut terminal, 32);
     terminal.send("p");
     terminal.wait_for_text("room-1.png");
     terminal.send("P");
@@ -136,7 +136,7 @@ fn export_matches_render() {
     assert_eq!(terminal.end().0, 0);
     // The dashboard distributes samples by the error of the displayed picture, also for linear
     // (EXR) files.
-    let args = ["room.toml", "--spp", "64", "--noise", "1e-9"];
+    let args = ["room.toml", "--spp", "32", "--noise", "1e-9"];
     for (exported, rendered) in [("room-1.png", "render.png"), ("room-1.exr", "render.exr")] {
         let expected = fixture.rendered(&args, rendered);
         assert!(fs::read(fixture.path(exported)).unwrap() == expected, "{exported} differs");

@@ -401,7 +401,7 @@ scene_tests!(samples, 16..24, many_samples, many(), matches_reference);
 // Compares scenes whose pictures are mostly empty. None of them needs a second comparison.
 scene_tests!(
     sparse_samples,
-    seeds_of(Layout::Sparse, 5..9),
+    seeds_of(Layout::Sparse, 5..8),
     many_sparse_samples,
     seeds_of(Layout::Sparse, many()),
     matches_reference

@@ -1,9 +1,9 @@
-//! Ten thousand random key and mouse events on three scenes. The model must stay valid, and it must
+//! Thousands of random key and mouse events on three scenes. The model must stay valid, and it must
 //! be possible to undo every edit.
 
 use super::*;
 
-const EVENTS: usize = 10_000;
+const EVENTS: usize = 6_000;
 /// Label of the command that quits the program.
 const QUIT: &str = "quit";
 
