@@ -127,14 +127,11 @@ fn check_frames<L: SimdFloat>(bound: f64) {
         }
     }
     assert!(worst > 0.0);
-    if L::WIDTH > 1 {
-        report(18, precision::<L>(), &format!("{worst:.0e}"));
-    }
+    report(18, precision::<L>(), &format!("{worst:.0e}"));
 }
 
 #[test]
 fn extreme_18_orthonormal_bases() {
     check_frames::<Double>(1e-15);
-    check_frames::<f64>(1e-15);
     check_frames::<Single>(1e-15 * (f64::from(f32::EPSILON) / f64::EPSILON));
 }

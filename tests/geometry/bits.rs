@@ -1,59 +1,52 @@
-//! Comparison of packets with vectors of width 1: their results must be equal in every bit.
+//! Comparison of packets with single rays, each in all lanes of a packet: their results must be equal
+//! in every bit.
 
 use crate::harness::*;
 pub use crate::harness::{any_line, forms};
 
-fn lane_of<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
-    v: Vec3<L>,
-    i: usize,
-) -> Vec3<S> {
-    let [x, y, z] = v.lane(i);
-    Vec3::new(x, y, z)
+/// Returns a vector whose lanes are all equal to lane `i` of `v`.
+fn repeated<L: SimdFloat>(v: Vec3<L>, i: usize) -> Vec3<L> {
+    let lane = v.lane(i);
+    Vec3::from_fn(|_| lane)
 }
 
 fn same(a: f64, b: f64) -> bool {
     a.to_bits() == b.to_bits()
 }
 
-fn same3<A: SimdFloat, B: SimdFloat>(a: Vec3<A>, b: Vec3<B>, lane: usize) -> bool {
+fn same3<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, lane: usize) -> bool {
     let (a, b) = (a.lane(lane).map(Float::to_f64), b.lane(0).map(Float::to_f64));
     (0..3).all(|i| same(a[i], b[i]))
 }
 
-/// Compares packets of the SIMD type `L` with single rays of its scalar type `S`. Both intersect an
-/// aggregate (list, or BVH if `tree` is `true`) of all `forms`.
-fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
-    name: &str,
-    forms: &[Form],
-    tree: bool,
-    lines: &[Line],
-) {
-    let wide = Aggregate::<L>::with_tree(forms, tree);
-    let narrow = Aggregate::<S>::with_tree(forms, tree);
+/// Compares packets of the SIMD type `L` with single rays. Both intersect an aggregate (list, or BVH
+/// if `tree` is `true`) of all `forms`.
+fn compare<L: SimdFloat>(name: &str, forms: &[Form], tree: bool, lines: &[Line]) {
+    let geometry = Aggregate::<L>::with_tree(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
-        let hit = wide.closest(&packet, wide.all());
+        let hit = geometry.closest(&packet, geometry.all());
         let hit_mask = hit.t.lt(L::from_f64(L::MAX));
-        let packet_surface = surface(&wide, &packet, &hit);
-        let limit = 2.0;
-        let occluded = wide.occluded(&packet, L::from_f64(limit), L::mask(true), wide.all());
+        let packet_surface = surface(&geometry, &packet, &hit);
+        let (limit, all) = (L::from_f64(2.0), L::mask(true));
+        let occluded = geometry.occluded(&packet, limit, all, geometry.all());
         for i in 0..count {
-            let ray =
-                Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
-            let ray_hit = narrow.closest(&ray, narrow.all());
+            let (origin, direction) = (repeated(packet.origin, i), repeated(packet.direction, i));
+            let ray = Ray { origin, direction };
+            let ray_hit = geometry.closest(&ray, geometry.all());
             let context = || {
                 format!(
-                    "{name}, {} against {}, tree {tree}: ray {} of the seed: {ray:?}: {:?}, not {:?}",
+                    "{name}, {}, tree {tree}: ray {} of the seed: {:?}, {:?}: {:?}, not {:?}",
                     L::NAME,
-                    S::NAME,
                     n * L::WIDTH + i,
+                    origin.lane(0),
+                    direction.lane(0),
                     hit.t.lane(i),
-                    ray_hit.t
+                    ray_hit.t.lane(0)
                 )
             };
             assert!(same(hit.t.lane(i).to_f64(), ray_hit.t.lane(0).to_f64()), "{}", context());
-            let limit = <S as SimdFloat>::from_f64(limit);
-            let b = narrow.occluded(&ray, limit, S::mask(true), narrow.all()).any();
-            assert!(occluded.lane(i) == b, "occluded: {}", context());
+            let alone = geometry.occluded(&ray, limit, all, geometry.all());
+            assert!(occluded.lane(i) == alone.lane(0), "occluded: {}", context());
             if !hit_mask.lane(i) {
                 continue;
             }
@@ -62,7 +55,7 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
                 "primitive: {}",
                 context()
             );
-            let s = surface(&narrow, &ray, &ray_hit);
+            let s = surface(&geometry, &ray, &ray_hit);
             let equal = same3(packet_surface.point, s.point, i)
                 && same3(packet_surface.normal, s.normal, i)
                 && same(
@@ -80,8 +73,8 @@ fn packets_and_single_rays_give_the_same_bits() {
         let mut numbers = Numbers::new(100 + i as u64);
         let lines: Vec<Line> = (0..2_000).map(|_| any_line(&mut numbers, &form)).collect();
         let forms = [form];
-        compare::<Single, f32>(&name, &forms, false, &lines);
-        compare::<Double, f64>(&name, &forms, false, &lines);
+        compare::<Single>(&name, &forms, false, &lines);
+        compare::<Double>(&name, &forms, false, &lines);
     }
 }
 
@@ -101,7 +94,7 @@ fn packets_and_single_rays_agree_among_all_kinds() {
         })
         .collect();
     for tree in [false, true] {
-        compare::<Single, f32>("all kinds", &all, tree, &lines);
-        compare::<Double, f64>("all kinds", &all, tree, &lines);
+        compare::<Single>("all kinds", &all, tree, &lines);
+        compare::<Double>("all kinds", &all, tree, &lines);
     }
 }

@@ -22,7 +22,7 @@ fn transformed_objects_are_hit_at_images_of_original_hits() {
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let mut numbers = Numbers::new(400 + i as u64);
         let flat = form.is_flat();
-        let original = Aggregate::<f64>::new(std::slice::from_ref(&form));
+        let original = Aggregate::<Double>::new(std::slice::from_ref(&form));
         for round in 0..20 {
             let map = random_map(&mut numbers);
             let back = map.inverse();

@@ -148,7 +148,6 @@ fn check_half_spaces(number: usize, lobe: Lobe, cases: impl IntoIterator<Item = 
         let spread = spread_of(lobe, roughness);
         let n = tilted_normal();
         let all = edges(&spread, n, reach, reach, 60);
-        worst[0] = worst[0].max(worst_z::<f64>(lobe, roughness, n, &all));
         worst[0] = worst[0].max(worst_z::<Double>(lobe, roughness, n, &all));
         let z_axis = if roughness < 1e-2 { [0.0, 0.0, 1.0] } else { n };
         let all = edges(&spread, z_axis, reach, reach, 60);
@@ -210,7 +209,6 @@ fn closed_form_05_density_of_the_square() {
 /// loses the fraction that the closed form gives.
 #[test]
 fn extreme_21_lobe_at_the_horizon() {
-    horizon::<f64>(1e-12);
     horizon::<Double>(1e-12);
     horizon::<Single>(1e-6);
 }
@@ -264,8 +262,6 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             assert!((dot(mirror, n) - delta.sin()).abs() < 1e-12);
         }
     }
-    if L::WIDTH > 1 {
-        let words = format!("folded {worst:.0e} off, absorbed {worst_z:.1} sigma at most");
-        report(21, precision::<L>(), &words);
-    }
+    let words = format!("folded {worst:.0e} off, absorbed {worst_z:.1} sigma at most");
+    report(21, precision::<L>(), &words);
 }

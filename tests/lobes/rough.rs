@@ -297,6 +297,6 @@ fn check_evaluation<L: SimdFloat>(tolerance: f64) {
 
 #[test]
 fn value_of_an_interface_is_weight_times_density() {
-    check_evaluation::<f64>(1e-9);
-    check_evaluation::<f32>(2e-3);
+    check_evaluation::<Double>(1e-9);
+    check_evaluation::<Single>(2e-3);
 }

@@ -76,9 +76,7 @@ fn nets<L: SimdFloat>() {
 
 #[test]
 fn scrambled_sets_remain_nets() {
-    nets::<f64>();
     nets::<Double>();
-    nets::<f32>();
     nets::<Single>();
 }
 

@@ -73,10 +73,10 @@ fn check_slab<L: SimdFloat>() -> f64 {
 
 #[test]
 fn extreme_27_slab_displacement() {
-    let double = check_slab::<f64>();
+    let double = check_slab::<Double>();
     assert!(double <= 1e-10, "{double}");
     report(27, "double", &format!("{double:.0e} t off at most"));
-    let single = check_slab::<f32>();
+    let single = check_slab::<Single>();
     assert!(single <= 1.5e-3, "{single}");
     report(27, "single", &format!("{single:.0e} t off at most"));
 }
