@@ -6,8 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use zerkalo_scene::asset::{Assets, LoadProgress};
 
-/// Length of a file in bytes, and triangles of a mesh, above which loading is reported.
-const LARGE: (u64, usize) = (8 << 20, 200_000);
+/// Length of a file above which reading is reported.
+const LARGE_FILE_BYTES: u64 = 8 << 20;
+/// Number of triangles of a mesh above which building its BVH is reported.
+const LARGE_MESH_TRIANGLES: usize = 200_000;
 
 /// Asset cache that reports large files on stderr, if that is a terminal.
 pub struct LoadReporter {
@@ -21,8 +23,8 @@ impl LoadReporter {
         let is_enabled = enabled.clone();
         let report = move |stage: &LoadProgress| {
             let large = match stage {
-                LoadProgress::Reading { bytes, .. } => *bytes >= LARGE.0,
-                LoadProgress::Building { triangles, .. } => *triangles >= LARGE.1,
+                LoadProgress::Reading { bytes, .. } => *bytes >= LARGE_FILE_BYTES,
+                LoadProgress::Building { triangles, .. } => *triangles >= LARGE_MESH_TRIANGLES,
             };
             if large && is_enabled.load(Ordering::Relaxed) {
                 warn(&stage.to_string());
