@@ -214,7 +214,8 @@ fn keys_wait_for_one_frame_only() {
         work
     });
     let mut numbers = 0x2545_f491_u32;
-    for (rate, round_trip, limit) in [(RATE, 100, 0.25), (32e3, 300, 0.48)] {
+    // The measured rate of a slow connection takes more keys to settle.
+    for (rate, round_trip, keys, limit) in [(RATE, 100, 24, 0.25), (32e3, 300, 40, 0.48)] {
         for mode in [AckClocked(None), SendQueue] {
             let round_trip = Duration::from_millis(round_trip);
             let mut connection = Connection::with_mode(SCREEN, rate, round_trip, mode);
@@ -224,14 +225,14 @@ fn keys_wait_for_one_frame_only() {
             };
             connection.pass(&target(0), Duration::from_secs(20));
             let mut latencies = Vec::new();
-            for key in 1..41 {
+            for key in 1..=keys {
                 latencies.push(connection.press(&target(key - 1), &target(key)).as_secs_f64());
                 numbers = numbers.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
                 let pause = 250 + u64::from(numbers >> 23);
                 connection.pass(&target(key), Duration::from_millis(pause));
             }
             latencies.sort_by(f64::total_cmp);
-            let [median, p95] = [latencies[20], latencies[38]];
+            let [median, p95] = [latencies.len() / 2, latencies.len() - 2].map(|at| latencies[at]);
             let found = connection.flow.reading().unwrap().rate;
             let what = format!(
                 "{mode:?}, {rate} B/s, {round_trip:?}: median {median:.3} s, p95 {p95:.3} s, rate {found:.0}"
