@@ -88,7 +88,8 @@ impl Format {
     }
 }
 
-/// Channel of the render that the picture's panel shows.
+/// Contents of the picture's panel: a channel of the live render, or a comparison with a pinned
+/// picture, which the user has stored earlier.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
     /// Rendered picture.
@@ -104,11 +105,14 @@ pub enum DisplayChannel {
     Normals,
     /// Distance of the first hits from the eye.
     Depth,
+    Pinned,
+    /// Live picture minus the pinned one, in false colour.
+    Difference,
 }
 
 impl DisplayChannel {
-    /// All channels, in the order in which a key cycles through them.
-    pub const ALL: [Self; 6] =
+    /// Channels of the live render, in the order in which a key cycles through them.
+    pub const LIVE: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
 
     /// Channels that need a film but no scene.
@@ -122,6 +126,8 @@ impl DisplayChannel {
             Self::Objects => "objects",
             Self::Normals => "normals",
             Self::Depth => "depth",
+            Self::Pinned => "pinned picture",
+            Self::Difference => "live − pinned",
         }
     }
 }

@@ -31,7 +31,7 @@ use editor::Editor;
 use key_context::KeyContext;
 use layout::{BORDER, Focus, Layout};
 use message::{DisplayChannel, Effect, Exported, Format, Message, OrphanedEdits};
-use model::{CompareView, Drag, FieldList, Mode, Model, WatchTable, short_name};
+use model::{Drag, FieldList, Mode, Model, WatchTable, short_name};
 use overlay::{Answer, Form, Overlay, Pick, PickEntry, Prompt, Question, ViewedImage};
 use panel_lines::{FieldLine, ListCursor, OutlineEntry, OutlineLine, PanelLine};
 use update::UpdateContext;

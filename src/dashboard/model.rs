@@ -70,24 +70,6 @@ impl FieldList {
     }
 }
 
-/// Comparison of the live picture with a pinned one, which the user has stored earlier.
-#[derive(Clone, Debug, Default)]
-pub struct Comparison {
-    /// Pinned picture and its mean number of samples per pixel.
-    pub pinned: Option<(Arc<LinearImage>, f64)>,
-    pub shown: CompareView,
-}
-
-/// Picture that is visible in a comparison.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CompareView {
-    #[default]
-    Live,
-    Pinned,
-    /// Live picture minus the pinned one, in false colour.
-    Difference,
-}
-
 /// Kind of a notice, which determines its mark and colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
@@ -159,7 +141,8 @@ pub struct Model {
     /// Exposure and tone curve.
     pub display: Display,
     pub channel: DisplayChannel,
-    pub comparison: Comparison,
+    /// Pinned picture and its mean number of samples per pixel.
+    pub pinned: Option<(Arc<LinearImage>, f64)>,
     /// Film pixel (column, row) of the pixel probe.
     pub probe: Option<[usize; 2]>,
     /// Latest snapshot of the session.

@@ -2,7 +2,7 @@
 
 use super::*;
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::model::{Colors, CompareView, Mode};
+use zerkalo::dashboard::model::{Colors, Mode};
 use zerkalo_scene::camera::Focus as LensFocus;
 
 const BALL: Target = Target::Object(1);
@@ -308,12 +308,12 @@ fn picture_stories() -> Vec<Story> {
         fine("probe right by one pixel", "i Shift-Right", [33, 24]),
         fine("probe up by one pixel", "i Shift-Up", [32, 23]),
         fine("probe down by one pixel", "i Shift-Down", [32, 25]),
-        story("pin this picture", "k", |_, d| d.model.comparison.pinned.is_some()),
+        story("pin this picture", "k", |_, d| d.model.pinned.is_some()),
         story("flip between pinned and live", "k c", |_, d| {
-            d.model.comparison.shown == CompareView::Pinned
+            d.model.channel == DisplayChannel::Pinned
         }),
         story("difference of pinned and live", "k C", |_, d| {
-            d.model.comparison.shown == CompareView::Difference
+            d.model.channel == DisplayChannel::Difference
         }),
         story("pause or resume", "Space", |_, d| d.model.paused),
         story("restart the picture", "R", |_, d| d.asked(|e| *e == Effect::Restart)),

@@ -2,7 +2,7 @@
 
 use crate::dashboard::key_context::KeyContext::{self, *};
 use crate::dashboard::update::{BACK, DOWN, FORWARD, LEFT, RIGHT, UP};
-use crate::dashboard::{CompareView, Effect, Format, Mode, Model, Overlay, UpdateContext};
+use crate::dashboard::{DisplayChannel, Effect, Format, Mode, Model, Overlay, UpdateContext};
 use HintLine as H;
 use zerkalo_terminal::event::Key;
 
@@ -249,8 +249,8 @@ pub static COMMANDS: &[Command] = &[
     command("picture", "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe_by_pixel(UP)).available(viewing),
     command("picture", "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe_by_pixel(DOWN)).available(viewing),
     command("picture", "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).available(viewing).hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
-    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).available(viewing),
-    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).available(viewing),
+    command("picture", "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(DisplayChannel::Pinned)).available(viewing),
+    command("picture", "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(DisplayChannel::Difference)).available(viewing),
 
     command("rendering", "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command("rendering", "restart the picture", &[(Anywhere, "R")], |c| c.restart()),

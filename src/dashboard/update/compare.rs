@@ -1,7 +1,7 @@
 //! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison.
 
 use crate::dashboard::update::{Direction, cycled};
-use crate::dashboard::{CompareView, DisplayChannel, Effect, Mode, UpdateContext};
+use crate::dashboard::{DisplayChannel, Effect, Mode, UpdateContext};
 use std::sync::Arc;
 use zerkalo_render::film::{LinearImage, Tone};
 
@@ -39,7 +39,7 @@ impl UpdateContext<'_> {
         let current = |channel: &DisplayChannel| *channel == self.model.channel;
         let channels = match self.model.watch {
             Some(_) => &DisplayChannel::OF_FILM[..],
-            None => &DisplayChannel::ALL,
+            None => &DisplayChannel::LIVE,
         };
         self.model.channel = *cycled(channels, current, by);
         self.repaint();
@@ -86,20 +86,20 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn pinned(&mut self, picture: Arc<LinearImage>, spp: f64) {
-        self.model.comparison.pinned = Some((picture, spp));
+        self.model.pinned = Some((picture, spp));
         self.repaint();
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Shows `what`, the pinned picture or its difference from the live one. If `what` is shown
+    /// Shows `channel`, the pinned picture or its difference from the live one. If it is shown
     /// already, shows the live picture.
-    pub(super) fn compare(&mut self, what: CompareView) {
-        if self.model.comparison.pinned.is_none() {
+    pub(super) fn compare(&mut self, channel: DisplayChannel) {
+        if self.model.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");
             return;
         }
-        let shown = &mut self.model.comparison.shown;
-        *shown = if *shown == what { CompareView::Live } else { what };
+        let is_shown = self.model.channel == channel;
+        self.model.channel = if is_shown { DisplayChannel::Beauty } else { channel };
         self.repaint();
     }
 }

@@ -1,7 +1,7 @@
 //! Focus and modes.
 
 use crate::dashboard::update::cycled;
-use crate::dashboard::{CompareView, Focus, Mode, UpdateContext};
+use crate::dashboard::{DisplayChannel, Focus, Mode, UpdateContext};
 use zerkalo_scene::edit;
 
 impl UpdateContext<'_> {
@@ -36,8 +36,8 @@ impl UpdateContext<'_> {
             self.model.focus = Focus::Picture;
         } else if self.model.fullscreen {
             self.toggle_fullscreen();
-        } else if self.model.comparison.shown != CompareView::Live {
-            self.model.comparison.shown = CompareView::Live;
+        } else if !DisplayChannel::LIVE.contains(&self.model.channel) {
+            self.model.channel = DisplayChannel::Beauty;
             self.repaint();
         }
     }

@@ -4,7 +4,7 @@ use crate::dashboard::text::{cut, number};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::legend::Legend;
 use crate::dashboard::view::painter::Painter;
-use crate::dashboard::{CompareView, DisplayChannel, Focus, Layout, Mode, Model};
+use crate::dashboard::{DisplayChannel, Focus, Layout, Mode, Model};
 use ratatui::style::Modifier;
 use zerkalo_render::film::Tone;
 
@@ -41,18 +41,17 @@ pub fn draw(model: &Model, layout: &Layout, legend: Option<&Legend>, painter: &m
     }
 }
 
-/// Returns the texts in the upper border: the channel or comparison, the exposure and the tone
-/// curve, each unless it is the default. A text with `true` is emphasised.
+/// Returns the texts in the upper border: the channel, the exposure and the tone curve, each unless
+/// it is the default. A text with `true` is emphasised.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
-    match (model.comparison.shown, model.channel) {
-        (CompareView::Pinned, _) => {
-            let spp = model.comparison.pinned.as_ref().map_or(0.0, |(_, spp)| *spp);
-            chips.push((format!("pinned picture, {spp:.0} spp"), true));
+    let name = model.channel.name();
+    match (model.channel, &model.pinned) {
+        (DisplayChannel::Beauty, _) => {}
+        (DisplayChannel::Pinned, Some((_, spp))) => {
+            chips.push((format!("{name}, {spp:.0} spp"), true));
         }
-        (CompareView::Difference, _) => chips.push(("live − pinned".to_string(), true)),
-        (CompareView::Live, DisplayChannel::Beauty) => {}
-        (CompareView::Live, channel) => chips.push((channel.name().to_string(), true)),
+        _ => chips.push((name.to_string(), true)),
     }
     let exposure = model.display.exposure_ev;
     if exposure != 0.0 {

@@ -50,7 +50,7 @@ impl View {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
             let settled = picture::is_settled(model);
-            let raster = self.imager.raster(model, layout.raster);
+            let raster = self.imager.raster(model, layout.raster).unwrap_or_default();
             self.picture = picture_cells(&raster, model.colors, settled);
             self.made_for = Some(version);
         }

@@ -5,9 +5,7 @@ use crate::dashboard::text::columns;
 use crate::dashboard::view::false_color::object_color;
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{ListRow, Painter, VisibleLine};
-use crate::dashboard::{
-    BORDER, CompareView, DisplayChannel, Focus, Layout, Model, OutlineEntry, OutlineLine,
-};
+use crate::dashboard::{BORDER, DisplayChannel, Focus, Layout, Model, OutlineEntry, OutlineLine};
 use zerkalo_scene::edit::Target;
 
 pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
@@ -18,8 +16,7 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
     let inner = area.inner(BORDER);
     let lines = outline(model.scene());
     // The picture then shows the objects in the colours of these marks.
-    let with_ids =
-        model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
+    let with_ids = model.channel == DisplayChannel::Objects;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
     for VisibleLine { row, index } in painter.window(inner, scroll, lines.len(), border) {
         match &lines[index] {

@@ -2,7 +2,7 @@
 
 use crate::dashboard::view::false_color::{NO_HIT, Scale, difference, normal_color, object_color};
 use crate::dashboard::view::legend::Legend;
-use crate::dashboard::{CompareView, DisplayChannel, Model, Overlay};
+use crate::dashboard::{DisplayChannel, Model, Overlay};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use std::sync::Arc;
@@ -36,32 +36,16 @@ pub fn is_settled(model: &Model) -> bool {
     let resting = |s: &Snapshot| matches!(s.report.state, State::Finished(_) | State::Paused);
     model.watch.is_some()
         || model.snapshot.as_ref().is_some_and(|s| resting(s))
-        || model.comparison.shown == CompareView::Pinned
+        || model.channel == DisplayChannel::Pinned
 }
 
 impl PictureView {
-    /// Returns the selected channel or comparison in `size` half cells, or an empty raster if its
-    /// data are missing.
-    pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
+    /// Returns the selected channel in `size` half cells, or `None` if its data are missing.
+    pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         self.legend = None;
-        let raster = match (model.comparison.shown, model.channel) {
-            (CompareView::Pinned, _) => {
-                self.pinned(model, size).map(|pinned| displayed(pinned, &model.display, size))
-            }
-            (CompareView::Difference, _) => self.difference(model, size),
-            (CompareView::Live, channel) => self.live(model, channel, size),
-        };
-        raster.unwrap_or_default()
-    }
-
-    /// Returns the raster of a channel of the latest snapshot.
-    fn live(&mut self, model: &Model, channel: DisplayChannel, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
-        match channel {
-            DisplayChannel::Beauty => {
-                let (radiance, from) = live_radiance(model, snapshot)?;
-                Some(resized(displayed(&radiance, &model.display, from), size))
-            }
+        match model.channel {
+            DisplayChannel::Beauty => beauty(model, snapshot, size),
             DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_levels;
                 self.tiles(model, snapshot, "8-bit levels of noise", size, noise)
@@ -80,6 +64,8 @@ impl PictureView {
                 self.legend = Some(Legend::magnitude(scale, "from the eye"));
                 hit_colors(snapshot, size, |hit| scale.color(hit.depth.into()))
             }
+            DisplayChannel::Pinned => self.pinned(model, size),
+            DisplayChannel::Difference => self.difference(model, snapshot, size),
         }
     }
 
@@ -113,24 +99,27 @@ impl PictureView {
         })
     }
 
-    fn pinned(&mut self, model: &Model, size: [usize; 2]) -> Option<&[[f32; 3]]> {
-        let (picture, _) = model.comparison.pinned.as_ref()?;
+    fn pinned(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
+        let (picture, _) = model.pinned.as_ref()?;
         let same =
             |cached: &PinnedCache| Arc::ptr_eq(&cached.picture, picture) && cached.size == size;
         if !self.pinned.as_ref().is_some_and(same) {
             let radiance = picture.resampled(size[0], size[1]);
             self.pinned = Some(PinnedCache { picture: Arc::clone(picture), size, radiance });
         }
-        self.pinned.as_ref().map(|cached| &*cached.radiance)
+        self.pinned.as_ref().map(|cached| displayed(&cached.radiance, &model.display, size))
     }
 
     /// Returns a raster of the difference in luma, live minus pinned, in false colour. The scale
     /// ends at the largest difference, rounded up by [`round_up`].
-    fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
-        let snapshot = model.snapshot.as_deref()?;
-        let (live, from) = live_radiance(model, snapshot)?;
-        let live = resized(displayed(&live, &model.display, from), size);
-        let pinned = displayed(self.pinned(model, size)?, &model.display, size);
+    fn difference(
+        &mut self,
+        model: &Model,
+        snapshot: &Snapshot,
+        size: [usize; 2],
+    ) -> Option<Raster> {
+        let live = beauty(model, snapshot, size)?;
+        let pinned = self.pinned(model, size)?;
         let (mut squares, mut largest) = (0.0, 0.0f64);
         let mut lumas = Vec::with_capacity(live.pixels.len());
         for (live, pinned) in live.pixels.iter().zip(&pinned.pixels) {
@@ -155,13 +144,13 @@ fn round_up(value: f64) -> f64 {
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// Returns linear radiance and size of the latest picture, with the present weights of the light
-/// groups.
-fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
+/// Returns the latest picture, with the present weights of the light groups.
+fn beauty(model: &Model, snapshot: &Snapshot, size: [usize; 2]) -> Option<Raster> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
-    let mixed = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
-    Some((mixed, [picture.cols, picture.rows]))
+    let radiance = picture.mixed(newest.as_ref().unwrap_or(&snapshot.weights));
+    let live = displayed(&radiance, &model.display, [picture.cols, picture.rows]);
+    Some(resized(live, size))
 }
 
 /// Returns a raster of the first hits in the colours `color`, and [`NO_HIT`] for rays without a

@@ -6,7 +6,7 @@ use crate::dashboard::testing::mirror_room;
 use crate::dashboard::testing::report;
 use crate::dashboard::update::update;
 use crate::dashboard::{
-    CompareView, DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode, Model,
+    DisplayChannel, Editor, FieldList, Focus, Form, ListCursor, Message, Mode, Model,
     OrphanedEdits, Overlay, PanelLine, Prompt,
 };
 use std::sync::Arc;
@@ -266,7 +266,7 @@ pub const STATES: &[Named] = &[
     ("noise", |m| m.channel = DisplayChannel::Noise),
     ("samples", |m| m.channel = DisplayChannel::Samples),
     ("objects", |m| m.channel = DisplayChannel::Objects),
-    ("pinned", |m| m.comparison.shown = CompareView::Pinned),
+    ("pinned", |m| m.channel = DisplayChannel::Pinned),
     ("fullscreen", |m| m.fullscreen = true),
     ("notice", |m| {
         notice(
