@@ -16,11 +16,16 @@ pub struct ListCursor {
 }
 
 impl ListCursor {
-    /// Moves the cursor by `steps` in a list of `len` entries, and scrolls so that the entry under
-    /// the cursor is among the `rows` visible ones.
-    pub fn walk(&mut self, steps: isize, len: usize, rows: usize) {
+    /// Moves the cursor by `steps` in a list of `len` entries.
+    pub fn walk(&mut self, steps: isize, len: usize) {
         self.index = self.index.saturating_add_signed(steps).min(len.saturating_sub(1));
-        self.scroll = scrolled(self.scroll, self.index, len, rows);
+    }
+
+    /// Scrolls a list of `len` entries so that the entry under the cursor is among the `rows`
+    /// visible ones.
+    pub fn follow(&mut self, len: usize, rows: usize) {
+        self.walk(0, len);
+        self.scroll = scrolled(self.scroll, Some(self.index), len, rows);
     }
 }
 
@@ -174,33 +179,27 @@ impl Model {
     }
 }
 
-/// Returns the index of the first line from `wanted` on that has a property, otherwise of the last
-/// such line before it. Returns 0 if no line has a property.
-pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
-    let field = |i: &usize| lines[*i].entry().is_some();
-    (wanted..lines.len())
-        .find(field)
-        .or_else(|| (0..lines.len().min(wanted)).rev().find(field))
-        .unwrap_or(0)
-}
-
-/// Returns the index to which the cursor moves by `steps` lines, downwards if positive. Headings
-/// are not counted.
-pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
-    let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].entry().is_some()).collect();
-    let position =
-        fields.iter().position(|i| *i >= cursor).unwrap_or(fields.len().saturating_sub(1));
-    let to = position.saturating_add_signed(steps).min(fields.len().saturating_sub(1));
-    fields.get(to).copied().unwrap_or(0)
+/// Returns the index to which the cursor moves by `steps` entries, downwards if positive. Headings
+/// are not counted: from a heading, or from beyond the end, the cursor first moves to the next
+/// entry, or else to the last. Returns 0 if there are no entries.
+pub fn walked<T>(lines: &[ListLine<T>], cursor: usize, steps: isize) -> usize {
+    let entries: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].entry().is_some()).collect();
+    let last = entries.len().saturating_sub(1);
+    let position = entries.iter().position(|i| *i >= cursor).unwrap_or(last);
+    entries.get(position.saturating_add_signed(steps).min(last)).copied().unwrap_or(0)
 }
 
 /// Returns the index of the first visible line in a list of `len` lines, of which `rows` are
 /// visible. It is the index closest to the present one, `scroll`, at which the line `cursor` is
-/// visible, and also the line above it if `rows` is greater than 2.
-pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
-    let lowest = (cursor + 1).saturating_sub(rows);
-    let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };
-    scroll.clamp(lowest.min(highest), highest).min(len.saturating_sub(rows))
+/// visible, and also the line above it if `rows` is greater than 2. Without `cursor`, any line may
+/// be the first.
+pub fn scrolled(scroll: usize, cursor: Option<usize>, len: usize, rows: usize) -> usize {
+    let following = |cursor: usize| {
+        let lowest = (cursor + 1).saturating_sub(rows);
+        let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };
+        scroll.clamp(lowest.min(highest), highest)
+    };
+    cursor.map_or(scroll, following).min(len.saturating_sub(rows))
 }
 
 #[cfg(test)]
@@ -238,13 +237,13 @@ mod tests {
         let scene = mirror_room();
         let lines = inspector(&scene, &Target::Object(2));
         let heading = lines.iter().position(|l| l.entry().is_none()).unwrap();
-        assert_eq!(walk_fields(&lines, heading - 1, 1), heading + 1);
-        assert_eq!(walk_fields(&lines, heading + 1, -1), heading - 1);
-        assert_eq!(walk_fields(&lines, 0, -5), 0);
-        assert_eq!(walk_fields(&lines, 0, 1000), lines.len() - 1);
-        assert_eq!(nearest_field(&lines, heading), heading + 1);
-        assert_eq!(nearest_field(&lines, 1000), lines.len() - 1);
-        assert_eq!((walk_fields(&[], 3, 1), nearest_field(&[], 3)), (0, 0));
+        assert_eq!(walked(&lines, heading - 1, 1), heading + 1);
+        assert_eq!(walked(&lines, heading + 1, -1), heading - 1);
+        assert_eq!(walked(&lines, 0, -5), 0);
+        assert_eq!(walked(&lines, 0, 1000), lines.len() - 1);
+        assert_eq!(walked(&lines, heading, 0), heading + 1);
+        assert_eq!(walked(&lines, 1000, 0), lines.len() - 1);
+        assert_eq!(walked::<()>(&[], 3, 1), 0);
     }
 
     #[test]
@@ -253,7 +252,7 @@ mod tests {
             for len in 1..30 {
                 let mut scroll = 0;
                 for cursor in (0..len).chain((0..len).rev()) {
-                    scroll = scrolled(scroll, cursor, len, rows);
+                    scroll = scrolled(scroll, Some(cursor), len, rows);
                     let seen = scroll <= cursor && cursor < scroll + rows.max(1);
                     assert!(seen || rows == 0, "{cursor} of {len} in {rows} from {scroll}");
                     assert!(scroll + rows <= len.max(rows));

@@ -1,6 +1,6 @@
 //! Commands on the properties in the inspector and in forms.
 
-use crate::dashboard::panel_lines::walk_fields;
+use crate::dashboard::panel_lines::walked;
 use crate::dashboard::update::Coalesce;
 use crate::dashboard::{Editor, FieldLine, Overlay, UpdateContext};
 use zerkalo_scene::edit::{self, Edit, EditError, Widget};
@@ -14,7 +14,7 @@ impl UpdateContext<'_> {
     pub(super) fn move_field_cursor(&mut self, steps: isize) {
         let lines = self.model.field_lines();
         let cursor = &mut self.model.field_list_mut().cursor;
-        *cursor = walk_fields(&lines, *cursor, steps);
+        *cursor = walked(&lines, *cursor, steps);
     }
 
     /// Returns the line under the cursor of the open form or inspector; `None` for a heading.

@@ -1,6 +1,6 @@
 //! Commands that move the cursor and open the entry under it, in panels and overlays.
 
-use crate::dashboard::panel_lines::{outline, outline_position};
+use crate::dashboard::panel_lines::{outline, outline_position, walked};
 use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::dashboard::{
     Answer, Editor, Focus, ListCursor, OutlineLine, Overlay, Pick, PickEntry, Question,
@@ -15,8 +15,6 @@ use zerkalo_render::session::QUALITIES;
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
     pub(super) fn move_cursor(&mut self, steps: isize) {
-        let list = self.model.overlay_layout().map(|layout| layout.list);
-        let rows = list.map_or(1, |list| usize::from(list.height));
         match &mut self.model.overlay {
             Some(Overlay::Form(_)) => {
                 if self.apply_field() {
@@ -25,7 +23,7 @@ impl UpdateContext<'_> {
             }
             Some(overlay) => {
                 if let Some((at, len)) = overlay.list() {
-                    at.walk(steps, len, rows);
+                    at.walk(steps, len);
                 }
             }
             None if self.model.watch.is_some() => self.move_watch_cursor(steps),
@@ -50,11 +48,9 @@ impl UpdateContext<'_> {
 
     fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
-        let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let position = lines[..before].iter().filter_map(OutlineLine::entry).count();
-        let entries: Vec<_> = lines.iter().filter_map(OutlineLine::entry).collect();
-        let position = position.saturating_add_signed(steps).min(entries.len().saturating_sub(1));
-        if let Some(entry) = entries.get(position) {
+        let position = outline_position(&lines, &self.model.selection).unwrap_or(0);
+        if let Some(entry) = lines.get(walked(&lines, position, steps)).and_then(OutlineLine::entry)
+        {
             self.select(entry.subject.clone());
         }
     }
@@ -139,7 +135,6 @@ impl UpdateContext<'_> {
         let found = (0..entries.len()).collect();
         let at = ListCursor { index, scroll: 0 };
         self.model.overlay = Some(Overlay::Pick(Pick { title, entries, editor, found, at, take }));
-        self.move_cursor(0);
     }
 
     /// Updates the open list to the entries that match the search text, best match first.

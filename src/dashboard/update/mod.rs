@@ -19,9 +19,10 @@ mod render;
 mod watch;
 
 use crate::dashboard::model::{Notice, Tone};
-use crate::dashboard::panel_lines::{nearest_field, outline, outline_position, scrolled};
-use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
+use crate::dashboard::panel_lines::{outline, outline_position, scrolled, walked};
+use crate::dashboard::{Effect, FieldList, Message, Model, Overlay, WatchTable};
 use files::capital;
+use ratatui::layout::Rect;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
@@ -272,39 +273,35 @@ impl UpdateContext<'_> {
             self.show_view();
             self.repaint();
         }
-        if self.model.watch.is_some() {
-            self.move_watch_cursor(0);
-            return;
-        }
-        self.normalize_panels();
+        self.normalize_lists();
         self.autosave();
     }
 
-    /// Limits cursors and scroll positions to the existing lines.
-    fn normalize_panels(&mut self) {
-        let (lines, follow) = (self.model.field_lines(), self.follow);
-        let area = match self.in_form() {
-            true => self.model.overlay_layout().map(|layout| layout.list),
-            false => self.model.inspector_rows().map(|(rows, _)| rows),
-        };
-        let rows = area.map_or(0, |area| usize::from(area.height));
-        let FieldList { cursor, scroll, .. } = self.model.field_list_mut();
-        *cursor = nearest_field(&lines, *cursor);
-        *scroll = (*scroll).min(lines.len().saturating_sub(rows));
-        if follow {
-            *scroll = scrolled(*scroll, *cursor, lines.len(), rows);
+    /// Limits cursors and scroll positions to the existing lines, and scrolls lists to their
+    /// cursors.
+    fn normalize_lists(&mut self) {
+        let follow = self.follow;
+        let height = |area: Option<Rect>| area.map_or(0, |area| usize::from(area.height));
+        let overlay = height(self.model.overlay_layout().map(|layout| layout.list));
+        if let Some((at, len)) = self.model.overlay.as_mut().and_then(Overlay::list) {
+            at.follow(len, overlay);
         }
-        if self.in_form() {
+        let table = height(self.model.watch_rows().map(|(rows, _)| rows));
+        if let Some(WatchTable { report, at }) = &mut self.model.watch {
+            at.follow(report.shards.len(), table);
             return;
         }
-        if let Some(rows) = self.model.outline_rows() {
-            let lines = outline(self.model.scene());
-            let rows = usize::from(rows.height);
-            let scroll = &mut self.model.outline_scroll;
-            *scroll = (*scroll).min(lines.len().saturating_sub(rows));
-            let line = outline_position(&lines, &self.model.selection).filter(|_| follow);
-            *scroll = line.map_or(*scroll, |line| scrolled(*scroll, line, lines.len(), rows));
-        }
+        let inspector = height(self.model.inspector_rows().map(|(rows, _)| rows));
+        let rows = if self.in_form() { overlay } else { inspector };
+        let lines = self.model.field_lines();
+        let FieldList { cursor, scroll, .. } = self.model.field_list_mut();
+        *cursor = walked(&lines, *cursor, 0);
+        *scroll = scrolled(*scroll, Some(*cursor).filter(|_| follow), lines.len(), rows);
+        let Some(rows) = self.model.outline_rows().filter(|_| !self.in_form()) else { return };
+        let lines = outline(self.model.scene());
+        let line = outline_position(&lines, &self.model.selection).filter(|_| follow);
+        let scroll = &mut self.model.outline_scroll;
+        *scroll = scrolled(*scroll, line, lines.len(), rows.height.into());
     }
 }
 

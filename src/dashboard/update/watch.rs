@@ -39,14 +39,13 @@ impl UpdateContext<'_> {
         // The first row is the most urgent.
         at.index = if at.index == 0 { 0 } else { same.unwrap_or(at.index) };
         self.model.watch = Some(WatchTable { report, at });
-        self.move_watch_cursor(0);
     }
 
-    /// Moves the cursor of the table and makes it visible.
+    /// Moves the cursor of the table.
     pub(super) fn move_watch_cursor(&mut self, steps: isize) {
-        let rows = self.model.watch_rows().map_or(1, |(rows, _)| usize::from(rows.height));
-        let Some(table) = &mut self.model.watch else { return };
-        table.at.walk(steps, table.report.shards.len(), rows);
+        if let Some(table) = &mut self.model.watch {
+            table.at.walk(steps, table.report.shards.len());
+        }
     }
 
     /// Moves the cursor of the table to the clicked row.

@@ -107,7 +107,7 @@ fn typing(model: &mut Model, text: &str, problem: Option<&str>) {
     model.inspector.editor = Some(editor);
     if let Some((list, _)) = model.inspector_rows() {
         let (cursor, lines) = (model.inspector.cursor, model.field_lines().len());
-        model.inspector.scroll = scrolled(0, cursor, lines, list.height.into());
+        model.inspector.scroll = scrolled(0, Some(cursor), lines, list.height.into());
     }
 }
 
