@@ -56,14 +56,14 @@ fn keys_manual() -> String {
         let title = commands[0].chapter;
         page += &format!("\n## {title}\n\n| keys | action |\n|---|---|\n");
         for command in commands {
-            page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
+            page += &format!("| {} | {} |\n", command.formatted_keys(false, quoted), command.label);
         }
     }
     let watching = watch::watching(1);
     page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
              | keys | action |\n|---|---|\n";
     for command in COMMANDS.iter().filter(|command| command.is_listed(&watching.model)) {
-        page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
+        page += &format!("| {} | {} |\n", command.formatted_keys(true, quoted), command.label);
     }
     page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";
     for (mouse, effect) in MOUSE {

@@ -43,11 +43,6 @@ pub struct Command {
     pub keys: &'static [(KeyContext, &'static str)],
     /// Hints, which may also describe related commands.
     pub hints: &'static [Hint],
-    /// `true` if the command itself handles a value that is being typed, as the commands of Enter
-    /// and Esc do. `false` if the value is applied before the command runs.
-    pub(super) while_typing: bool,
-    /// `true` if the command also runs in the viewer of exported images, which other keys close.
-    pub(super) over_image: bool,
     /// Function that returns `true` if the command can run.
     pub(super) available: fn(&Model) -> bool,
     pub(super) run: fn(&mut UpdateContext<'_>),
@@ -59,16 +54,7 @@ const fn command(
     keys: &'static [(KeyContext, &'static str)],
     run: fn(&mut UpdateContext<'_>),
 ) -> Command {
-    Command {
-        chapter,
-        label,
-        keys,
-        hints: &[],
-        while_typing: false,
-        over_image: false,
-        available: editing,
-        run,
-    }
+    Command { chapter, label, keys, hints: &[], available: editing, run }
 }
 
 const fn hint(
@@ -185,13 +171,13 @@ pub static COMMANDS: &[Command] = &[
 
     command("panels", "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).available(viewing).hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
     command("panels", "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).available(viewing),
-    command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Rotating, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).while_typing().hints(&[
+    command("panels", "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Rotating, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).hints(&[
         hint(&[H::In(Moving), H::In(Rotating), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
         hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
     ]),
-    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).while_typing().hints(&[
+    command("panels", "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(viewing_or_choosing).hints(&[
         hint(&[H::In(Outline)], 2, "Enter", "inspect"),
         hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
@@ -224,8 +210,8 @@ pub static COMMANDS: &[Command] = &[
     command("file", "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(not_watching),
     command("file", "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(not_watching),
     command("file", "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
-    command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
-    command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
+    command("file", "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always),
+    command("file", "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
     command("picture", "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).available(viewing).hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
     command("picture", "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).available(viewing).hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
@@ -274,48 +260,24 @@ impl Command {
         Self { hints, ..self }
     }
 
-    const fn while_typing(self) -> Self {
-        Self { while_typing: true, ..self }
-    }
-
-    const fn over_image(self) -> Self {
-        Self { over_image: true, ..self }
-    }
-
     /// Returns `true` if the command palette lists the command. In `zerkalo watch`, it lists only
     /// commands that can run.
     pub fn is_listed(&self, model: &Model) -> bool {
         model.watch.is_none() || (self.available)(model)
     }
 
-    /// Returns all keys with their contexts, such as `Left in the picture`. `key` formats the name
-    /// of one key.
-    pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
-        self.formatted_keys(key, |context| Some(context.place()))
-    }
-
-    /// Returns the keys that work in `zerkalo watch` while no overlay is open.
-    pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
-        self.formatted_keys(key, |context| match context {
-            Anywhere | Outline => Some(""),
-            Probing => Some(context.place()),
-            _ => None,
-        })
-    }
-
-    /// Formats the keys, grouped by context. `place` returns the text after the keys of a context,
-    /// or `None` to leave the context out.
-    fn formatted_keys(
-        &self,
-        key: impl Fn(&str) -> String,
-        place: impl Fn(KeyContext) -> Option<&'static str>,
-    ) -> String {
-        let in_context = |(context, names): &(KeyContext, &'static str)| {
-            let place = place(*context)?;
+    /// Returns the keys with their contexts, such as `Left in the picture`. `key` formats the name
+    /// of one key. `watching` omits keys without effect in `zerkalo watch` and keys of overlays.
+    pub fn formatted_keys(&self, watching: bool, key: impl Fn(&str) -> String) -> String {
+        let listed = |context| !watching || matches!(context, Anywhere | Outline | Probing);
+        let in_context = |(context, names): &(KeyContext, &str)| {
             let keys: Vec<_> = names.split(' ').map(&key).collect();
-            Some(format!("{} {place}", keys.join(" ")).trim_end().to_string())
+            // The table of files uses the keys of the outline.
+            let place = if watching && *context == Outline { "" } else { context.place() };
+            format!("{} {place}", keys.join(" ")).trim_end().to_string()
         };
-        self.keys.iter().filter_map(in_context).collect::<Vec<_>>().join(", ")
+        let keys = self.keys.iter().filter(|(context, _)| listed(*context)).map(in_context);
+        keys.collect::<Vec<_>>().join(", ")
     }
 }
 

@@ -38,7 +38,8 @@ impl UpdateContext<'_> {
         self.model.first_time = false;
         self.model.notice.take_if(|notice| notice.until.is_none());
         if let Some(Overlay::ViewerImage(_)) = self.model.overlay {
-            match lookup(KeyContext::Overlay, key).filter(|command| command.over_image) {
+            // Of the keys of overlays, those with Ctrl suspend or quit the program.
+            match lookup(KeyContext::Overlay, key).filter(|_| key.ctrl) {
                 Some(command) => self.run(command),
                 None => self.close_viewer(),
             }
@@ -61,10 +62,11 @@ impl UpdateContext<'_> {
             }
             return;
         };
-        // An invalid value that is being typed prevents the command.
+        // An invalid value that is being typed prevents the command. The commands of Enter and Esc
+        // handle the value themselves.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
-            && !command.while_typing
+            && !matches!(key.code, Code::Enter | Code::Esc)
             && !self.apply_field()
         {
             return;

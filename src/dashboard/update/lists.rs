@@ -107,10 +107,7 @@ impl UpdateContext<'_> {
         let entry = |command: &Command| PickEntry {
             name: command.label.to_string(),
             note: command.chapter.to_string(),
-            keys: match self.model.watch {
-                Some(_) => command.watch_keys(str::to_string),
-                None => command.all_keys(str::to_string),
-            },
+            keys: command.formatted_keys(self.model.watch.is_some(), str::to_string),
         };
         let listed = COMMANDS.iter().filter(|command| command.is_listed(self.model));
         let entries: Vec<_> = listed.map(entry).collect();
