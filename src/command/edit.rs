@@ -4,7 +4,7 @@ use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
-use crate::dashboard::run::{DEFAULT_STOP, Ended, FaultyFile, Setup, run as run_dashboard};
+use crate::dashboard::run::{Ended, FaultyFile, Setup, run as run_dashboard};
 use std::env;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
@@ -12,7 +12,6 @@ use std::sync::Arc;
 use zerkalo_kernel::sampling::{SampleSettings, SamplerKind};
 use zerkalo_render::film::Display;
 use zerkalo_render::film::file::is_film_file;
-use zerkalo_render::schedule::Settings;
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::asset::Assets;
 use zerkalo_scene::disk::open_regular;
@@ -60,7 +59,6 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         state,
         threads: args.compute.threads(),
         options: Options::new(precision, sampling, Display::default()),
-        settings: Settings::new(true, DEFAULT_STOP),
         terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),
     };
@@ -173,7 +171,7 @@ mod tests {
             path: PathBuf::from("room.png"),
             description: "60x40  4 spp  noise unknown".to_string(),
             advice: String::new(),
-            size: Some([60, 40]),
+            is_image: true,
         };
         Ended { signalled, exported: vec![Ok(exported)], kept: Ok(None) }
     }

@@ -37,8 +37,8 @@ pub enum Message {
     Warning(String),
     /// Written image or checkpoint, or the reason of the failure.
     Exported(Result<Exported, String>),
-    /// Progress of [`Effect::ExportSized`], 0..=1.
-    ExportProgress(f64),
+    /// Progress of [`Effect::ExportSized`], 0..=1; `None` at its end.
+    ExportProgress(Option<f64>),
     /// Result of [`Effect::ViewImage`] for the file at this path.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// Fraction of the viewed image that the terminal has received, 0..=1.
@@ -67,8 +67,8 @@ pub struct Exported {
     pub description: String,
     /// Advice on the next step, such as the command that copies an image from another machine.
     pub advice: String,
-    /// Width and height in pixels; `None` for a checkpoint.
-    pub size: Option<[usize; 2]>,
+    /// `false` for a checkpoint.
+    pub is_image: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -153,13 +153,13 @@ impl Desk {
                 path: format!("room-1.{}", format.extension()).into(),
                 description: "64x48  16 spp  noise 2.50 levels".into(),
                 advice: "scp me@here:room-1.png .".into(),
-                size: Some([64, 48]),
+                is_image: true,
             })),
             Effect::Checkpoint(_) => Message::Exported(Ok(Exported {
                 path: "room-1.zk".into(),
                 description: "checkpoint".into(),
                 advice: "`zerkalo room-1.zk` continues it".into(),
-                size: None,
+                is_image: false,
             })),
             Effect::Pin => {
                 let header = Header {

@@ -1,20 +1,22 @@
 //! Executor of the effects that `update` returns.
 
+use crate::dashboard::run::DEFAULT_STOP;
 use crate::dashboard::run::exports::{Exporter, ResizedExport, image_viewer, paths};
 use crate::dashboard::run::files::{AutosaveJob, Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
-use crate::dashboard::{Effect, Format, Message};
+use crate::dashboard::{Effect, Exported, Format, Message};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo_kernel::sampling::SamplerKind;
 use zerkalo_render::Options;
 use zerkalo_render::film::{Display, LinearImage};
 use zerkalo_render::plan::FilmFiles;
 use zerkalo_render::schedule::{Settings, Stop};
-use zerkalo_render::session::Session;
+use zerkalo_render::session::{Picture, Session};
 use zerkalo_scene::{Scene, SceneFile};
 
 /// Executor of effects: the session, the threads of the scene file, and the exports.
@@ -34,7 +36,6 @@ struct Editing {
     resized: Option<ResizedExport>,
     threads: usize,
     options: Options,
-    settings: Settings,
 }
 
 impl EffectRunner {
@@ -46,17 +47,13 @@ impl EffectRunner {
         state: Option<PathBuf>,
         threads: usize,
         options: Options,
-        settings: Settings,
         results: Sender<Message>,
     ) -> io::Result<Self> {
-        let session = Session::new(threads, options.clone(), settings)?;
+        let session = Session::new(threads, options.clone(), Settings::new(true, DEFAULT_STOP))?;
         let files = Files::new(file, state, results.clone())?;
-        let exporter = Exporter {
-            file: Some(files.shared.clone()),
-            sampler: options.sampling.kind,
-            adaptive: settings.adaptive,
-        };
-        let editing = Editing { files, resized: None, threads, options, settings };
+        let exporter =
+            Exporter { file: Some(files.shared.clone()), sampler: options.sampling.kind };
+        let editing = Editing { files, resized: None, threads, options };
         Ok(Self { session, exporter, editing: Some(editing), exporting: None, results })
     }
 
@@ -72,7 +69,7 @@ impl EffectRunner {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
-        let exporter = Exporter::of_films();
+        let exporter = Exporter { file: None, sampler: SamplerKind::Sobol };
         Ok(Self { session, exporter, editing: None, exporting: None, results })
     }
 
@@ -88,8 +85,15 @@ impl EffectRunner {
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
             Effect::Pin => self.pin(),
-            Effect::Export(format) => self.export(format),
-            Effect::Checkpoint(scene) => self.write_checkpoint(&scene),
+            Effect::Export(format) => {
+                self.export(move |exporter, picture| exporter.write(picture, format));
+            }
+            Effect::Checkpoint(scene) => {
+                let provenance = self.exporter.provenance(&scene);
+                self.export(move |exporter, picture| {
+                    exporter.write_checkpoint(picture, &provenance)
+                });
+            }
             Effect::Copy(path) => frames.copy(&paths::full(&path)),
             Effect::ViewImage { path, display, screen } => {
                 let viewport = image_viewer::viewport(frames, screen);
@@ -127,7 +131,7 @@ impl EffectRunner {
     fn export_sized(&mut self, scene: Arc<Scene>, format: Format, display: Display, stop: Stop) {
         let Some(editing) = &mut self.editing else { return };
         let options = Options { display, ..editing.options.clone() };
-        let settings = Settings { stop, ..editing.settings };
+        let settings = Settings::new(true, stop);
         let started = Session::new(editing.threads, options, settings).and_then(|mut session| {
             session.set_scene(scene);
             ResizedExport::start(session, format, self.exporter.clone(), self.results.clone())
@@ -136,6 +140,7 @@ impl EffectRunner {
             Ok(export) => editing.resized = Some(export),
             Err(error) => {
                 let why = format!("cannot start a rendering thread: {error}");
+                let _ = self.results.send(Message::ExportProgress(None));
                 let _ = self.results.send(Message::Exported(Err(why)));
             }
         }
@@ -151,35 +156,17 @@ impl EffectRunner {
         });
     }
 
-    /// Records that an export runs until it drops the returned sender.
-    fn begin_export(&mut self) -> Sender<()> {
-        let (running, ended) = bounded(0);
+    /// Calls `write` with the present picture in the session's thread.
+    fn export<F>(&mut self, write: F)
+    where
+        F: FnOnce(&Exporter, Option<Picture>) -> Result<Exported, String> + Send + 'static,
+    {
+        let (running, ended) = bounded::<()>(0);
         self.exporting = Some(ended);
-        running
-    }
-
-    fn export(&mut self, format: Format) {
         let (exporter, results) = (self.exporter.clone(), self.results.clone());
-        let running = self.begin_export();
         self.session.submit(move |picture| {
             let _running = running;
-            let written = match picture {
-                Some(picture) => exporter.write(&picture, format),
-                None => Err("there is no picture to write".to_string()),
-            };
-            let _ = results.send(Message::Exported(written));
-        });
-    }
-
-    fn write_checkpoint(&mut self, scene: &Scene) {
-        let (exporter, results) = (self.exporter.clone(), self.results.clone());
-        let running = self.begin_export();
-        let provenance = self.exporter.provenance(scene);
-        self.session.submit(move |picture| {
-            let _running = running;
-            let checkpoint = picture.and_then(|picture| picture.checkpoint(&provenance));
-            let written = exporter.write_checkpoint(checkpoint);
-            let _ = results.send(Message::Exported(written));
+            let _ = results.send(Message::Exported(write(&exporter, picture)));
         });
     }
 

@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo_render::plan::FilmFiles;
-use zerkalo_render::schedule::{Settings, Stop};
+use zerkalo_render::schedule::Stop;
 use zerkalo_render::{Checkpoint, Options};
 use zerkalo_scene::{SceneErrors, SceneFile};
 use zerkalo_terminal::{
@@ -43,8 +43,6 @@ pub struct Setup {
     pub state: Option<PathBuf>,
     pub threads: usize,
     pub options: Options,
-    /// Settings of sample allocation, and the initial stop criteria.
-    pub settings: Settings,
     pub terminal: TerminalSetup,
     /// Path of the CSV file for input latencies; `None` to measure none.
     pub trace: Option<PathBuf>,
@@ -80,7 +78,7 @@ pub struct Ended {
 
 /// Runs a dashboard until the user quits, a terminating signal arrives or the terminal is lost.
 pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
+    let Setup { file, checkpoint, state, threads, options, terminal, trace } = setup;
     let (scene, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document.scene().clone())), Ok(file)),
         Err(FaultyFile { path, errors }) => (Err(errors), Err(path)),
@@ -90,7 +88,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Err(path) => (Some(path.clone()), String::new()),
     };
     let (results, done) = unbounded();
-    let mut effects = EffectRunner::new(file, state, threads, options, settings, results)?;
+    let mut effects = EffectRunner::new(file, state, threads, options, results)?;
     if let Ok(scene) = &scene {
         // Rendering starts while the terminal replies to the capability queries.
         match checkpoint {
@@ -98,7 +96,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             None => effects.session.set_scene(Arc::clone(scene)),
         };
     }
-    let model = Model::new(path, &name, scene, settings.stop);
+    let model = Model::new(path, &name, scene, DEFAULT_STOP);
     run_on_terminal(effects, done, model, terminal, trace)
 }
 
@@ -201,6 +199,6 @@ fn end(
 /// Longest wait for the first report on watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
-/// Default stop criterion: half a quantisation step of an 8-bit image file.
-pub const DEFAULT_STOP: Stop =
+/// Initial stop criterion: half a quantisation step of an 8-bit image file.
+const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_levels: Some(0.5), rmse_linear: None, seconds: None };

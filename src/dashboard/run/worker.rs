@@ -6,31 +6,31 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 /// Handle of a thread that may wait for a disk or the renderer without end.
-pub struct Worker {
-    thread: JoinHandle<()>,
+pub struct Worker<T> {
+    thread: JoinHandle<T>,
     /// Receiver that is disconnected at the end of the thread.
     ended: Receiver<()>,
 }
 
-impl Worker {
-    pub fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<Self> {
+impl<T: Send + 'static> Worker<T> {
+    pub fn spawn(name: &str, run: impl FnOnce() -> T + Send + 'static) -> io::Result<Self> {
         let (running, ended) = bounded(0);
         let thread = thread::Builder::new().name(name.into()).spawn(move || {
             let _running = running;
-            run();
+            run()
         })?;
         Ok(Self { thread, ended })
     }
 
     /// Waits for the end of the thread, at most for `patience`, without limit for `Duration::MAX`.
-    /// Returns `true` if it has ended, and propagates its panic.
-    pub fn join_within(self, patience: Duration) -> bool {
+    /// Returns the result of its function; `None` if it has not ended. Propagates its panic.
+    pub fn join_within(self, patience: Duration) -> Option<T> {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
-            return false;
+            return None;
         }
         match self.thread.join() {
             Err(panic) if !thread::panicking() => std::panic::resume_unwind(panic),
-            _ => true,
+            result => result.ok(),
         }
     }
 }
@@ -45,9 +45,9 @@ mod tests {
         let (sender, receiver) = unbounded::<()>();
         let run = move || assert!(receiver.recv().is_err());
         let worker = Worker::spawn("blocked", run.clone()).unwrap();
-        assert!(!worker.join_within(Duration::from_millis(1)));
+        assert_eq!(worker.join_within(Duration::from_millis(1)), None);
         let worker = Worker::spawn("released", run).unwrap();
         drop(sender);
-        assert!(worker.join_within(Duration::MAX));
+        assert_eq!(worker.join_within(Duration::MAX), Some(()));
     }
 }

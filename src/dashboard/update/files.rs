@@ -174,19 +174,14 @@ impl UpdateContext<'_> {
 
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
-            Ok(Exported { path, description, advice, size }) => {
+            Ok(Exported { path, description, advice, is_image }) => {
                 let text = format!("{}  {description}  ·  {advice}", path.display());
-                if let Some(size) = size {
-                    // An image of this size counts as the result of the background export.
-                    self.model.export.take_if(|e| e.size.map(|n| n as usize) == size);
+                if is_image {
                     self.model.last_export = Some(path);
                 }
                 self.notify(Tone::Good, text, None);
             }
-            Err(reason) => {
-                self.model.export = None;
-                self.notify(Tone::Bad, capital(&reason), None);
-            }
+            Err(reason) => self.notify(Tone::Bad, capital(&reason), None),
         }
     }
 

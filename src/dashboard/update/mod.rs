@@ -120,11 +120,10 @@ impl UpdateContext<'_> {
             Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => self.notify(Tone::Bad, capital(&text), None),
             Message::Exported(result) => self.exported(result),
-            Message::ExportProgress(progress) => {
-                if let Some(export) = &mut self.model.export {
-                    export.progress = progress;
-                }
-            }
+            Message::ExportProgress(progress) => match (&mut self.model.export, progress) {
+                (Some(export), Some(progress)) => export.progress = progress,
+                (export, _) => *export = None,
+            },
             Message::ViewerImage(path, result) => self.image_ready(&path, result),
             Message::ImageSent(sent) => {
                 if let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay {

@@ -22,8 +22,8 @@ pub enum AutosaveJob {
     /// Recover the edits of the last [`Message::OrphanedEdits`].
     Recover,
     Discard,
-    /// Write scheduled edits, send the path of the recovery file, and end the thread.
-    End(Sender<Result<Option<PathBuf>, String>>),
+    /// Write scheduled edits, and end the thread.
+    End,
 }
 
 /// State of the thread that writes the recovery file.
@@ -38,7 +38,11 @@ pub struct AutosaveWorker {
 }
 
 impl AutosaveWorker {
-    pub fn run(mut self, inbox: &Receiver<AutosaveJob>) {
+    /// Executes jobs until [`AutosaveJob::End`], and returns the path of the recovery file.
+    ///
+    /// # Errors
+    /// Fails with a message for the user if the last edits could not be written.
+    pub fn run(mut self, inbox: &Receiver<AutosaveJob>) -> Result<Option<PathBuf>, String> {
         let messages = self.with_file(|autosave, file| autosave.search(file));
         messages.into_iter().for_each(|message| self.send(message));
         loop {
@@ -47,15 +51,12 @@ impl AutosaveWorker {
                 None => inbox.recv().map_err(|_| RecvTimeoutError::Disconnected),
             };
             match job {
-                Ok(AutosaveJob::End(reply)) => {
+                Ok(AutosaveJob::End) | Err(RecvTimeoutError::Disconnected) => {
                     self.write();
-                    // The receiver may have timed out.
-                    let _ = reply.send(self.autosave.kept());
-                    break;
+                    return self.autosave.kept();
                 }
                 Ok(job) => self.work(job),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
             }
             if self.autosave.due().is_some_and(|due| due <= Instant::now()) {
                 self.write_and_warn();
@@ -93,7 +94,7 @@ impl AutosaveWorker {
                 let next = self.with_file(|autosave, file| autosave.offer(file));
                 next.into_iter().for_each(|message| self.send(message));
             }
-            AutosaveJob::End(_) => {}
+            AutosaveJob::End => {}
         }
     }
 

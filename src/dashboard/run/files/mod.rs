@@ -18,7 +18,6 @@ pub use shared_file::SharedFile;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
 use zerkalo_scene::disk::FileStamp;
 use zerkalo_scene::{Recovery, Scene, SceneFile};
@@ -37,7 +36,7 @@ pub struct Files {
     pub shared: SharedFile,
     /// Newest scene with unsaved edits.
     unsaved: Option<Arc<Scene>>,
-    threads: Option<[Worker; 2]>,
+    threads: Option<(Worker<()>, Worker<Result<Option<PathBuf>, String>>)>,
 }
 
 impl Files {
@@ -77,10 +76,10 @@ impl Files {
             shared: shared.clone(),
             results,
         };
-        let threads = [
+        let threads = (
             Worker::spawn("files", move || worker.run(&inbox))?,
             Worker::spawn("autosave", move || autosave_worker.run(&autosave_inbox))?,
-        ];
+        );
         Ok(Self { jobs, autosaves, shared, unsaved: None, threads: Some(threads) })
     }
 
@@ -113,16 +112,15 @@ impl Files {
     /// # Errors
     /// Fails with a message for the user if there are unsaved edits that cannot be kept.
     pub fn finish(&mut self) -> Result<Option<PathBuf>, String> {
-        let Some([files, autosave]) = self.threads.take() else { return Ok(None) };
+        let Some((files, autosave)) = self.threads.take() else { return Ok(None) };
         self.give(Job::End);
         files.join_within(SAVED_WITHIN);
-        let (reply, kept) = bounded(1);
-        self.give_autosave(AutosaveJob::End(reply));
-        if autosave.join_within(KEPT_WITHIN) {
-            return kept.recv().unwrap_or(Ok(None));
-        }
-        match (self.unsaved.take(), self.shared.get()) {
-            (Some(scene), Some(file)) => keep_elsewhere(&scene, &file, self.shared.elsewhere()),
+        self.give_autosave(AutosaveJob::End);
+        match (autosave.join_within(KEPT_WITHIN), self.unsaved.take(), self.shared.get()) {
+            (Some(kept), ..) => kept,
+            (None, Some(scene), Some(file)) => {
+                keep_elsewhere(&scene, &file, self.shared.elsewhere())
+            }
             _ => Ok(None),
         }
     }
@@ -152,17 +150,13 @@ fn keep_elsewhere(
     mut recovery: Recovery,
 ) -> Result<Option<PathBuf>, String> {
     let (text, base) = (file.text_of(scene), file.fingerprint());
-    let (reply, kept) = bounded(1);
-    thread::spawn(move || {
-        let kept = recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf));
-        // This unlocks the recovery file for the next start.
-        drop(recovery);
-        // The receiver may have timed out.
-        let _ = reply.send(kept.map_err(|error| error.to_string()));
+    // The end of the thread unlocks the recovery file for the next start.
+    let writer = Worker::spawn("recovery", move || {
+        recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf))
     });
-    let no_answer = || Err("the disk does not respond".to_string());
-    kept.recv_timeout(KEPT_WITHIN)
-        .unwrap_or_else(|_| no_answer())
+    let no_answer = || Err(io::Error::other("the disk does not respond"));
+    writer
+        .and_then(|writer| writer.join_within(KEPT_WITHIN).unwrap_or_else(no_answer))
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
