@@ -42,6 +42,7 @@ pub fn report(generation: u64, spp: u64, noise_levels: Option<f64>) -> Report {
         saturated_pixels: 0,
         recent_samples_per_second: 1e7,
         threads: 2,
+        precision: "single",
         lanes: "f32x8",
         inventory: "1 sphere (list)".into(),
     }

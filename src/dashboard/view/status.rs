@@ -93,9 +93,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         parts.push(part(6, vec![plain(rate(link.rate))]));
     }
     if !watching {
-        let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
         let plural = if report.threads == 1 { "" } else { "s" };
-        parts.push(part(7, vec![dim(precision)]));
+        parts.push(part(7, vec![dim(report.precision)]));
         parts.push(part(5, vec![dim(&format!("{} thread{plural}", report.threads))]));
     }
     parts

@@ -54,6 +54,8 @@ pub struct Report {
     /// measurement.
     pub recent_samples_per_second: f64,
     pub threads: usize,
+    /// `single` or `double`; empty without a scene.
+    pub precision: &'static str,
     /// Name of the SIMD type, such as `f32x8`; empty without a scene.
     pub lanes: &'static str,
     /// Features of the compiled scene, such as `2 point lights`, in one line; empty without a
