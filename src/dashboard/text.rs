@@ -2,7 +2,6 @@
 //! durations.
 
 use std::borrow::Cow;
-use std::time::Duration;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use zerkalo_render::schedule::Interval;
 
@@ -100,17 +99,6 @@ pub fn durations(Interval { low, high }: Interval) -> String {
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Formats the age of a file, rounded down, such as `40 s`, `12 min`, `3 h` or `2 d`.
-pub fn age(age: Duration) -> String {
-    let seconds = age.as_secs();
-    match seconds {
-        0..60 => format!("{seconds} s"),
-        60..3600 => format!("{} min", seconds / 60),
-        3600..86400 => format!("{} h", seconds / 3600),
-        _ => format!("{} d", seconds / 86400),
-    }
-}
-
 /// Converts `seconds` to a unit that suits a duration of `reference` seconds. Returns number and
 /// unit.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
@@ -167,7 +155,5 @@ mod tests {
         let durations = |low, high| durations(Interval { low, high });
         assert_eq!([durations(3.0, 5.0), durations(20.0, 150.0)], ["3–5 s", "0.3–2.5 min"]);
         assert_eq!(durations(3.01, 3.02), "3 s");
-        let ages = [59, 60, 3599, 7200, 86_399, 172_800].map(|s| age(Duration::from_secs(s)));
-        assert_eq!(ages, ["59 s", "1 min", "59 min", "2 h", "23 h", "2 d"]);
     }
 }

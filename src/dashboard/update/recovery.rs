@@ -1,7 +1,7 @@
 //! Recovery of unsaved edits after a crash, and requests for autosaves.
 
 use crate::dashboard::model::Tone;
-use crate::dashboard::text::age;
+use crate::dashboard::text::duration;
 use crate::dashboard::{Effect, OrphanedEdits, UpdateContext};
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         let mut text = format!(
             "A session with {} ended unexpectedly {} ago with unsaved edits.",
             self.model.file.name,
-            age(edits.age)
+            duration(edits.age.as_secs_f64())
         );
         if self.model.file.unreadable {
             text += " The file has become unreadable since.";

@@ -1,6 +1,6 @@
 //! Drawing of the table of watched film files, and of their summary in the status line.
 
-use crate::dashboard::text::{age, wrapped};
+use crate::dashboard::text::{duration, wrapped};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::painter::{ListRow, Painter, Row, VisibleLine};
 use crate::dashboard::view::theme::Theme;
@@ -34,23 +34,17 @@ pub fn draw(model: &Model, layout: &Layout, painter: &mut Painter) {
         let shard = &shards[index];
         let selected = (index == table.at.index).then_some(active);
         let ListRow { mut to, name: plain, note: dim, .. } = painter.list_row(rows, row, selected);
-        let (mark, style) = mark(&shard.state, &theme);
+        let (mark, word, style) = state(shard, &theme);
         let style = if selected.is_some() { plain } else { style };
         to.put(mark, style);
-        let age = shard.age.map_or(String::new(), age);
-        let late = if shard.state == WatchedState::Late { style } else { dim };
-        right(&mut to, [(&age, AGE)], late);
-        match &shard.state {
-            WatchedState::Missing => {
-                to.put_right("missing", 1, style);
-            }
-            WatchedState::Refused(_) => {
-                to.put_right("not used", 1, style);
-            }
-            _ => {
-                right(&mut to, [(&share(shard), SHARE)], plain);
-                right(&mut to, [(&samples(shard), SAMPLES)], dim);
-            }
+        // Ages below one second would change at each report.
+        let age = shard.age.map_or(String::new(), |age| duration(age.as_secs() as f64));
+        right(&mut to, [(&age, AGE)], if word == LATE { style } else { dim });
+        if [MISSING, NOT_USED].contains(&word) {
+            to.put_right(word, 1, style);
+        } else {
+            right(&mut to, [(&share(shard), SHARE)], plain);
+            right(&mut to, [(&samples(shard), SAMPLES)], dim);
         }
         to.put(&label(shard), plain);
     }
@@ -73,7 +67,7 @@ fn explain(shard: &WatchedShards, area: Rect, painter: &mut Painter) {
         return;
     }
     painter.row(area, 0).put(&"─".repeat(area.width.into()), theme.border(false));
-    let (_, style) = mark(&shard.state, &theme);
+    let (.., style) = state(shard, &theme);
     let width = area.width.saturating_sub(2);
     let path = shard.path.as_ref().map(|path| sanitized(&path.display().to_string()));
     let path = path.map_or(String::new(), |path| format!("{path}: "));
@@ -106,12 +100,18 @@ fn label(shard: &WatchedShards) -> String {
     }
 }
 
-fn mark(state: &WatchedState, theme: &Theme) -> (&'static str, Style) {
-    match state {
-        WatchedState::Complete => (" ✓ ", theme.good()),
-        WatchedState::Running => (" ● ", theme.accent()),
-        WatchedState::Late => (" ! ", theme.warn()),
-        WatchedState::Missing | WatchedState::Refused(_) => (" ✗ ", theme.bad()),
+const LATE: &str = "late";
+const MISSING: &str = "missing";
+const NOT_USED: &str = "not used";
+
+/// Returns mark, word and style for the state of a file.
+fn state(shard: &WatchedShards, theme: &Theme) -> (&'static str, &'static str, Style) {
+    match shard.state {
+        WatchedState::Complete => (" ✓ ", "complete", theme.good()),
+        WatchedState::Running => (" ● ", "running", theme.accent()),
+        WatchedState::Late => (" ! ", LATE, theme.warn()),
+        WatchedState::Missing => (" ✗ ", MISSING, theme.bad()),
+        WatchedState::Refused(_) => (" ✗ ", NOT_USED, theme.bad()),
     }
 }
 
@@ -156,16 +156,12 @@ pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
             texts.extend(percent.map(|percent| (percent, theme.text())));
         }
     }
-    let count = |wanted: &dyn Fn(&WatchedState) -> bool| {
-        report.shards.iter().filter(|shard| wanted(&shard.state)).count()
-    };
-    let refused = count(&|state| matches!(state, WatchedState::Refused(_)));
-    let missing = count(&|state| *state == WatchedState::Missing);
-    let late = count(&|state| *state == WatchedState::Late);
-    let counts = [(refused, "not used"), (missing, "missing"), (late, "late")];
-    for (count, what) in counts.into_iter().filter(|(count, _)| *count > 0) {
-        let style = if what == "late" { theme.warn() } else { theme.bad() };
-        texts.push((format!("{count} {what}"), style));
+    for (wanted, style) in [(NOT_USED, theme.bad()), (MISSING, theme.bad()), (LATE, theme.warn())] {
+        let is_wanted = |shard: &&WatchedShards| state(shard, theme).1 == wanted;
+        let count = report.shards.iter().filter(is_wanted).count();
+        if count > 0 {
+            texts.push((format!("{count} {wanted}"), style));
+        }
     }
     texts
 }
