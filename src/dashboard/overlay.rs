@@ -83,8 +83,6 @@ pub struct Form {
     pub subject: Target,
     /// Label of the undo step.
     pub label: String,
-    /// Part of the scene that is selected again if the form is cancelled.
-    pub before: Target,
     /// State of the list, whose lines are those of `panel_lines::form`.
     pub fields: FieldList,
 }

@@ -172,8 +172,8 @@ impl Dashboard {
                 // A change of lights alone needs no new picture: the snapshot has one picture per
                 // light group.
                 let snapshot = self.model.snapshot.as_deref();
-                let mix = snapshot.and_then(|s| s.mix_for(self.model.scene()));
-                if !is_edit || mix.is_none() {
+                let weights = snapshot.and_then(|s| s.mix_for(self.model.scene()));
+                if !is_edit || weights.is_none() {
                     awaited = Some(generation);
                 }
             }
@@ -223,7 +223,7 @@ impl Dashboard {
             }
             self.resize();
         }
-        self.frames.look(now);
+        self.frames.poll_connection(now);
         if self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
             self.dispatch(Message::LinkStatus(self.frames.flow.reading()));

@@ -149,7 +149,7 @@ impl FramePipeline {
     }
 
     /// Gives up overdue acknowledgements, and reads the kernel's send queue if a reading is due.
-    pub fn look(&mut self, now: Duration) {
+    pub fn poll_connection(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
             self.flow.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));

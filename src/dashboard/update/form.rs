@@ -28,7 +28,6 @@ impl UpdateContext<'_> {
                     scene: Arc::new(scene),
                     subject,
                     label,
-                    before: self.model.selection.clone(),
                     fields: FieldList::default(),
                 }));
                 self.show();
@@ -59,13 +58,5 @@ impl UpdateContext<'_> {
         self.select(form.subject);
         let label = self.model.selection.label(self.scene());
         self.say(format!("{label} added · m moves it · r rotates it · u undoes"));
-    }
-
-    /// Closes the form and restores scene and selection.
-    pub(super) fn cancel_form(&mut self) {
-        if let Some(Overlay::Form(form)) = self.model.overlay.take() {
-            self.select(form.before);
-            self.show();
-        }
     }
 }

@@ -95,7 +95,10 @@ impl UpdateContext<'_> {
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
             Some(Overlay::Form(form)) if form.fields.editor.is_some() => form.fields.editor = None,
-            Some(Overlay::Form(_)) => self.cancel_form(),
+            Some(Overlay::Form(_)) => {
+                self.model.overlay = None;
+                self.show();
+            }
             _ => {
                 self.model.quit_when_saved = false;
                 self.model.overlay = None;

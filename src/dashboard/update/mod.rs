@@ -26,7 +26,7 @@ use ratatui::layout::Rect;
 use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
-use zerkalo_render::session::{State, View};
+use zerkalo_render::session::View;
 use zerkalo_scene::Scene;
 use zerkalo_scene::edit::{Edit, EditError, Target};
 use zerkalo_scene::value::sanitized;
@@ -104,10 +104,6 @@ impl UpdateContext<'_> {
                 self.repaint();
             }
             Message::Snapshot(snapshot) => {
-                if let State::Failed(reason) = &snapshot.report.state {
-                    let text = format!("This scene cannot be rendered: {reason}");
-                    self.notify(Tone::Bad, text, None);
-                }
                 self.model.convergence.add(&snapshot.report);
                 self.model.snapshot = Some(snapshot);
                 self.repaint();

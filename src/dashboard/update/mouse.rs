@@ -165,7 +165,7 @@ impl UpdateContext<'_> {
     }
 
     /// Returns `true` in the modes in which all edits with the same label form one undo step.
-    fn moves_or_rotates(&self) -> bool {
+    pub(super) fn moves_or_rotates(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
 

@@ -1,7 +1,7 @@
 //! Commands on the selected part of the scene.
 
+use crate::dashboard::UpdateContext;
 use crate::dashboard::update::{Coalesce, Direction};
-use crate::dashboard::{Mode, UpdateContext};
 use glam::{DVec2, DVec3};
 use zerkalo_scene::edit::{self, bounds, step_length};
 
@@ -39,8 +39,8 @@ impl UpdateContext<'_> {
     /// Returns the rule for edits by arrow keys and drags: in a drag or in a mode that moves or
     /// rotates, all edits with the same label form one undo step.
     fn gesture(&self) -> Coalesce {
-        let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
-        if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
+        let in_gesture = self.moves_or_rotates() || self.model.drag.is_some();
+        if in_gesture { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
     /// Moves the selection by a drag in half cells, vertically if `upright` is `true`, otherwise in

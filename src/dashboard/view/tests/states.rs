@@ -129,7 +129,6 @@ fn adding(model: &mut Model, problem: Option<&str>) {
         scene: Arc::new(edit.scene),
         subject: edit.subject,
         label: edit.label,
-        before: model.selection.clone(),
         fields: FieldList {
             cursor: 2,
             refusal: problem.map(str::to_string),
