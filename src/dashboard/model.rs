@@ -257,6 +257,16 @@ impl Model {
         }
     }
 
+    /// Returns cursor and length of the list in the open overlay, or of the table of watched files.
+    /// Returns `None` if there is neither.
+    pub fn list(&mut self) -> Option<(&mut ListCursor, usize)> {
+        match (&mut self.overlay, &mut self.watch) {
+            (Some(overlay), _) => overlay.list(),
+            (None, Some(table)) => Some((&mut table.at, table.report.shards.len())),
+            (None, None) => None,
+        }
+    }
+
     /// Returns `true` while an overlay or the inspector's text editor is open: questions must wait.
     pub fn is_busy(&self) -> bool {
         self.overlay.is_some() || self.inspector.editor.is_some()

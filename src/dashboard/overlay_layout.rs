@@ -2,7 +2,7 @@
 
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::text::wrapped_rows;
-use crate::dashboard::{BORDER, Form, Layout, Model, Overlay};
+use crate::dashboard::{BORDER, Focus, Form, Layout, Model, Overlay};
 use ratatui::layout::Rect;
 use zerkalo_render::session::QUALITIES;
 
@@ -81,6 +81,16 @@ impl Model {
         let frame = Rect { x: width - columns, y: 0, width: columns, height: height - 2 };
         let (list, help) = split(frame.inner(BORDER), form.fields.problem().is_some());
         OverlayLayout { frame, input: Rect::default(), list, help }
+    }
+
+    /// Returns the area of the lines of the list whose cursor the keys move; `None` if it is hidden.
+    pub fn list_rows(&self) -> Option<Rect> {
+        match (&self.overlay, self.focus) {
+            (Some(_), _) => Some(self.overlay_layout()?.list),
+            (None, _) if self.watch.is_some() => Some(self.watch_rows()?.0),
+            (None, Focus::Outline) => self.outline_rows(),
+            (None, Focus::Picture | Focus::Inspector) => Some(self.inspector_rows()?.0),
+        }
     }
 
     /// Returns the area of the lines of the outline; `None` if it is hidden.

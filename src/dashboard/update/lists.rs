@@ -15,33 +15,24 @@ use zerkalo_render::session::QUALITIES;
 impl UpdateContext<'_> {
     /// Moves the cursor of the open overlay, or of the focused panel, by `steps` lines.
     pub(super) fn move_cursor(&mut self, steps: isize) {
-        match &mut self.model.overlay {
-            Some(Overlay::Form(_)) => {
+        if let Some((at, len)) = self.model.list() {
+            at.walk(steps, len);
+            return;
+        }
+        match (&self.model.overlay, self.model.focus) {
+            (None, Focus::Outline) => self.move_outline_cursor(steps),
+            (None | Some(Overlay::Form(_)), _) => {
                 if self.apply_field() {
                     self.move_field_cursor(steps);
                 }
             }
-            Some(overlay) => {
-                if let Some((at, len)) = overlay.list() {
-                    at.walk(steps, len);
-                }
-            }
-            None if self.model.watch.is_some() => self.move_watch_cursor(steps),
-            None if self.model.focus == Focus::Outline => self.move_outline_cursor(steps),
-            None => self.move_field_cursor(steps),
+            (Some(_), _) => {}
         }
     }
 
     /// Moves the cursor by `pages` pages, each the number of visible rows minus 1.
     pub(super) fn page(&mut self, pages: isize) {
-        let rows = match (self.model.overlay_layout(), self.model.focus) {
-            (Some(layout), _) => layout.list.height,
-            (None, _) if self.model.watch.is_some() => {
-                self.model.watch_rows().map_or(1, |(rows, _)| rows.height)
-            }
-            (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
-            (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
-        };
+        let rows = self.model.list_rows().map_or(1, |rows| rows.height);
         let page = isize::from(i16::try_from(rows).unwrap_or(1)).max(2) - 1;
         self.move_cursor(pages * page);
     }

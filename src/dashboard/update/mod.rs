@@ -20,7 +20,7 @@ mod watch;
 
 use crate::dashboard::model::{Notice, Tone};
 use crate::dashboard::panel_lines::{outline, outline_position, scrolled, walked};
-use crate::dashboard::{Effect, FieldList, Message, Model, Overlay, WatchTable};
+use crate::dashboard::{Effect, FieldList, Message, Model, Overlay};
 use files::capital;
 use ratatui::layout::Rect;
 use std::mem::discriminant;
@@ -277,17 +277,15 @@ impl UpdateContext<'_> {
     fn normalize_lists(&mut self) {
         let follow = self.follow;
         let height = |area: Option<Rect>| area.map_or(0, |area| usize::from(area.height));
-        let overlay = height(self.model.overlay_layout().map(|layout| layout.list));
-        if let Some((at, len)) = self.model.overlay.as_mut().and_then(Overlay::list) {
-            at.follow(len, overlay);
+        let list = height(self.model.list_rows());
+        if let Some((at, len)) = self.model.list() {
+            at.follow(len, list);
         }
-        let table = height(self.model.watch_rows().map(|(rows, _)| rows));
-        if let Some(WatchTable { report, at }) = &mut self.model.watch {
-            at.follow(report.shards.len(), table);
+        if self.model.watch.is_some() {
             return;
         }
         let inspector = height(self.model.inspector_rows().map(|(rows, _)| rows));
-        let rows = if self.in_form() { overlay } else { inspector };
+        let rows = if self.in_form() { list } else { inspector };
         let lines = self.model.field_lines();
         let FieldList { cursor, scroll, .. } = self.model.field_list_mut();
         *cursor = walked(&lines, *cursor, 0);

@@ -20,7 +20,7 @@ fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
 
 /// Returns the index of the line under the mouse in the list at `rows`, whose first visible line
 /// has the index `scroll`. Returns `None` outside of `rows`.
-pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
+fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
     is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }
 
@@ -70,7 +70,8 @@ impl UpdateContext<'_> {
             self.set_focus(Focus::Inspector);
             self.press_in_fields(rows, focused, mouse);
         } else if is_in(mouse, layout.outline) && self.model.watch.is_some() {
-            self.press_in_watch_table(mouse);
+            self.model.focus = Focus::Outline;
+            self.press_in_list(mouse);
         } else if let Some(rows) = self.model.outline_rows()
             && is_in(mouse, layout.outline)
         {
@@ -109,17 +110,20 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked line if the cursor is on it already, otherwise moves the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
-        let Some(layout) = self.model.overlay_layout() else { return };
-        match &self.model.overlay {
-            Some(Overlay::Form(_)) => return self.press_in_fields(layout.list, true, mouse),
-            Some(Overlay::ViewerImage(_)) => return self.close_viewer(),
-            _ => {}
+        match (&self.model.overlay, self.model.list_rows()) {
+            (Some(Overlay::Form(_)), Some(rows)) => self.press_in_fields(rows, true, mouse),
+            (Some(Overlay::ViewerImage(_)), _) => self.close_viewer(),
+            _ => self.press_in_list(mouse),
         }
-        let list = self.model.overlay.as_mut().and_then(Overlay::list);
-        let Some((&mut at, len)) = list else { return };
-        if let Some(line) = line_at(layout.list, at.scroll, mouse).filter(|line| *line < len) {
+    }
+
+    /// Opens the clicked line of the list in the open overlay, or of the table of watched files, if
+    /// the cursor is on it already. Otherwise moves the cursor there.
+    fn press_in_list(&mut self, mouse: Mouse) {
+        let rows = self.model.list_rows().unwrap_or_default();
+        let Some((&mut at, len)) = self.model.list() else { return };
+        if let Some(line) = line_at(rows, at.scroll, mouse).filter(|line| *line < len) {
             match line == at.index {
                 true => self.open(),
                 false => self.move_cursor(line as isize - at.index as isize),
@@ -222,7 +226,7 @@ impl UpdateContext<'_> {
             scroll
         } else if is_in(mouse, layout.outline) {
             if self.model.watch.is_some() {
-                return self.move_watch_cursor(lines);
+                return self.move_cursor(lines);
             }
             &mut self.model.outline_scroll
         } else if is_in(mouse, layout.picture) && self.model.watch.is_none() {

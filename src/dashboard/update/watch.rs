@@ -1,14 +1,12 @@
-//! Table of watched film files: reports and cursor.
+//! Reports on watched film files.
 
-use crate::dashboard::update::mouse::line_at;
-use crate::dashboard::{Focus, ListCursor, UpdateContext, WatchTable, short_name};
+use crate::dashboard::{ListCursor, UpdateContext, WatchTable, short_name};
 use std::path::Path;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
 use zerkalo_render::session::{WatchReport, WatchedShards};
 use zerkalo_scene::Scene;
 use zerkalo_scene::value::sanitized;
-use zerkalo_terminal::event::Mouse;
 
 impl UpdateContext<'_> {
     /// Stores a report. A cursor on the first row stays there; on another row it follows its entry
@@ -39,23 +37,5 @@ impl UpdateContext<'_> {
         // The first row is the most urgent.
         at.index = if at.index == 0 { 0 } else { same.unwrap_or(at.index) };
         self.model.watch = Some(WatchTable { report, at });
-    }
-
-    /// Moves the cursor of the table.
-    pub(super) fn move_watch_cursor(&mut self, steps: isize) {
-        if let Some(table) = &mut self.model.watch {
-            table.at.walk(steps, table.report.shards.len());
-        }
-    }
-
-    /// Moves the cursor of the table to the clicked row.
-    pub(super) fn press_in_watch_table(&mut self, mouse: Mouse) {
-        self.model.focus = Focus::Outline;
-        if let Some((rows, _)) = self.model.watch_rows()
-            && let Some(table) = &self.model.watch
-            && let Some(line) = line_at(rows, table.at.scroll, mouse)
-        {
-            self.move_watch_cursor(line as isize - table.at.index as isize);
-        }
     }
 }
