@@ -152,7 +152,7 @@ impl FramePipeline {
     pub fn poll_connection(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
-            self.flow.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
+            self.flow.on_queue_length(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }
 

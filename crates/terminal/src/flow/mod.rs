@@ -214,7 +214,7 @@ impl FlowControl {
     }
 
     /// Returns `true` if the caller should now measure the send queue for
-    /// [`FlowControl::held_back`].
+    /// [`FlowControl::on_queue_length`].
     pub fn wants_queue_length(&self, now: Duration) -> bool {
         self.measures_at(now).is_some_and(|at| at <= now)
     }
@@ -400,7 +400,7 @@ impl FlowControl {
     }
 
     /// Records the number of bytes in the send queue; `None` if the kernel no longer reports it.
-    pub fn held_back(&mut self, now: Duration, bytes: Option<usize>) {
+    pub fn on_queue_length(&mut self, now: Duration, bytes: Option<usize>) {
         let Some(bytes) = bytes else {
             self.stop_requests(PacingMode::FixedRate, now);
             return;

@@ -173,7 +173,7 @@ fn send_queue_replaces_lost_replies() {
     // The kernel no longer lists the connection.
     flow.sent(now, 4000, true, 0);
     assert!(flow.measures_at(now).is_some_and(|at| flow.wants_queue_length(at)));
-    flow.held_back(now, None);
+    flow.on_queue_length(now, None);
     assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
 }
 
@@ -232,7 +232,7 @@ impl MeasuredWire {
             let now = ms(at);
             if flow.wants_queue_length(now) {
                 let queue = self.queue(now);
-                flow.held_back(now, Some(queue));
+                flow.on_queue_length(now, Some(queue));
             }
             let Some(allowance) = flow.allowance(now, false) else { continue };
             let bytes = wants(at, allowance.bytes);
@@ -353,7 +353,7 @@ fn rate_is_true_behind_a_relay_that_buffers() {
                 let now = ms(at);
                 if flow.wants_queue_length(now) {
                     let backlog = wire.free_at.saturating_sub(now).as_secs_f64() * rate;
-                    flow.held_back(now, Some((backlog - RELAYED).max(0.0) as usize));
+                    flow.on_queue_length(now, Some((backlog - RELAYED).max(0.0) as usize));
                 }
                 let Some(allowance) = flow.allowance(now, false) else { continue };
                 let bytes = wants(at, allowance.bytes);
@@ -396,7 +396,7 @@ fn connection_without_acknowledgements_becomes_silent() {
         assert!(now < ms(60_000));
         now += ms(20);
         if flow.wants_queue_length(now) {
-            flow.held_back(now, Some(5000));
+            flow.on_queue_length(now, Some(5000));
         }
     }
     assert_eq!(
@@ -407,7 +407,7 @@ fn connection_without_acknowledgements_becomes_silent() {
     // acknowledged, there is no such time.
     flow.record_input(now);
     assert!(flow.silent_at(None).unwrap() > now);
-    flow.held_back(now, Some(0));
+    flow.on_queue_length(now, Some(0));
     assert_eq!(flow.silent_at(None), None);
     // At a fixed rate, without acknowledgements, only a write that does not return shows that the
     // connection is silent.
