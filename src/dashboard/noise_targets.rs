@@ -6,7 +6,7 @@ use crate::dashboard::text::{duration, durations};
 use zerkalo_render::session::{QUALITIES, Report};
 
 /// Appearance of the picture at each target in [`QUALITIES`].
-pub const LOOKS: [&str; QUALITIES.len()] = [
+pub const APPEARANCES: [&str; QUALITIES.len()] = [
     "a draft: grain is visible",
     "grain in dark and even parts",
     "grain is visible by comparison",

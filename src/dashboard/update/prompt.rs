@@ -160,10 +160,11 @@ pub(super) fn stop_text(stop: &Stop) -> String {
 /// Parses the format of [`stop_text`]. Words are separated by spaces, commas or equals signs.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
-    let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());
-    let mut any = false;
+    let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty()).peekable();
+    if words.peek().is_none() {
+        return Err("Type one, or none for no limit.".to_string());
+    }
     while let Some(word) = words.next() {
-        any = true;
         if word.eq_ignore_ascii_case("none") {
             continue;
         }
@@ -189,7 +190,7 @@ fn parse_stop(text: &str) -> Result<Stop, String> {
             }
         }
     }
-    if any { Ok(stop) } else { Err("Type one, or none for no limit.".to_string()) }
+    Ok(stop)
 }
 
 #[cfg(test)]

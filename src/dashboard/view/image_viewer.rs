@@ -9,9 +9,10 @@ use ratatui::style::{Color, Style};
 use zerkalo_terminal::cells::picture_cells;
 use zerkalo_terminal::image::{Protocol, ViewerImage};
 
-/// Draws the viewed image in half blocks and returns these cells. The uploaded image later replaces
-/// them. Returns `None` if the image is still being read, or placeholder characters show it.
-pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<Buffer> {
+/// Draws the viewed image in half blocks and returns these cells and their area. The uploaded image
+/// later replaces them. Returns `None` if the image is still being read, or placeholder characters
+/// show it.
+pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Option<(Buffer, Rect)> {
     let theme = painter.theme;
     let [width, height] = model.screen;
     let last = Rect { x: 0, y: height.saturating_sub(1), width, height: 1 };
@@ -38,7 +39,7 @@ pub fn draw(model: &Model, viewed: &ViewedImage, painter: &mut Painter) -> Optio
     }
     let cells = picture_cells(&image.raster, model.colors, true);
     paint(&cells, place, painter.buffer);
-    Some(cells)
+    Some((cells, place))
 }
 
 /// Returns size and progress of the image, and a hint if the terminal supports no image protocol.

@@ -62,17 +62,13 @@ impl View {
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme { colors: model.colors };
         let painter = &mut Painter { theme, buffer };
+        (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
-            let cells = image_viewer::draw(model, viewed, painter);
-            (self.place, self.uncovered) = match (cells, &viewed.image) {
-                (Some(cells), Some(image)) => {
-                    picture::visible_mask(&cells, image.layout.place, painter.buffer)
-                }
-                _ => (Rect::ZERO, Vec::new()),
-            };
+            if let Some((cells, place)) = image_viewer::draw(model, viewed, painter) {
+                (self.place, self.uncovered) = picture::visible_mask(&cells, place, painter.buffer);
+            }
             return None;
         }
-        (self.place, self.uncovered) = (Rect::ZERO, Vec::new());
         let Some(layout) = model.layout() else {
             too_small(model.screen, painter);
             return None;

@@ -1,6 +1,6 @@
 //! Drawing of overlays.
 
-use crate::dashboard::noise_targets::{ABOUT, LOOKS, cost};
+use crate::dashboard::noise_targets::{ABOUT, APPEARANCES, cost};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::text::{columns, cut};
 use crate::dashboard::view::fields::{self, typed};
@@ -66,7 +66,7 @@ impl OverlayPainter<'_, '_> {
             to.put_right("  ", 0, text).put_right(&cost, 8, name);
             to.put_right("  ", 0, text).put(mark, good);
             to.put_wide(&noise_levels.to_string(), 5, name);
-            to.skip(2).put(LOOKS[i], text);
+            to.skip(2).put(APPEARANCES[i], text);
         }
         self.say(ABOUT, self.theme.dim());
     }

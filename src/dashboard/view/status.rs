@@ -143,13 +143,10 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
 fn noise_part(model: &Model, report: &Report, levels: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(levels), theme.text())];
-    match model.stop.noise_levels.filter(|target| *target < levels) {
-        Some(target) => {
-            text.push((format!(" → {target}"), theme.good()));
-            text.push(dim(" levels"));
-        }
-        None => text.push(dim(" levels")),
+    if let Some(target) = model.stop.noise_levels.filter(|target| *target < levels) {
+        text.push((format!(" → {target}"), theme.good()));
     }
+    text.push(dim(" levels"));
     if let (Some(left), State::Tracing) = (report.eta_seconds, &report.state) {
         let left = if left.high < 1.0 { "under 1 s".to_string() } else { durations(left) };
         text.push((format!(" in {left}"), theme.text()));
