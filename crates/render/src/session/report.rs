@@ -54,7 +54,7 @@ pub struct Report {
     /// measurement.
     pub recent_samples_per_second: f64,
     pub threads: usize,
-    /// `single` or `double`; empty without a scene.
+    /// `single` or `double` in reports of sessions that render, otherwise empty.
     pub precision: &'static str,
     /// Name of the SIMD type, such as `f32x8`; empty without a scene.
     pub lanes: &'static str,
