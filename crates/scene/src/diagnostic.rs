@@ -1,6 +1,6 @@
 //! Diagnostics: errors and warnings about a scene file, as users read them.
 
-use crate::format::source_map::LineCounter;
+use crate::format::source_map::line_column;
 use crate::value::{sanitized, sort_by_number};
 use std::fmt;
 
@@ -97,17 +97,17 @@ impl FirstDiagnostics {
         self.found.is_empty()
     }
 
-    /// Returns the stored diagnostics, sorted, with file, line and column, and the number of
-    /// diagnostics that were only counted.
-    pub fn located(mut self, (file, text): (&str, &str)) -> (Vec<Diagnostic>, usize) {
+    /// Returns the diagnostics, sorted, with file, line and column, without repetitions.
+    pub fn located(mut self, file: &str, text: &str) -> SceneErrors {
         self.keep_first();
-        let mut lines = LineCounter::new(text);
         let located = |(at, diagnostic): (usize, Diagnostic)| Diagnostic {
             file: file.to_string(),
-            line_column: Some(lines.line_column(at)),
+            line_column: Some(line_column(text, at)),
             ..diagnostic
         };
-        (self.found.into_iter().map(located).collect(), self.more)
+        let mut messages: Vec<_> = self.found.into_iter().map(located).collect();
+        messages.dedup();
+        SceneErrors { messages, more: self.more }
     }
 }
 
@@ -115,13 +115,6 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors of a file from [`FirstDiagnostics::located`], without repetitions.
-    pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
-        debug_assert!(!messages.is_empty(), "errors without a message");
-        messages.dedup();
-        Self { messages, more }
-    }
-
     /// Creates the errors of a scene file that has one error, at the given location.
     pub(super) fn at(
         file: &str,

@@ -36,18 +36,17 @@ impl Scene {
 impl Document {
     /// Reads and validates the scene file at `path`. Returns the same errors as [`Scene::read`].
     pub fn read(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        Self::read_opened(path, assets, |path| File::open(path))
+        Self::read_opened(path, File::open(path), assets)
     }
 
-    /// Reads a scene file like [`Document::read`]. `open` opens the file.
+    /// Reads a scene file like [`Document::read`], once it was opened as `file`.
     pub(super) fn read_opened(
         path: &Path,
+        file: io::Result<File>,
         assets: Arc<Assets>,
-        open: impl Fn(&Path) -> io::Result<File>,
     ) -> Result<Self, SceneErrors> {
         let name = path.display().to_string();
-        read_text(path, open)
-            .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
+        Self::parse_in(read_text(path, file)?, &name, AssetResolver::new(path, assets))
     }
 
     /// Parses and validates a scene. `name` is the file name in diagnostics. Returns the same

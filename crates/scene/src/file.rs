@@ -76,7 +76,7 @@ impl SceneFile {
 
     /// Reads a scene like [`SceneFile::open`], with a cache of the files that it refers to.
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        let document = Document::read_opened(path, assets, open_regular)?;
+        let document = Document::read_opened(path, open_regular(path), assets)?;
         let fingerprint = fnv1a64(document.text().as_bytes());
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }

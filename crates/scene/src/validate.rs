@@ -78,13 +78,6 @@ impl Problems<'_> {
             self.report(&all, || (error.found, format!("Expected {}.", error.expected)));
         }
     }
-
-    /// Adds the validation errors of the entry at `index` in the scene's list `list`.
-    fn add_entry(&mut self, list: &str, index: usize, errors: Vec<ValidationError>) {
-        if !errors.is_empty() {
-            self.add(&[list, &index.to_string()], errors);
-        }
-    }
 }
 
 impl Scene {
@@ -133,13 +126,13 @@ impl Scene {
         problems.add(&["background"], self.background.validator().errors());
         problems.add(&["ambient"], self.ambient.validator().errors());
         for (i, light) in self.lights.iter().enumerate() {
-            problems.add_entry("light", i, light.faults());
+            problems.add(&["light", &i.to_string()], light.faults());
         }
         for (name, material) in &self.materials {
             problems.add(&["materials", name], material.faults());
         }
         for (i, object) in self.objects.iter().enumerate() {
-            problems.add_entry("object", i, object.faults());
+            problems.add(&["object", &i.to_string()], object.faults());
         }
         if problems.found.is_empty() {
             self.missing_coordinates(&mut problems);

@@ -15,10 +15,14 @@ use toml::Value;
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let all = 0..old.len();
     let mut free = Free::of(old);
-    let new: Vec<Entry> = new.iter().map(Entry::of).collect();
-    let mut from: Vec<_> = new.iter().map(|entry| free.take(&[entry.name()], &all)).collect();
+    let new: Vec<_> = new.iter().map(properties).collect();
+    let by_name = |property: &Property| matches!(property, Property::Name(_));
+    let by_equality = |property: &Property| matches!(property, Property::NamelessContent(_));
+    let by_place =
+        |property: &Property| matches!(property, Property::Content(_) | Property::Nameless);
+    let mut from: Vec<_> = new.iter().map(|entry| free.take(entry, by_name, &all)).collect();
     for (origin, entry) in from.iter_mut().zip(&new).filter(|(origin, _)| origin.is_none()) {
-        *origin = free.take(&[entry.nameless_content()], &all);
+        *origin = free.take(entry, by_equality, &all);
     }
     // For each entry, the origin of the first later entry that has one, or the length of `old`.
     let mut next = vec![old.len(); new.len()];
@@ -28,84 +32,68 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut after = 0;
     for (j, entry) in new.iter().enumerate() {
         if from[j].is_none() && after < next[j] {
-            from[j] = free.take(&[entry.content(), entry.nameless()], &(after..next[j]));
+            from[j] = free.take(entry, by_place, &(after..next[j]));
         }
         after = from[j].map_or(after, |i| i + 1);
     }
     from
 }
 
-/// Entry of a list: its name, and the hash of the text of its other keys.
-struct Entry {
-    name: Option<String>,
-    content: u64,
-}
-
-/// Property that an entry and its origin have in common.
-#[derive(PartialEq, Eq, Hash)]
+/// Property that an entry of a list and its origin have in common.
+#[derive(Clone, PartialEq, Eq, Hash)]
 enum Property {
     Name(String),
     Nameless,
+    /// Hash of the text of all keys but the name.
     Content(u64),
     NamelessContent(u64),
 }
 
-impl Entry {
-    fn of(entry: &Value) -> Self {
-        let mut table = entry.as_table().cloned().unwrap_or_default();
-        let name = table.remove("name").and_then(|name| name.as_str().map(str::to_string));
-        Self { name, content: fnv1a64(table.to_string().as_bytes()) }
+fn properties(entry: &Value) -> Vec<Property> {
+    let mut table = entry.as_table().cloned().unwrap_or_default();
+    let name = table.remove("name").and_then(|name| name.as_str().map(str::to_string));
+    let content = fnv1a64(table.to_string().as_bytes());
+    let mut properties = vec![Property::Content(content)];
+    match name {
+        Some(name) => properties.push(Property::Name(name)),
+        None => properties.extend([Property::Nameless, Property::NamelessContent(content)]),
     }
-
-    fn name(&self) -> Option<Property> {
-        self.name.clone().map(Property::Name)
-    }
-
-    fn nameless(&self) -> Option<Property> {
-        self.name.is_none().then_some(Property::Nameless)
-    }
-
-    fn content(&self) -> Option<Property> {
-        Some(Property::Content(self.content))
-    }
-
-    fn nameless_content(&self) -> Option<Property> {
-        self.name.is_none().then_some(Property::NamelessContent(self.content))
-    }
-
-    fn properties(&self) -> impl Iterator<Item = Property> {
-        [self.name(), self.nameless(), self.content(), self.nameless_content()]
-            .into_iter()
-            .flatten()
-    }
+    properties
 }
 
 /// Old entries that are not an origin yet.
 struct Free {
-    entries: Vec<Entry>,
+    /// Properties of each entry.
+    entries: Vec<Vec<Property>>,
     /// Indices of the entries with each property.
     indices: HashMap<Property, BTreeSet<usize>>,
 }
 
 impl Free {
     fn of(entries: &[Value]) -> Self {
-        let entries: Vec<_> = entries.iter().map(Entry::of).collect();
+        let entries: Vec<_> = entries.iter().map(properties).collect();
         let mut indices: HashMap<_, BTreeSet<_>> = HashMap::new();
         for (i, entry) in entries.iter().enumerate() {
-            for property in entry.properties() {
-                indices.entry(property).or_default().insert(i);
+            for property in entry {
+                indices.entry(property.clone()).or_default().insert(i);
             }
         }
         Self { entries, indices }
     }
 
-    /// Takes the first old entry in `range` that has one of the properties `wanted`, and returns
-    /// its index; `None` if there is none.
-    fn take(&mut self, wanted: &[Option<Property>], range: &Range<usize>) -> Option<usize> {
-        let sets = wanted.iter().flatten().filter_map(|property| self.indices.get(property));
+    /// Takes the first old entry in `range` that has one of the `wanted` properties of `entry`, and
+    /// returns its index; `None` if there is none.
+    fn take(
+        &mut self,
+        entry: &[Property],
+        wanted: impl Fn(&Property) -> bool,
+        range: &Range<usize>,
+    ) -> Option<usize> {
+        let wanted = entry.iter().filter(|property| wanted(property));
+        let sets = wanted.filter_map(|property| self.indices.get(property));
         let first = sets.filter_map(|set| set.range(range.clone()).next().copied()).min()?;
-        for property in self.entries[first].properties() {
-            self.indices.entry(property).or_default().remove(&first);
+        for property in &self.entries[first] {
+            self.indices.entry(property.clone()).or_default().remove(&first);
         }
         Some(first)
     }
@@ -177,7 +165,7 @@ mod tests {
             let before = from[j..].iter().find_map(|i| *i).unwrap_or(old.len());
             from[j] = find(&from, after..before.max(after), &|i| {
                 let is_nameless = name(&old[i]).is_none() && name(&new[j]).is_none();
-                is_nameless || Entry::of(&old[i]).content == Entry::of(&new[j]).content
+                is_nameless || properties(&old[i])[0] == properties(&new[j])[0]
             });
         }
         from

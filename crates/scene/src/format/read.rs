@@ -79,7 +79,7 @@ impl<'a> SourceScene<'a> {
         let mut errors = FirstDiagnostics::default();
         locate(text, &source.parts, problems, &mut errors);
         errors.more += more;
-        Err(SceneErrors::new(errors.located((name, text))))
+        Err(errors.located(name, text))
     }
 
     /// Reads the parts and checks keys and types. Returns `true` if all parts were read, `false` if
@@ -120,7 +120,7 @@ impl<'a> SourceScene<'a> {
             return Err(SceneErrors::at(name, Some(line_column(text, at)), found, ""));
         }
         if !errors.is_empty() {
-            return Err(SceneErrors::new(errors.located((name, text))));
+            return Err(errors.located(name, text));
         }
         self.scene.objects.shrink_to_fit();
         Ok(true)
@@ -130,7 +130,7 @@ impl<'a> SourceScene<'a> {
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let mut found = FirstDiagnostics::default();
         locate(self.text, &self.parts, self.scene.warnings(), &mut found);
-        found.located((self.name, self.text)).0
+        found.located(self.name, self.text).messages
     }
 }
 
@@ -145,7 +145,7 @@ pub trait TomlText: FieldValue {
         schema::read(&root, Self::TYPE, &mut value, &Part::whole(text), &mut errors);
         match errors.is_empty() {
             true => Ok(value),
-            false => Err(SceneErrors::new(errors.located(("", text)))),
+            false => Err(errors.located("", text)),
         }
     }
 
@@ -160,11 +160,8 @@ pub trait TomlText: FieldValue {
 
 impl<T: FieldValue> TomlText for T {}
 
-/// Returns the text of the scene file at `path`. `open` opens the file.
-pub(crate) fn read_text(
-    path: &Path,
-    open: impl Fn(&Path) -> io::Result<File>,
-) -> Result<String, SceneErrors> {
+/// Returns the text of the scene file at `path`, which was opened as `file`.
+pub(crate) fn read_text(path: &Path, file: io::Result<File>) -> Result<String, SceneErrors> {
     let name = path.display().to_string();
     let fail = |found: &str, help: &str| SceneErrors::at(&name, None, found.to_string(), help);
     let io = |error: std::io::Error| match error.kind() {
@@ -179,7 +176,7 @@ pub(crate) fn read_text(
         }
         _ => fail(&format!("the file cannot be read: {error}"), ""),
     };
-    let file = open(path).map_err(io)?;
+    let file = file.map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_dir() {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));

@@ -6,7 +6,7 @@ use crate::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::format::parts::Part;
 use crate::format::source_map::subject_in;
 use crate::format::suggest::{did_you_mean, nearest};
-use crate::light;
+use crate::light::{self, LightKind};
 use crate::material;
 use crate::value::{
     DefaultValue, Description, Field, KeyNode, ValueType, integer, names, read_value,
@@ -173,7 +173,7 @@ impl SchemaReader<'_> {
         let mut intended = Vec::new();
         for (key, value) in table {
             match fields.iter().find(|f| f.name == key.get_ref().as_ref()) {
-                Some(field) => self.field(field, value, node),
+                Some(field) => self.child(field.name, field.takes, value, node),
                 None => intended.extend(self.unknown(key, fields)),
             }
         }
@@ -205,7 +205,7 @@ impl SchemaReader<'_> {
         }
         sort_by_number(&mut known, |(key, ..)| key.span().start as i64);
         for (_, value, field) in known.iter().take(1) {
-            self.field(field, value, node);
+            self.child(field.name, field.takes, value, node);
         }
         let expected =
             || format!("Expected {}.", ValueType::OneOf(fields)).replace("a table with ", "");
@@ -222,7 +222,7 @@ impl SchemaReader<'_> {
     fn kind_of_light(&mut self, table: &DeTable, span: ops::Range<usize>) {
         let is_known = |key: &str| light::FIELDS.iter().any(|field| field.name == key);
         let mut given: Vec<_> =
-            table.keys().filter(|key| light::KIND_KEYS.contains(&key.get_ref().as_ref())).collect();
+            table.keys().filter(|key| LightKind::KEYS.contains(&key.get_ref().as_ref())).collect();
         sort_by_number(&mut given, |key| key.span().start as i64);
         match given.as_slice() {
             [first, second, ..] => {
@@ -231,7 +231,7 @@ impl SchemaReader<'_> {
                 self.add(second.span(), found, help.to_string());
             }
             [] if table.keys().all(|key| is_known(key.get_ref())) => {
-                let kinds = light::KIND_KEYS.join(", ");
+                let kinds = LightKind::KEYS.join(", ");
                 let help = format!(
                     "Expected one of {kinds}, such as point = {{ position = [2.0, 4.0, 3.0] }}."
                 );
@@ -242,54 +242,37 @@ impl SchemaReader<'_> {
         }
     }
 
-    /// Reads `value`, the value of the key `field`, into the child of `parent` for this key.
-    fn field(&mut self, field: &'static Field, value: &Spanned<DeValue>, parent: &mut dyn KeyNode) {
-        if let Some(node) = parent.make_child(field.name) {
-            self.path.push(field.name.to_string());
-            self.value(field, value, node);
+    /// Reads `value` of the type `takes` into the child `key` of `parent`.
+    fn child(
+        &mut self,
+        key: &str,
+        takes: ValueType,
+        value: &Spanned<DeValue>,
+        parent: &mut dyn KeyNode,
+    ) {
+        if let Some(node) = parent.make_child(key) {
+            self.path.push(key.to_string());
+            self.value(takes, value, node);
             self.path.pop();
         }
-    }
-
-    /// Reads a list entry or named table of the type `takes` into the child `key` of `list`.
-    fn entry(
-        &mut self,
-        key: String,
-        value: &Spanned<DeValue>,
-        takes: ValueType,
-        list: &mut dyn KeyNode,
-    ) {
-        let Some(node) = list.make_child(&key) else { return };
-        self.path.push(key);
-        match (value.get_ref(), takes) {
-            (DeValue::Table(table), ValueType::OneOf(fields)) => {
-                self.one_of(table, value.span(), fields, node);
-            }
-            (DeValue::Table(table), ValueType::Table(fields)) => {
-                self.table(table, value.span(), fields, node);
-                if matches!(self.path.as_slice(), [list, _] if list == "light") {
-                    self.kind_of_light(table, value.span());
-                }
-            }
-            (other, ValueType::Table(_)) => self.wrong(value.span(), other, "a table"),
-            (other, takes) => self.wrong(value.span(), other, &takes.to_string()),
-        }
-        self.path.pop();
     }
 
     fn entries(&mut self, list: &[Spanned<DeValue>], takes: ValueType, node: &mut dyn KeyNode) {
         let first = self.part.first_index(&self.path);
         for (i, entry) in (first..).zip(list) {
-            self.entry(i.to_string(), entry, takes, node);
+            self.child(&i.to_string(), takes, entry, node);
         }
     }
 
-    /// Reads the value `spanned` of the key `field` into `node`.
-    fn value(&mut self, field: &'static Field, spanned: &Spanned<DeValue>, node: &mut dyn KeyNode) {
+    /// Reads the value `spanned` of the type `takes` into `node`.
+    fn value(&mut self, takes: ValueType, spanned: &Spanned<DeValue>, node: &mut dyn KeyNode) {
         let (value, span) = (spanned.get_ref(), spanned.span());
-        match (field.takes, value) {
+        match (takes, value) {
             (ValueType::Table(fields), DeValue::Table(table)) => {
-                self.table(table, span, fields, node);
+                self.table(table, span.clone(), fields, node);
+                if matches!(self.path.as_slice(), [list, _] if list == "light") {
+                    self.kind_of_light(table, span);
+                }
             }
             (ValueType::OneOf(fields), DeValue::Table(table)) => {
                 self.one_of(table, span, fields, node);
@@ -302,22 +285,21 @@ impl SchemaReader<'_> {
             }
             (ValueType::Named(fields), DeValue::Table(named)) => {
                 for (name, entry) in named {
-                    let name = name.get_ref().to_string();
-                    self.entry(name, entry, ValueType::Table(fields), node);
+                    self.child(name.get_ref(), ValueType::Table(fields), entry, node);
                 }
             }
             (takes, value) if read_value(takes, value).is_some_and(|v| node.set_value(v)) => {}
             (ValueType::Choice(choices), DeValue::String(word)) => {
                 let intended = did_you_mean(word, choices.iter().map(|c| c.name));
-                let help = format!("Expected {}.{intended}", field.takes);
+                let help = format!("Expected {takes}.{intended}");
                 self.add(span, format!("{} is {}", self.inner(), describe(value)), help);
             }
             (ValueType::Tables(_), _) if self.path.len() == 1 => {
-                let expected = format!("tables that begin with [[{}]]", field.name);
+                let expected = format!("tables that begin with [[{}]]", self.path[0]);
                 self.wrong(span, value, &expected);
             }
             (ValueType::Named(_), _) => {
-                let expected = format!("tables that begin with [{}.NAME]", field.name);
+                let expected = format!("tables that begin with [{}.NAME]", self.path[0]);
                 self.wrong(span, value, &expected);
             }
             (takes, _) => self.wrong(span, value, &takes.to_string()),

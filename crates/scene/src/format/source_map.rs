@@ -9,37 +9,14 @@ use toml::de::{DeTable, DeValue};
 
 /// Returns the line and the column \[characters\] of the byte offset `at`, both counted from 1.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
-    LineCounter::new(text).line_column(at)
-}
-
-/// Converter of ascending byte offsets of a text to lines and columns, in one pass over the text.
-pub(crate) struct LineCounter<'a> {
-    text: &'a str,
-    /// Byte offset up to which line endings have been counted in `lines`.
-    counted: usize,
-    lines: usize,
-}
-
-impl<'a> LineCounter<'a> {
-    pub fn new(text: &'a str) -> Self {
-        Self { text, counted: 0, lines: 0 }
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
     }
-
-    /// Returns line and column, in characters, of the byte offset `at`, both counted from 1. Offsets
-    /// must not decrease from call to call.
-    pub fn line_column(&mut self, at: usize) -> (usize, usize) {
-        let mut at = at.min(self.text.len());
-        while !self.text.is_char_boundary(at) {
-            at -= 1;
-        }
-        let new = &self.text.as_bytes()[self.counted.min(at)..at];
-        self.lines += new.iter().filter(|byte| **byte == b'\n').count();
-        self.counted = at;
-        let before = &self.text[..at];
-        let line = before.rfind('\n').map_or(0, |newline| newline + 1);
-        let visible = before[line..].trim_start_matches('\u{feff}');
-        (self.lines + 1, visible.chars().count() + 1)
-    }
+    let before = &text[..at];
+    let line = before.rfind('\n').map_or(0, |newline| newline + 1);
+    let visible = before[line..].trim_start_matches('\u{feff}');
+    (before.matches('\n').count() + 1, visible.chars().count() + 1)
 }
 
 /// Returns the byte range of the value at `path`, or of its nearest ancestor that is in `root`;
@@ -107,7 +84,7 @@ pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -
 
 #[cfg(test)]
 mod tests {
-    use super::{LineCounter, line_column};
+    use super::line_column;
 
     #[test]
     fn columns_count_characters_and_skip_a_byte_order_mark() {
@@ -117,14 +94,5 @@ mod tests {
         assert_eq!(line_column(text, text.rfind('=').unwrap()), (2, 5));
         assert_eq!(line_column(text, 1), (1, 1), "inside a character");
         assert_eq!(line_column(text, 10_000), (3, 1));
-    }
-
-    #[test]
-    fn line_counter_agrees_with_single_lookups() {
-        let text = "\u{feff}a = 1\nöäü = 2\n\n\n# é\nb = 3";
-        let mut lines = LineCounter::new(text);
-        for at in 0..text.len() + 3 {
-            assert_eq!(lines.line_column(at), line_column(text, at), "{at}");
-        }
     }
 }
