@@ -5,7 +5,7 @@ use zerkalo_scene::camera::PerspectiveCamera;
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
-    let [u, v, w] = view.frame();
+    let [u, v, w] = view.frame;
     for (a, b, expected) in
         [(u, u, 1.0), (v, v, 1.0), (w, w, 1.0), (u, v, 0.0), (v, w, 0.0), (w, u, 0.0)]
     {

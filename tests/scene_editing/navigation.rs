@@ -146,10 +146,10 @@ fn framed_target_fills_the_picture() {
             for start in [aimed(), free().0] {
                 let start = Camera { view_angle, ..start };
                 let (center, radius) = (DVec3::new(-0.9, 0.5, 0.0), 0.5);
-                let camera = start.framed(center.to_array(), radius, aspect);
+                let camera = start.framed(center.to_array(), radius, [aspect, 1.0]);
                 assert!(degrees_between(&camera, &start) < 1e-4);
                 let to = center - eye(&camera);
-                let [half_width, half_height] = camera.half_size(aspect);
+                let [half_width, half_height] = camera.half_size([aspect, 1.0]);
                 let half = half_width.min(half_height).atan();
                 let share = (radius / to.length()).asin() / half;
                 assert!(share < 1.0 && share > 0.85, "{share} of the picture");
@@ -178,7 +178,7 @@ fn moved(camera: &Camera, (what, a, b): (u8, f64, f64), distance: f64) -> Camera
         4 => camera.look(a, b),
         5 => camera.roll(a),
         6 => camera.zoom(a.abs()),
-        _ => camera.framed([a, b, a * 0.5], b.abs(), 1.0 + a.abs()),
+        _ => camera.framed([a, b, a * 0.5], b.abs(), [1.0 + a.abs(), 1.0]),
     }
 }
 

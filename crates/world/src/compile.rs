@@ -371,12 +371,12 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> BoundingSphere {
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
     let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
     let near = scene.camera.near;
-    let lens = camera.lens().map_or(0.0, |lens| {
+    let lens = camera.lens.map_or(0.0, |lens| {
         // The radius includes a margin for rounding errors of ray origins on the lens.
-        let error = F32_RAY_ERROR * (lens.radius + camera.eye().abs().max_element());
+        let error = F32_RAY_ERROR * (lens.radius + camera.eye.abs().max_element());
         lens.blur(near) + error
     });
-    BoundingSphere { center: camera.eye(), radius: near * farthest_corner + lens }
+    BoundingSphere { center: camera.eye, radius: near * farthest_corner + lens }
 }
 
 impl<L: SimdFloat> World<L> {
@@ -393,7 +393,7 @@ impl<L: SimdFloat> World<L> {
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
-        let moved = materials.move_emissive_sheets(recentered, camera.eye());
+        let moved = materials.move_emissive_sheets(recentered, camera.eye);
         let recentered = moved.as_ref().unwrap_or(recentered);
         let geometry = aggregate(scene, &recentered.forms);
         let primitives = &geometry.sources;

@@ -127,7 +127,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let offset = if world.jitter { sampler.pixel() } else { (center, center) };
         let camera = &world.camera;
         let mut path = Path::new(camera.rays(corner_directions, offset));
-        if let Some(lens) = camera.lens() {
+        if let Some(lens) = &camera.lens {
             let (u, v) = sampler.lens();
             let (x, y, _) = disk(u, v);
             path.ray = camera.lens_rays(lens, corner_directions, offset, (x, y));

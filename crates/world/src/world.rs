@@ -125,7 +125,7 @@ pub struct WorldInfo {
 impl<L: SimdFloat> World<L> {
     /// Returns which random positions camera rays use: in the pixel, on the lens, both or none.
     pub fn camera_dimensions(&self) -> CameraDimensions {
-        CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
+        CameraDimensions { pixel: self.jitter, lens: self.camera.lens.is_some() }
     }
 
     /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.

@@ -79,12 +79,10 @@ impl UpdateContext<'_> {
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
-        let [width, height] = scene.film.size.map(f64::from);
+        let size = scene.film.size.map(f64::from);
         // Bounds without extent get a radius that also shows the surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
-        self.set_camera(Coalesce::Single, |camera, _| {
-            camera.framed(ball.center, radius, width / height)
-        });
+        self.set_camera(Coalesce::Single, |camera, _| camera.framed(ball.center, radius, size));
     }
 
     pub(super) fn reset_camera(&mut self) {
@@ -137,8 +135,7 @@ impl UpdateContext<'_> {
     /// Returns half the width of the view at distance 1 in front of the eye.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.scene();
-        let [width, height] = scene.film.size.map(f64::from);
-        scene.camera.half_size(width / height)[0]
+        scene.camera.half_size(scene.film.size.map(f64::from))[0]
     }
 
     /// Returns the amount for a drag by one half cell if a drag across the whole picture has the

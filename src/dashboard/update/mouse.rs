@@ -244,7 +244,7 @@ impl UpdateContext<'_> {
 pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);
-    let half = camera.half_size(width / height);
+    let half = camera.half_size([width, height]);
     let [right, up, forward] = camera.frame();
     let across = |pixel: usize, size: f64| (2.0 * (pixel as f64 + 0.5) / size) - 1.0;
     let direction =

@@ -26,13 +26,13 @@ impl Camera {
     }
 
     /// Returns half the width and half the height of the picture, on the picture plane at unit
-    /// distance. `aspect` is width divided by height.
-    pub fn half_size(&self, aspect: f64) -> [f64; 2] {
+    /// distance. `width` and `height` are in any unit.
+    pub fn half_size(&self, [width, height]: [f64; 2]) -> [f64; 2] {
         let degrees = self.view_angle.degrees();
         let half = (0.5 * degrees).to_radians().tan();
         match self.view_angle {
-            ViewAngle::Vertical(_) => [half * aspect, half],
-            ViewAngle::Horizontal(_) => [half, half / aspect],
+            ViewAngle::Vertical(_) => [half * width / height, half],
+            ViewAngle::Horizontal(_) => [half, half * height / width],
         }
     }
 
@@ -121,11 +121,10 @@ impl Camera {
     }
 
     /// Moves the eye along the view direction so that the sphere of `radius` around `center` fills
-    /// the picture, with a margin of 10 %. `aspect` is the picture's width divided by its height. A
-    /// target becomes `center`.
-    pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
+    /// the picture of the given width and height, with a margin of 10 %. A target becomes `center`.
+    pub fn framed(&self, center: [f64; 3], radius: f64, size: [f64; 2]) -> Self {
         let forward = self.frame()[2];
-        let half = self.half_size(aspect).into_iter().fold(f64::INFINITY, f64::min).atan();
+        let half = self.half_size(size).into_iter().fold(f64::INFINITY, f64::min).atan();
         let distance = 1.1 * radius / half.sin();
         if !(distance > 0.0 && distance.is_finite()) {
             return self.clone();
@@ -135,7 +134,7 @@ impl Camera {
         if aimed.target.is_some() {
             aimed.target = Some(center.to_array());
         }
-        self.valid_or_self(aimed.moved_to(center - forward * distance, forward, distance, false))
+        self.valid_or_self(aimed.placed(center - forward * distance, forward, distance))
     }
 
     /// Returns the distance from the eye to the pivot; 1 if it is not positive and finite.
@@ -164,12 +163,6 @@ impl Camera {
     /// Returns the camera at `eye` with the view direction `forward`. If the eye stays, the target
     /// moves to the point `distance` ahead.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
-        let eye_stays = DVec3::from_array(self.eye) == eye;
-        self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
-    }
-
-    /// Returns the camera of [`Camera::placed`] without a check that it is valid.
-    fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| round_fine(x, distance)).to_array();
         if let Some(direction) = next.direction {
@@ -177,12 +170,12 @@ impl Camera {
             let length = if length.is_normal() { length } else { 1.0 };
             next.direction = Some((forward * length).map(|x| round_fine(x, length)).to_array());
         }
-        if eye_stays {
+        if DVec3::from_array(self.eye) == eye {
             next.target = next.target.map(|_| round(eye + forward * distance));
         } else {
             next.eye = round(eye);
         }
-        next
+        self.valid_or_self(next)
     }
 
     /// Returns the camera with eye and target moved by `translation`. Changed coordinates are

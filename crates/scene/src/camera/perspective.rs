@@ -1,6 +1,6 @@
 //! Compiled perspective camera: rays through pixels.
 
-use crate::camera::{Camera, ViewAngle};
+use crate::camera::Camera;
 use glam::DVec3;
 use zerkalo_kernel::bvh::Ray;
 use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
@@ -9,11 +9,10 @@ use zerkalo_kernel::lanes::{Float, SimdFloat, Vec3};
 /// in double precision, offsets inside the pixel in the precision of the rays.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
-    eye: DVec3,
-    /// Unit vectors to the right, up and forward.
-    u: DVec3,
-    v: DVec3,
-    w: DVec3,
+    /// Position of the eye relative to the `origin` of [`PerspectiveCamera::new`].
+    pub eye: DVec3,
+    /// Unit vectors to the right, up in the picture, and forward.
+    pub frame: [DVec3; 3],
     /// Vectors to the next pixel to the right and below, on the picture plane at unit distance.
     dx_axis: DVec3,
     dy_axis: DVec3,
@@ -21,7 +20,7 @@ pub struct PerspectiveCamera {
     raster_corner: DVec3,
     near: f64,
     /// Thin lens of the camera; `None` for a pinhole.
-    lens: Option<ThinLens>,
+    pub lens: Option<ThinLens>,
 }
 
 /// Thin lens: a disk around the eye, perpendicular to the view direction.
@@ -46,46 +45,22 @@ impl PerspectiveCamera {
     pub fn new(camera: &Camera, [width, height]: [u32; 2], origin: DVec3) -> Self {
         let [u, v, w] = camera.frame();
         let (width, height) = (f64::from(width), f64::from(height));
-        // Half the width and half the height of the picture plane at unit distance from the eye.
-        let half = (0.5 * camera.view_angle.degrees()).to_radians().tan();
-        let (half_width, half_height) = match camera.view_angle {
-            ViewAngle::Vertical(_) => (half * width / height, half),
-            ViewAngle::Horizontal(_) => (half, half * height / width),
-        };
+        let [half_width, half_height] = camera.half_size([width, height]);
+        let (radius, focus) = (camera.lens_radius(), camera.focus_depth());
         Self {
             eye: DVec3::from(camera.eye) - origin,
-            u,
-            v,
-            w,
+            frame: [u, v, w],
             dx_axis: u * (2.0 * half_width / width),
             dy_axis: -v * (2.0 * half_height / height),
             raster_corner: w - u * half_width + v * half_height,
             near: camera.near,
-            lens: {
-                let (radius, focus) = (camera.lens_radius(), camera.focus_depth());
-                (radius > 0.0).then_some(ThinLens { radius, focus })
-            },
+            lens: (radius > 0.0).then_some(ThinLens { radius, focus }),
         }
-    }
-
-    /// Returns the camera's thin lens; `None` for a pinhole.
-    pub fn lens(&self) -> Option<&ThinLens> {
-        self.lens.as_ref()
     }
 
     /// Returns the radius of the camera's lens in scene units; 0 for a pinhole.
     pub fn lens_radius(&self) -> f64 {
         self.lens.map_or(0.0, |lens| lens.radius)
-    }
-
-    /// Returns the position of the eye relative to the `origin` of [`PerspectiveCamera::new`].
-    pub fn eye(&self) -> DVec3 {
-        self.eye
-    }
-
-    /// Returns the unit vectors to the right, up in the picture, and forward.
-    pub fn frame(&self) -> [DVec3; 3] {
-        [self.u, self.v, self.w]
     }
 
     /// Returns about the smallest angle \[radians\] between rays of neighbouring pixels, which
@@ -113,7 +88,7 @@ impl PerspectiveCamera {
     /// Projects a point in front of the eye to column and row, with fractions.
     pub fn project(&self, point: DVec3) -> [f64; 2] {
         let from_eye = point - self.eye;
-        let on_plane = from_eye / from_eye.dot(self.w) - self.raster_corner;
+        let on_plane = from_eye / from_eye.dot(self.frame[2]) - self.raster_corner;
         [self.dx_axis, self.dy_axis].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
     }
 
@@ -133,7 +108,7 @@ impl PerspectiveCamera {
         let dy_axis = Vec3::of(self.dy_axis.to_array());
         let direction = dx_axis.mul_add(dx, dy_axis.mul_add(dy, base));
         let eye = Vec3::of(self.eye.to_array());
-        // The component of `direction` along `w` is 1.
+        // The component of `direction` along the view is 1.
         let origin =
             if self.near > 0.0 { direction.mul_add(L::from_f64(self.near), eye) } else { eye };
         Ray { origin, direction: direction.normalize() }
@@ -155,7 +130,7 @@ impl PerspectiveCamera {
         (x, y): (L, L),
     ) -> Ray<L> {
         let axis = |v: DVec3| Vec3::of(v.to_array());
-        let (u, v) = (axis(self.u), axis(self.v));
+        let [u, v, _] = self.frame.map(axis);
         let across = u.mul_add(x, v * y);
         let through_eye = axis(self.dx_axis).mul_add(dx, axis(self.dy_axis).mul_add(dy, base));
         let slope = L::from_f64(-lens.radius / lens.focus);

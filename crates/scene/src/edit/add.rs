@@ -217,7 +217,7 @@ mod tests {
             let [right, up, forward] = scene.camera.frame();
             let to = middle - DVec3::from_array(scene.camera.eye);
             let depth = to.dot(forward);
-            let [w, h] = scene.camera.half_size(4.0 / 3.0);
+            let [w, h] = scene.camera.half_size([4.0, 3.0]);
             let inside = to.dot(right).abs() < w * depth && to.dot(up).abs() < h * depth;
             assert!(depth > 0.0 && inside, "{}: {middle}", word.name);
             for other in &scene.objects[2..] {

@@ -167,7 +167,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
     let depth = to.dot(forward);
-    let [half_width, half_height] = camera.half_size(f64::from(size[0]) / f64::from(size[1]));
+    let [half_width, half_height] = camera.half_size(size.map(f64::from));
     depth > 0.0
         && to.dot(right).abs() < 0.85 * half_width * depth
         && to.dot(up).abs() < 0.85 * half_height * depth

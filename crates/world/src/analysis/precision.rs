@@ -60,10 +60,10 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
     // Distances are measured from the eye, the centre of the lens. An object that is closer to
     // another point of the lens is blurred by more than a pixel, which hides its errors.
     let distance =
-        |form: &Form| Some(form.clearance(view.eye())? * if form.is_flat() { FLAT } else { 1.0 });
+        |form: &Form| Some(form.clearance(view.eye)? * if form.is_flat() { FLAT } else { 1.0 });
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
-    let lens_slope = view.lens().map_or(0.0, |lens| lens.radius / lens.focus);
+    let lens_slope = view.lens.map_or(0.0, |lens| lens.radius / lens.focus);
     if angle < LEAST_ANGLE * (1.0 + lens_slope) || extent > MAX_EXTENT_PER_PIXEL * angle * seen_from
     {
         return false;
@@ -86,7 +86,7 @@ pub(crate) fn single_suffices(scene: &Scene, geometry: &RecenteredGeometry) -> b
     }
     let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();
     let narrow = (COINCIDENT_GAP * extent).max(rounded)..extent / MAX_EXTENT_PER_GAP;
-    let pixel = |point: DVec3| angle * point.distance(view.eye());
+    let pixel = |point: DVec3| angle * point.distance(view.eye);
     !has_gap(forms, narrow, pixel)
 }
 

@@ -246,7 +246,7 @@ impl<'a> SceneDistances<'a> {
             faintest: faintest.unwrap_or(1.0).min(1.0),
             gain,
             radius: 0.1 * extent,
-            eye: (camera.eye(), camera.pixel()),
+            eye: (camera.eye, camera.pixel()),
             ray_offset: 4.0 * epsilon * extent,
         }
     }

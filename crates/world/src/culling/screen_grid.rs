@@ -28,9 +28,9 @@ impl ScreenBounds {
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
-        let [_, _, forward] = camera.frame();
+        let [_, _, forward] = camera.frame;
         let lens_radius = camera.lens_radius();
-        let eye = camera.eye().abs() + DVec3::splat(lens_radius);
+        let eye = camera.eye.abs() + DVec3::splat(lens_radius);
         let max_coordinate = low.abs().max(high.abs()).max(eye).max_element();
         let (mut nearest, mut farthest) = (f64::INFINITY, 0.0f64);
         let mut out = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
@@ -38,7 +38,7 @@ impl ScreenBounds {
             let coordinate =
                 |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
             let point = DVec3::new(coordinate(0), coordinate(1), coordinate(2));
-            let from_eye = point - camera.eye();
+            let from_eye = point - camera.eye;
             let depth = from_eye.dot(forward);
             let ray_error = F32_RAY_ERROR * max_coordinate;
             if depth <= 2.0 * ray_error {
@@ -56,7 +56,7 @@ impl ScreenBounds {
             out.low = std::array::from_fn(|axis| out.low[axis].min(position[axis] - margin));
             out.high = std::array::from_fn(|axis| out.high[axis].max(position[axis] + margin));
         }
-        if let Some(lens) = camera.lens() {
+        if let Some(lens) = &camera.lens {
             // On the plane at unit distance from the eye, the blur of a point at depth z has the
             // radius `r |1/z - 1/f|`. Here r is the lens radius and f the focus distance. The blur
             // is largest at one end of the interval of depths.

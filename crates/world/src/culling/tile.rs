@@ -84,14 +84,14 @@ impl<S: Float> Culling<S> {
         let with_primary = |primary| TileCandidates { primary, ..self.all_candidates.clone() };
         match &self.mode {
             CullingMode::Frusta(culler) => {
-                let [_, _, forward] = camera.frame();
+                let [_, _, forward] = camera.frame;
                 let corners = camera.corners(origin, extent);
                 let frustum = Frustum {
-                    apex: camera.eye(),
+                    apex: camera.eye,
                     forward,
                     corners,
                     lens_radius: camera.lens_radius(),
-                    focus: camera.lens().map_or(1.0, |lens| lens.focus),
+                    focus: camera.lens.map_or(1.0, |lens| lens.focus),
                 };
                 Some(culler.candidates(geometry, Some(&frustum)))
             }

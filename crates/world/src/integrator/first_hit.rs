@@ -45,7 +45,7 @@ fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut 
     let ray = world.camera.rays(corner_directions, (offset(0), offset(1)));
     let hit = world.geometry.closest(&ray, world.geometry.all());
     let hit_points = ray.at(hit.t);
-    let from_eye = hit_points - Vec3::of(world.camera.eye().to_array());
+    let from_eye = hit_points - Vec3::of(world.camera.eye.to_array());
     let depth = from_eye.dot(from_eye).sqrt();
     hits.fill(FirstHit::MISS);
     for (primitive, lanes) in distinct(hit.primitive, hit.t.lt(L::from_f64(L::MAX))) {
