@@ -1,7 +1,7 @@
 //! Access to the values of edit targets by key path.
 
 use crate::edit::{EditError, Target};
-use crate::light;
+use crate::light::LightKind;
 use crate::value::{Field, KeyNode, ValueType};
 use crate::{FIELDS, Scene};
 
@@ -18,7 +18,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
-        Target::Light(_) => light::KIND_KEYS,
+        Target::Light(_) => LightKind::KEYS,
         Target::Material(_) => &["f0", "metal"],
         Target::Ambient
         | Target::Background

@@ -6,7 +6,7 @@
 //! ```
 
 use crate::asset::{AssetError, Loaded, RadianceMap};
-use crate::light::{Handles, LightDesc, LightForm, LightSample};
+use crate::light::{LightDesc, LightForm, LightSample};
 use crate::value::{Color, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -71,10 +71,6 @@ impl LightDesc for Environment {
 
     fn usual_name(&self) -> &'static str {
         "sky"
-    }
-
-    fn handles(&mut self) -> Handles<'_> {
-        Handles::default()
     }
 }
 

@@ -23,17 +23,6 @@ pub enum LightForm<'a> {
     Environment(&'a Environment),
 }
 
-impl LightForm<'_> {
-    /// Returns `true` if the camera and mirrors can see the light.
-    pub fn is_visible(&self) -> bool {
-        match self {
-            Self::Surface(_) | Self::Environment(_) => true,
-            Self::Distant { radius, .. } => *radius > 0.0,
-            Self::Point { .. } => false,
-        }
-    }
-}
-
 #[derive(Clone, Debug, PartialEq)]
 pub enum EmissiveSurface {
     Sphere {

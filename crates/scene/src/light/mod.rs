@@ -28,7 +28,7 @@ pub use environment::{Environment, EnvironmentLight};
 pub use form::{EmissiveSurface, LightForm};
 pub use point::Point;
 pub use rectangle::RectangleLight;
-pub use registry::{Handles, KIND_KEYS, LightDesc, LightKind, Placement};
+pub use registry::{Handles, LightDesc, LightKind, Placement};
 pub use sample::LightSample;
 pub use sphere::SphereLight;
 pub use spot::{Spot, SpotCone, spot_factor};
@@ -113,7 +113,11 @@ impl Light {
 
     /// Returns `true` if the camera and mirrors can see the light while `visible` is `true`.
     pub fn has_radiance(&self) -> bool {
-        self.form().is_visible()
+        match self.form() {
+            LightForm::Surface(_) | LightForm::Environment(_) => true,
+            LightForm::Distant { radius, .. } => radius > 0.0,
+            LightForm::Point { .. } => false,
+        }
     }
 
     /// Returns `true` if the key `name` has an effect on a light of this kind.
@@ -134,11 +138,8 @@ impl Light {
     }
 
     pub fn environment_mut(&mut self) -> Option<&mut Environment> {
-        if let LightKind::Environment(environment) = &mut self.kind {
-            Some(environment)
-        } else {
-            None
-        }
+        let LightKind::Environment(environment) = &mut self.kind else { return None };
+        Some(environment)
     }
 
     /// Returns the position of the light, or the centre of its surface.

@@ -17,7 +17,9 @@ pub trait LightDesc: KeyNode {
     }
 
     /// Returns the values that edits of position and direction change.
-    fn handles(&mut self) -> Handles<'_>;
+    fn handles(&mut self) -> Handles<'_> {
+        Handles::default()
+    }
 
     /// Returns the name of the first new light of this kind.
     fn usual_name(&self) -> &'static str {
@@ -61,9 +63,6 @@ kinds! {
         "environment" => Environment(Environment),
     }
 }
-
-/// Keys of all kinds of lights, of which a light has exactly one.
-pub const KIND_KEYS: &[&str] = LightKind::KEYS;
 
 impl LightKind {
     /// Creates a light of the kind `key` by [`LightDesc::place`]; `None` if there is no such kind.

@@ -218,9 +218,8 @@ impl Material {
     /// Returns the validation errors of the material's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
-        let dielectric = self.fresnel == Some(Fresnel::Dielectric);
-        let other = if self.metal.is_some() { "metal" } else { "f0" };
-        let redundant = dielectric && (self.metal.is_some() || self.f0.is_some());
+        let given = self.metal.map(|_| "metal").or(self.f0.map(|_| "f0"));
+        let redundant = given.filter(|_| self.fresnel == Some(Fresnel::Dielectric));
         self.validator()
             .and(both.then(|| {
                 ValidationError::new(
@@ -229,7 +228,7 @@ impl Material {
                     "only one of them: a metal stands for its f0",
                 )
             }))
-            .and(redundant.then(|| {
+            .and(redundant.map(|other| {
                 ValidationError::new(
                     "fresnel",
                     format!("`dielectric` together with {other}"),

@@ -140,20 +140,6 @@ choices! {
     }
 }
 
-impl ImageTexture {
-    /// Returns the pixels; `None` if no readable file has been loaded.
-    pub fn image(&self) -> Option<&Arc<Image>> {
-        self.content.content()
-    }
-}
-
-impl HeightImage {
-    /// Returns the pixels; `None` if no readable file has been loaded.
-    pub fn image(&self) -> Option<&Arc<Image>> {
-        self.content.content()
-    }
-}
-
 impl Texture {
     /// Returns the placement of the texture on shapes.
     pub fn placement(&self) -> &Placement {
@@ -174,7 +160,7 @@ impl Texture {
     /// Returns `true` if the texture changes colours.
     pub fn has_effect(&self) -> bool {
         match self {
-            Self::Image(image) => image.image().is_some(),
+            Self::Image(image) => image.content.content().is_some(),
             Self::Checker(_) => true,
         }
     }
@@ -190,29 +176,30 @@ impl Bump {
     /// Returns `true` if the bump map perturbs normals.
     pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
-        image.height != 0.0 && image.image().is_some()
+        image.height != 0.0 && image.content.content().is_some()
     }
 }
 
 impl crate::material::Material {
-    /// Returns the names of the files of the texture and the bump map.
-    pub fn files(&self) -> impl Iterator<Item = &str> {
+    /// Returns the image files of the texture and the bump map: their names and contents.
+    fn loads(&self) -> impl Iterator<Item = (&str, &Loaded<Image>)> {
         let texture = match &self.texture {
-            Some(Texture::Image(image)) => Some(image.file.as_str()),
+            Some(Texture::Image(image)) => Some((image.file.as_str(), &image.content)),
             Some(Texture::Checker(_)) | None => None,
         };
-        let bump = self.bump.as_ref().map(|Bump::Image(image)| image.file.as_str());
-        [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
+        let bump = self.bump.as_ref();
+        let bump = bump.map(|Bump::Image(image)| (image.file.as_str(), &image.content));
+        texture.into_iter().chain(bump)
+    }
+
+    /// Returns the names of the files of the texture and the bump map.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        self.loads().map(|(file, _)| file).filter(|file| !file.is_empty())
     }
 
     /// Returns the loaded images of the texture and the bump map.
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
-        let texture = match &self.texture {
-            Some(Texture::Image(image)) => image.image(),
-            Some(Texture::Checker(_)) | None => None,
-        };
-        let bump = self.bump.as_ref().and_then(|Bump::Image(image)| image.image());
-        [texture, bump].into_iter().flatten()
+        self.loads().filter_map(|(_, content)| content.content())
     }
 
     /// Reads the files of the texture and of the bump map by `load`, unless they are loaded already.

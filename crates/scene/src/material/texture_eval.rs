@@ -97,7 +97,7 @@ impl<S: Float> CompiledTexture<S> {
                 Some(Self::Checker([checker.even, checker.odd].map(|c| c.0.map(S::from_f64))))
             }
             Texture::Image(texture) => Some(Self::Image {
-                image: texture.image()?.clone(),
+                image: texture.content.content()?.clone(),
                 wrap: texture.wrap,
                 filter: texture.filter,
             }),
@@ -134,7 +134,11 @@ impl BumpMap {
     pub fn new(bump: &Bump) -> Option<Self> {
         let Bump::Image(source) = bump;
         bump.has_effect().then_some(())?;
-        Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
+        Some(Self {
+            image: source.content.content()?.clone(),
+            wrap: source.wrap,
+            height: source.height,
+        })
     }
 
     /// Returns the derivatives of the height with respect to u and v, in scene units per repetition,

@@ -28,6 +28,15 @@ pub(super) fn frustum_between(
 /// Methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the axis from `$base` to
 /// `$top`.
 macro_rules! by_axis {
+    ($base:ident, $top:ident, radius) => {
+        fn fit(&mut self, base: glam::DVec3, size: glam::DVec3) {
+            let top = base + glam::DVec3::Y * size.y;
+            let radius = size.x.min(size.z) / 2.0;
+            *self = Self { $base: base.to_array(), $top: top.to_array(), radius };
+        }
+
+        $crate::shape::axial::by_axis!($base, $top);
+    };
     ($base:ident, $top:ident) => {
         fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
             vec![&mut self.$base, &mut self.$top]

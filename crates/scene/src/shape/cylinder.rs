@@ -3,7 +3,6 @@
 use crate::shape::ShapeDesc;
 use crate::shape::axial::{axis_faults, by_axis, frustum_between};
 use crate::value::{KeyNode, ValidationError, description};
-use glam::DVec3;
 use zerkalo_kernel::primitive::Form;
 
 description! {
@@ -29,11 +28,5 @@ impl ShapeDesc for Cylinder {
         axis_faults(self.validator(), [self.base, self.top], "top", sizes)
     }
 
-    fn fit(&mut self, base: DVec3, size: DVec3) {
-        let top = base + DVec3::Y * size.y;
-        let radius = size.x.min(size.z) / 2.0;
-        *self = Self { base: base.to_array(), top: top.to_array(), radius };
-    }
-
-    by_axis!(base, top);
+    by_axis!(base, top, radius);
 }

@@ -55,25 +55,21 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             }
         }
     }
-    let (half, scale) = (0.5, 0.5 / golden);
-    let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-    let place = |corner: &DVec3| {
-        let position = (*corner * scale + DVec3::Y * half).to_array().map(|x| x as f32);
-        for (axis, x) in position.into_iter().enumerate() {
-            bounds[0][axis] = bounds[0][axis].min(x);
-            bounds[1][axis] = bounds[1][axis].max(x);
-        }
-        position
+    let place = |corner: &DVec3| *corner * (0.5 / golden) + DVec3::Y * 0.5;
+    let positions: Vec<_> =
+        corners.iter().map(|corner| place(corner).to_array().map(|x| x as f32)).collect();
+    let bound = |pick: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).fold(positions[0][axis], pick))
     };
     Arc::new(Mesh::new(TriangleMesh {
-        positions: corners.iter().map(place).collect(),
+        bounds: [bound(f32::min), bound(f32::max)],
+        positions,
         center: [0.0; 3],
         triangles,
         normals: None,
         uvs: None,
         colors: Vec::new(),
         color_of: Vec::new(),
-        bounds,
         notes: Vec::new(),
     }))
 });

@@ -254,7 +254,7 @@ macro_rules! description {
                 #[doc = concat!("Keys of [`", stringify!($flat_type), "`].")]
                 pub $flat: $flat_type,
             )?
-            $($hidden: $hidden_type,)?
+            $(pub(crate) $hidden: $hidden_type,)?
         }
 
         impl Default for $name {

@@ -4,7 +4,7 @@
 use crate::lights::groups::LightGroupSource;
 use crate::world::World;
 use zerkalo_kernel::lanes::SimdFloat;
-use zerkalo_scene::light::KIND_KEYS;
+use zerkalo_scene::light::LightKind;
 use zerkalo_scene::material::{Bsdf, FacetNormals, ReflectionLobe, SpecularModel};
 use zerkalo_scene::{BelowHorizon, Filter, RayTypes, Scene};
 
@@ -25,7 +25,7 @@ pub(crate) fn inventory<L: SimdFloat>(scene: &Scene, world: &World<L>) -> String
         let is_kind = |source: &&LightGroupSource| matches!(source, LightGroupSource::Light(i) if scene.lights[*i].kind.key() == kind);
         groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
     };
-    for kind in KIND_KEYS {
+    for kind in LightKind::KEYS {
         parts.extend(counted(light_count(kind), &format!("{kind} light")));
     }
     parts.extend(present([(world.lights.choice.is_some(), "choice of lights")]));
