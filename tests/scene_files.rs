@@ -126,14 +126,14 @@ fn warnings_have_line_and_column() {
     let text = "# Dubious.\n[[object]]\nname = \"ball\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n\n\
                 [[light]]\nname = \"lamp\"\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
                 [[light]]\npoint.position = [0, 5, 0]\nintensity = 0\n\n\
-                [materials.steep]\nlobe = \"ggx\"\nalpha = 3\n";
+                [materials.rough]\nalpha = 0.3\n";
     let document = Document::parse(text.to_string(), "dubious.toml").unwrap();
     let warnings: Vec<_> = document.warnings.iter().map(|w| w.to_string()).collect();
     assert_eq!(warnings.len(), 2, "{warnings:?}");
     assert!(warnings[0].starts_with(
         "dubious.toml:9:13  light \"lamp\": intensity is 0, so that it gives no light (and one more like it)."
     ));
-    assert!(warnings[1].starts_with("dubious.toml:17:9  material \"steep\": alpha is 3"));
+    assert!(warnings[1].starts_with("dubious.toml:16:9  material \"rough\": alpha has no effect"));
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub struct History {
     saved: Arc<Scene>,
 }
 
-/// Scene before or after a step, label of the step, and estimated memory of the scene in bytes.
+/// Scene before or after a step, and the label of the step.
 #[derive(Clone, Debug)]
 struct HistoryEntry {
     scene: Arc<Scene>,

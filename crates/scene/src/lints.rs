@@ -15,15 +15,8 @@ type Case = (Vec<String>, String);
 type MaterialLint = fn(&Material) -> Option<(&'static str, String)>;
 
 /// Lints of materials, each with the help text of its warning.
-const MATERIAL_LINTS: [(MaterialLint, &str); 4] = [
+const MATERIAL_LINTS: [(MaterialLint, &str); 3] = [
     (brighter_than_its_light, "Allowed: the picture is clipped only for display."),
-    (
-        |m| {
-            let alpha = m.alpha.filter(|a| *a > 2.0 && m.has_microfacets())?;
-            Some(("alpha", format!("alpha is {}, grooves far deeper than wide", number(alpha))))
-        },
-        "Surfaces have an alpha from 0 to about 1.",
-    ),
     (
         |m| without_effect("alpha", m.alpha.is_some() && !m.has_microfacets()),
         "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",

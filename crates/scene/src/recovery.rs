@@ -7,7 +7,8 @@
 
 use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
 use crate::format::read::MAX_BYTES;
-use crate::value::{fnv1a64, sort_by_number};
+use crate::value::fnv1a64;
+use std::cmp::Reverse;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
@@ -164,11 +165,7 @@ impl Recovery {
                 }
             }
         }
-        let age = |lost: &Orphan| match lost.written.duration_since(SystemTime::UNIX_EPOCH) {
-            Ok(since) => -(since.as_nanos() as i64),
-            Err(before) => before.duration().as_nanos() as i64,
-        };
-        sort_by_number(&mut found.orphans, age);
+        found.orphans.sort_by_key(|lost| Reverse(lost.written));
         found
     }
 

@@ -33,14 +33,8 @@ impl Color {
 
     /// Returns the `#rrggbb` that decodes to exactly this colour, if one exists.
     pub fn to_hex(self) -> Option<String> {
-        let mut text = "#".to_string();
-        for channel in self.0 {
-            let level = (srgb_from_linear(channel) * 255.0).round();
-            if !(0.0..=255.0).contains(&level) {
-                return None;
-            }
-            text += &format!("{:02x}", level as u8);
-        }
+        let [r, g, b] = self.0.map(|channel| (srgb_from_linear(channel) * 255.0).round() as u8);
+        let text = format!("#{r:02x}{g:02x}{b:02x}");
         (Self::from_hex(&text) == Some(self)).then_some(text)
     }
 }

@@ -61,20 +61,13 @@ impl NumberRange {
 impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
-        match (self.low.is_finite(), self.low_in, self.high.is_finite(), self.high_in) {
-            (false, _, false, _) => f.write_str("other than inf and nan"),
-            (true, true, true, true) => write!(f, "from {low} to {high}"),
-            (true, false, true, false) => {
+        match (self.low_in, self.high_in) {
+            _ if self.low.is_infinite() => f.write_str("other than inf and nan"),
+            (true, _) => write!(f, "from {low} to {high}"),
+            (false, false) => {
                 write!(f, "between {low} and {high} ({low} and {high} are excluded)")
             }
-            (true, false, true, true) => write!(f, "greater than {low}, at most {high}"),
-            (true, true, true, false) => write!(f, "at least {low}, less than {high}"),
-            (true, low_in, false, _) => {
-                write!(f, "{} {low}", if low_in { "of at least" } else { "greater than" })
-            }
-            (false, _, true, high_in) => {
-                write!(f, "{} {high}", if high_in { "of at most" } else { "less than" })
-            }
+            (false, true) => write!(f, "greater than {low}, at most {high}"),
         }
     }
 }

@@ -1,20 +1,13 @@
 //! Sanitising of untrusted text for output on a terminal.
 
-use std::fmt::Write as _;
-
-/// Escapes the characters that could control a terminal or hide other text as `\u{..}`.
+/// Escapes the characters that could control a terminal or hide other text as `\n` or `\u{..}`.
 pub fn sanitized(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
-        match c {
-            '\n' => out.push_str("\\n"),
-            '\r' => out.push_str("\\r"),
-            '\t' => out.push_str("\\t"),
-            _ if c.is_control() || controls_terminal(c) => {
-                // Writing into a String cannot fail.
-                let _ = write!(out, "{}", c.escape_unicode());
-            }
-            _ => out.push(c),
+        if c.is_control() || controls_terminal(c) {
+            out.extend(c.escape_default());
+        } else {
+            out.push(c);
         }
     }
     out
