@@ -231,7 +231,7 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     let scene =
         desk.scene(&(VIEW.to_string() + "shape.sphere = { center = [0, 0, 0], radius = 1 }"));
     let edit = add_object(&scene, "mesh", None).unwrap();
-    let subject = edit.subject.clone();
+    let subject = edit.target.clone();
     let typed = |scene: &Scene, text: &str| set(scene, &subject, "shape.mesh.file", text);
     for (text, words) in [
         ("bell.obj", "there is no such file"),
@@ -253,7 +253,8 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     fs::remove_file(ball_file).unwrap();
     let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
     let rotated = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
-    let lit = set(&rotated, &Target::Ambient, "color", "0.5 0.5 0.5").unwrap().scene;
+    let ambient = Target::Settings(SceneSettings::Ambient);
+    let lit = set(&rotated, &ambient, "color", "0.5 0.5 0.5").unwrap().scene;
     assert_eq!(mesh(&lit), mesh(&named));
     assert!(typed(&lit, "other.obj").is_err());
     assert!(lit.faults().is_empty());

@@ -157,7 +157,7 @@ fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
     if property.components.len() < 2 {
         return vec![line(None, property.label.clone(), &property.value)];
     }
-    let names: &[&str] = match (property.entry, property.components.len()) {
+    let names: &[&str] = match (property.widget, property.components.len()) {
         (Widget::Color, _) => &["red", "green", "blue"],
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],

@@ -51,7 +51,7 @@ pub use zerkalo_scene::TomlText;
 pub use zerkalo_scene::asset::Assets;
 pub use zerkalo_scene::camera::{Aperture, Camera, Focus, ViewAngle};
 pub use zerkalo_scene::disk::Existing;
-pub use zerkalo_scene::edit::Target;
+pub use zerkalo_scene::edit::{SceneSettings, Target};
 pub use zerkalo_scene::light::{
     Directional, Falloff, Light, LightKind, Point, RectangleLight, Spot,
 };

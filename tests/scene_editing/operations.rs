@@ -42,7 +42,7 @@ fn perform(
         2 => ("fine step", edit::step(scene, &subject, &row.key, component, amount * 0.1 + 0.05)),
         3 => ("set", edit::set(scene, &subject, &row.key, text)),
         4 => ("set number", edit::set_component(scene, &subject, &row.key, at % 3, text)),
-        5 => match row.entry {
+        5 => match row.widget {
             Widget::Switch | Widget::Choice | Widget::Kind => {
                 ("toggle", edit::toggle(scene, &subject, &row.key, amount > 0.0))
             }
@@ -90,7 +90,7 @@ fn check_sequence(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), Tes
         match result {
             Ok(edit) => {
                 prop_assert_eq!(edit.scene.faults(), [], "{} {:?}", name, act);
-                prop_assert!(edit.subject.exists(&edit.scene), "{} {:?}", name, edit.subject);
+                prop_assert!(edit.target.exists(&edit.scene), "{} {:?}", name, edit.target);
                 history.record(Arc::new(edit.scene), &edit.label, act.1 % 2 == 0);
             }
             Err(refusal) => prop_assert!(!refusal.found.is_empty() && !name.contains("add m")),

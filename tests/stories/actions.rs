@@ -7,6 +7,7 @@ use zerkalo_scene::camera::Focus as LensFocus;
 
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
+const TRACE: Target = Target::Settings(SceneSettings::Integrator);
 
 /// Expected result of a story: a function of the scene before the keys and of the dashboard after
 /// them. It returns `true` if the story has gone as expected.
@@ -224,13 +225,11 @@ fn panel_stories() -> Vec<Story> {
         story("page down", "Tab PageDown", |_, d| {
             !matches!(d.model.selection, Target::Camera | Target::View(_))
         }),
-        selected("page up", Target::IntegratorSettings, "Tab PageUp", |_, d| {
-            !matches!(d.model.selection, Target::IntegratorSettings | Target::Film)
+        selected("page up", TRACE, "Tab PageUp", |_, d| {
+            ![&TRACE, &Target::Settings(SceneSettings::Film)].contains(&&d.model.selection)
         }),
-        selected("first line", Target::IntegratorSettings, "Tab Home", |_, d| {
-            d.model.selection == Target::Camera
-        }),
-        story("last line", "Tab End", |_, d| d.model.selection == Target::IntegratorSettings),
+        selected("first line", TRACE, "Tab Home", |_, d| d.model.selection == Target::Camera),
+        story("last line", "Tab End", |_, d| d.model.selection == TRACE),
         story("field up", "Enter Right", |_, d| eye(d)[0] > 0.05),
         story("field down", "Enter Left", |_, d| eye(d)[0] < -0.05),
         story("field up, fine", "Enter Shift-Right", |_, d| (0.001..0.05).contains(&eye(d)[0])),

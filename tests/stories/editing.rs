@@ -182,7 +182,7 @@ fn mode_is_one_undo_step() {
     assert_ne!(desk.text(), ROOM);
     desk.keys("u");
     assert_eq!(desk.text(), ROOM);
-    let mut desk = self::desk(Target::Film, "m");
+    let mut desk = self::desk(Target::Settings(SceneSettings::Film), "m");
     assert!(desk.notice().contains("cannot be moved"), "{}", desk.notice());
     desk.keys("Left");
     assert!(desk.scene().camera.eye[0] < 0.0, "the keys still move the camera");
@@ -223,10 +223,10 @@ fn invalid_prompt_answer_keeps_prompt_open() {
 
 #[test]
 fn light_intensity_is_reported_and_selection_stays() {
-    let mut desk = desk(Target::Ambient, "' '");
+    let mut desk = desk(Target::Settings(SceneSettings::Ambient), "' '");
     assert!(desk.scene().ambient.color.0[0] > 0.1 && desk.scene().lights[0].intensity == 1.0);
     assert!(desk.notice().starts_with("ambient: "), "{}", desk.notice());
-    assert_eq!(desk.model.selection, Target::Ambient);
+    assert_eq!(desk.model.selection, Target::Settings(SceneSettings::Ambient));
     desk.keys("L");
     assert!(desk.notice().contains("no switch"));
 }

@@ -27,7 +27,7 @@ fn click_selects_visible_object() {
     desk.click(x, image.y + image.height - 1);
     assert_eq!(desk.model.selection, Target::Object(0), "the floor");
     desk.click(x, image.y);
-    assert_eq!(desk.model.selection, Target::Background);
+    assert_eq!(desk.model.selection, Target::Settings(SceneSettings::Background));
     assert_eq!(desk.text(), ROOM);
 }
 

@@ -133,7 +133,7 @@ fn texture_edits_read_each_file_once() {
         |scene: &Scene, key: &str| rows(scene, &m).unwrap().into_iter().find(|row| row.key == key);
     let texture = row(&scene, "texture").unwrap();
     assert_eq!(
-        (texture.entry, texture.value.as_str(), texture.is_default),
+        (texture.widget, texture.value.as_str(), texture.is_default),
         (Widget::Kind, "", true)
     );
     assert!(row(&scene, "texture.image.file").is_none());

@@ -5,13 +5,13 @@ use crate::dashboard::update::Coalesce;
 use crate::dashboard::update::mouse::first_hit;
 use zerkalo_scene::Scene;
 use zerkalo_scene::camera::{Aperture, Camera};
-use zerkalo_scene::edit::{self, Edit, EditError, Target, bounds};
+use zerkalo_scene::edit::{self, Edit, EditError, SceneSettings, Target, bounds};
 use zerkalo_scene::value::{number, round_significant};
 
 impl UpdateContext<'_> {
     /// Records an edit and reports the new values of the edited part.
     fn adjust(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
-        let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
+        let subject = edit.as_ref().ok().map(|edit| edit.target.clone());
         self.commit(edit, coalesce);
         if let Some(values) = subject.and_then(|subject| values(self.scene(), &subject)) {
             self.say(values);
@@ -37,7 +37,10 @@ impl UpdateContext<'_> {
     /// the background, otherwise the first light.
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
-            s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
+            s @ (Target::Light(_)
+            | Target::Settings(SceneSettings::Ambient | SceneSettings::Background)) => {
+                Ok(s.clone())
+            }
             _ if !self.scene().lights.is_empty() => Ok(Target::Light(0)),
             _ => {
                 let [found, help] = ["there is no light", "A adds one."].map(str::to_string);
@@ -115,8 +118,8 @@ fn values(scene: &Scene, subject: &Target) -> Option<String> {
             let off = if light.on { "" } else { ", off" };
             format!("intensity {}{off}", number(light.intensity))
         }
-        Target::Ambient => color(scene.ambient.color.0),
-        Target::Background => color(scene.background.color.0),
+        Target::Settings(SceneSettings::Ambient) => color(scene.ambient.color.0),
+        Target::Settings(SceneSettings::Background) => color(scene.background.color.0),
         Target::Material(name) => {
             let material = scene.materials.get(name)?;
             let [roughness, reflection] = [material.roughness, material.reflection].map(number);
@@ -125,9 +128,9 @@ fn values(scene: &Scene, subject: &Target) -> Option<String> {
             let lobe = lobe.map_or_else(String::new, |row| format!(" · {}", row.value));
             format!("roughness {roughness} · reflection {reflection}{lobe}")
         }
-        Target::View(_) | Target::Object(_) | Target::Film | Target::IntegratorSettings => {
-            return None;
-        }
+        Target::Settings(SceneSettings::Film | SceneSettings::Integrator)
+        | Target::View(_)
+        | Target::Object(_) => return None,
     };
     Some(format!("{}: {state}", subject.label(scene)))
 }

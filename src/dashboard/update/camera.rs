@@ -32,7 +32,7 @@ impl UpdateContext<'_> {
         let next = Scene { camera, ..Scene::clone(scene) };
         // Camera moves keep a valid camera valid.
         let edit =
-            Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
+            Edit { scene: next, target: Target::Camera, label: "camera".to_string(), note: None };
         self.commit(Ok::<_, EditError>(edit), coalesce);
     }
 

@@ -32,14 +32,14 @@ impl UpdateContext<'_> {
         let words = field.property.words;
         let chosen = !words.is_empty();
         match typed {
-            None if field.property.entry == Widget::Switch => self.step_field(1.0),
+            None if field.property.widget == Widget::Switch => self.step_field(1.0),
             None if chosen && !self.in_form() => {
                 let cursor = words.iter().position(|word| word.name == field.value);
                 self.open_pick(field.label, words, cursor.unwrap_or(0), |c, word| {
                     c.fill_field(word)
                 });
             }
-            Some(' ') if chosen || field.property.entry == Widget::Switch => self.step_field(1.0),
+            Some(' ') if chosen || field.property.widget == Widget::Switch => self.step_field(1.0),
             Some(' ') => {}
             Some(c) => self.set_editor(Some(Editor::new(c))),
             None => self.set_editor(Some(Editor::new(field.value))),

@@ -21,7 +21,7 @@ impl UpdateContext<'_> {
     /// Opens the form for a new object or light of the kind `what`, which `edit` adds.
     pub(super) fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
-            Ok(Edit { scene, subject, label, .. }) => {
+            Ok(Edit { scene, target: subject, label, .. }) => {
                 self.end_mode();
                 self.model.overlay = Some(Overlay::Form(Form {
                     title: format!("new {what}"),
@@ -53,7 +53,7 @@ impl UpdateContext<'_> {
             Arc::make_mut(&mut scene).materials.remove(&name);
         }
         let scene = Arc::unwrap_or_clone(scene);
-        let edit = Edit { scene, subject: form.subject.clone(), label: form.label, note: None };
+        let edit = Edit { scene, target: form.subject.clone(), label: form.label, note: None };
         self.record(edit, Coalesce::Single);
         self.select(form.subject);
         let label = self.model.selection.label(self.scene());

@@ -211,7 +211,7 @@ impl UpdateContext<'_> {
 
     /// Records an edit and selects the edited part. Returns `true` if the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
-        let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
+        let subject = edit.as_ref().ok().map(|edit| edit.target.clone());
         let changed = self.commit(edit, Coalesce::Single);
         if let Some(subject) = subject {
             self.select(subject);

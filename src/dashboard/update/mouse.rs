@@ -7,7 +7,7 @@ use crate::dashboard::{
 use glam::DVec3;
 use ratatui::layout::Rect;
 use zerkalo_scene::Scene;
-use zerkalo_scene::edit::Target;
+use zerkalo_scene::edit::{SceneSettings, Target};
 use zerkalo_terminal::event::{Button, Mouse, MouseKind};
 
 /// Number of lines that a list scrolls per tick of the wheel.
@@ -184,7 +184,9 @@ impl UpdateContext<'_> {
                 return self.focus_on_pixel(pixel);
             }
             let hit = first_hit(self.scene(), pixel);
-            let seen = hit.map_or(Target::Background, |(object, _)| Target::Object(object));
+            let seen = hit.map_or(Target::Settings(SceneSettings::Background), |(object, _)| {
+                Target::Object(object)
+            });
             if seen != self.model.selection {
                 self.end_mode();
             }

@@ -6,7 +6,7 @@ use crate::dashboard::{Editor, Effect, Format, Overlay, Prompt, UpdateContext};
 use std::path::PathBuf;
 use std::sync::Arc;
 use zerkalo_render::schedule::Stop;
-use zerkalo_scene::edit::{self, Target};
+use zerkalo_scene::edit::{self, SceneSettings, Target};
 use zerkalo_scene::value::{number, truncated};
 
 impl UpdateContext<'_> {
@@ -133,7 +133,7 @@ impl UpdateContext<'_> {
         if let Some(more) = words.next() {
             return Err(format!("Unexpected \"{}\".", truncated(more)));
         }
-        let film = edit::set(self.scene(), &Target::Film, "size", size);
+        let film = edit::set(self.scene(), &Target::Settings(SceneSettings::Film), "size", size);
         let scene = film.map_err(|error| error.to_string())?.scene;
         let size = scene.film.size;
         self.model.export = Some(RunningExport { size, progress: 0.0 });

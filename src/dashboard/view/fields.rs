@@ -82,7 +82,7 @@ fn draw_field(
     if let Some(style) = swatch {
         to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
     }
-    let words = matches!(field.property.entry, Widget::Choice | Widget::Kind | Widget::Switch);
+    let words = matches!(field.property.widget, Widget::Choice | Widget::Kind | Widget::Switch);
     match field.value.as_str() {
         "" => to.put("–", theme.dim()),
         word if words && chosen.is_some() => to.put(&format!("‹ {word} ›"), value),

@@ -86,8 +86,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
         Vec::new()
     };
     next.objects.push(Object { name, material, shape, transform });
-    let subject = Target::Object(next.objects.len() - 1);
-    Edit::checked(next, subject, format!("add {kind}"))
+    let target = Target::Object(next.objects.len() - 1);
+    Edit::checked(next, target, format!("add {kind}"))
 }
 
 /// Returns steps that scale the longest side of `shape`, which has no key for its position, to
@@ -183,8 +183,8 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let label = format!("add {}", light.name);
     next.lights.push(light);
-    let subject = Target::Light(next.lights.len() - 1);
-    Ok(Edit::checked(next, subject, label)?.with_note(note))
+    let target = Target::Light(next.lights.len() - 1);
+    Ok(Edit::checked(next, target, label)?.with_note(note))
 }
 
 #[cfg(test)]
@@ -197,7 +197,7 @@ mod tests {
         let scene = mirror_room();
         for word in object_kinds() {
             let edit = add_object(&scene, &word.name, None).unwrap();
-            let Target::Object(i) = edit.subject else { panic!() };
+            let Target::Object(i) = edit.target else { panic!() };
             let object = &edit.scene.objects[i];
             assert_eq!(object.shape.key(), word.name);
             assert_eq!(

@@ -1,5 +1,7 @@
 //! Bounds of objects and scenes: to frame objects, to step coordinates, and to place new objects.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 use crate::edit::Target;
 use crate::value::floor_log10;
 use crate::{Object, Scene};
@@ -21,8 +23,8 @@ pub(super) type Extent = (DVec3, DVec3);
 /// infinite object, such as a plane, has a sphere around its position, with the radius R of
 /// [`scene_bounds`]. A light has a sphere with its own radius, at least R / 10, and none without a
 /// position. The sphere of a material contains all finite objects that use it.
-pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
-    match subject {
+pub fn bounds(scene: &Scene, target: &Target) -> Option<BoundingSphere> {
+    match target {
         Target::Object(i) => {
             let object = scene.objects.get(*i)?;
             Some(match object.form().bounds() {
@@ -44,7 +46,7 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
             let used = scene.objects.iter().filter(|o| o.names_material(name));
             used.filter_map(|o| o.form().bounds()).reduce(union).map(ball)
         }
-        _ => None,
+        Target::Camera | Target::View(_) | Target::Settings(_) => None,
     }
 }
 
@@ -95,6 +97,7 @@ pub fn pivot_distance(scene: &Scene) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::SceneSettings;
     use crate::testing::mirror_room;
 
     #[test]
@@ -107,7 +110,7 @@ mod tests {
         assert!((floor.radius - 32f64.sqrt()).abs() < 1e-12 && floor.center == [0.0; 3]);
         let red = bounds(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(red, bounds(&scene, &Target::Object(2)).unwrap());
-        assert_eq!(bounds(&scene, &Target::Film), None);
+        assert_eq!(bounds(&scene, &Target::Settings(SceneSettings::Film)), None);
         scene.objects.truncate(1);
         assert_eq!(scene_bounds(&scene), floor, "without solids what there is");
         scene.objects.clear();

@@ -42,24 +42,24 @@ pub(super) const AIM: Field = Field::required(
 /// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
-    subject: &Target,
+    target: &Target,
     key: &str,
     name: &str,
 ) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let mut note = None;
-    match subject {
+    match target {
         Target::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             note = switch_light(light, scene, name);
         }
         Target::Camera => switch_camera(&mut next.camera, scene, key, name),
         Target::View(view) => {
-            let camera = next.cameras.get_mut(view).ok_or_else(|| EditError::gone(subject))?;
+            let camera = next.cameras.get_mut(view).ok_or_else(|| EditError::gone(target))?;
             switch_camera(camera, scene, key, name);
         }
         Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             if object.shape.key() != name
                 && let Some(shape) = convert_shape(&object.shape, name, scene)
             {
@@ -68,13 +68,13 @@ pub(super) fn switch(
         }
         Target::Material(material) => {
             let material =
-                next.materials.get_mut(material).ok_or_else(|| EditError::gone(subject))?;
+                next.materials.get_mut(material).ok_or_else(|| EditError::gone(target))?;
             switch_texture(material, key, name);
         }
-        Target::Ambient | Target::Background | Target::Film | Target::IntegratorSettings => {}
+        Target::Settings(_) => {}
     }
-    let label = label(&next, subject, key);
-    Ok(Edit::checked(next, subject.clone(), label)?.with_note(note))
+    let label = label(&next, target, key);
+    Ok(Edit::checked(next, target.clone(), label)?.with_note(note))
 }
 
 /// Returns a shape of the kind `name` with the place, size and rotation of `shape`.
@@ -173,8 +173,8 @@ pub(super) fn switch_falloff(
     index: usize,
     falloff: KeyValue,
 ) -> Result<Edit, EditError> {
-    let subject = Target::Light(index);
-    let mut edit = replace(scene, &subject, "falloff", falloff)?;
+    let target = Target::Light(index);
+    let mut edit = replace(scene, &target, "falloff", falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
     if light.falloff != old.falloff {
@@ -266,11 +266,11 @@ mod tests {
     fn converted_shapes_keep_place_and_size() {
         let scene = mirror_room();
         for object in 0..scene.objects.len() {
-            let subject = Target::Object(object);
+            let target = Target::Object(object);
             // The canonical cylinder and meshes are placed by a transform alone.
             let unplaced = ["unit_frustum", "mesh"];
             for kind in KINDS.iter().filter(|kind| !unplaced.contains(&kind.name)) {
-                let edit = set(&scene, &subject, "shape", kind.name);
+                let edit = set(&scene, &target, "shape", kind.name);
                 let edit = edit.unwrap_or_else(|e| panic!("{object} -> {}: {e}", kind.name));
                 let (old, new) = (&scene.objects[object], &edit.scene.objects[object]);
                 assert_eq!(new.shape.key(), kind.name);
@@ -282,7 +282,7 @@ mod tests {
                 assert!((from - to).length() <= 0.6 * size, "{object} {}: {from} {to}", kind.name);
                 assert!((b.1 - b.0).length() <= 1.5 * size, "{object} {}", kind.name);
             }
-            let same = set(&scene, &subject, "shape", scene.objects[object].shape.key()).unwrap();
+            let same = set(&scene, &target, "shape", scene.objects[object].shape.key()).unwrap();
             assert_eq!(same.scene, scene);
         }
         let upright = set(&scene, &Target::Object(3), "shape", "prism").unwrap();

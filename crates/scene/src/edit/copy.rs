@@ -1,5 +1,7 @@
 //! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 use crate::Scene;
 use crate::edit::bounds::bounds;
 use crate::edit::parse_value::name;
@@ -13,12 +15,12 @@ use glam::DVec3;
 /// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
 /// object is moved to a free place on the same level, or down if it is infinite. A light is moved
 /// along x. Fails for targets of which a scene has exactly one, such as the camera.
-pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
-    if !subject.exists(scene) {
-        return Err(EditError::gone(subject));
+pub fn duplicate(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
+    if !target.exists(scene) {
+        return Err(EditError::gone(target));
     }
     let mut next = scene.clone();
-    let copy = match subject {
+    let copy = match target {
         Target::Object(i) => {
             let mut copy = scene.objects[*i].clone();
             if !copy.name.is_empty() {
@@ -35,7 +37,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
                 let by = by.map(|x| crate::value::rounded_to(x, digits));
                 move_object(&mut copy, by.to_array());
             } else {
-                let ball = bounds(scene, subject);
+                let ball = bounds(scene, target);
                 move_object(&mut copy, [0.0, -0.1 * ball.map_or(1.0, |b| b.radius), 0.0]);
             }
             next.objects.push(copy);
@@ -63,27 +65,27 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             next.cameras.insert(new.clone(), scene.cameras[old].clone());
             Target::View(new)
         }
-        _ => {
-            let found = format!("there is only one {}", subject.label(scene));
+        Target::Camera | Target::Settings(_) => {
+            let found = format!("there is only one {}", target.label(scene));
             return Err(EditError::new(&found, ""));
         }
     };
-    Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
+    Edit::checked(next, copy, format!("duplicate {}", target.label(scene)))
 }
 
 /// Deletes an object, a light, a stored camera or a material. Objects whose material is deleted get
 /// the default material, parts of compounds get that of the whole; the note names these objects.
 /// Fails for targets that every scene has.
-pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
-    if !subject.exists(scene) {
-        return Err(EditError::gone(subject));
+pub fn delete(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
+    if !target.exists(scene) {
+        return Err(EditError::gone(target));
     }
-    let label = format!("delete {}", subject.label(scene));
+    let label = format!("delete {}", target.label(scene));
     let mut next = scene.clone();
     let mut note = None;
     // Index to select after entry `i` was deleted and `left` remain.
     let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
-    let select = match subject {
+    let select = match target {
         Target::Object(i) => {
             next.objects.remove(*i);
             neighbour(*i, next.objects.len()).map(Target::Object)
@@ -101,8 +103,8 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             note = strip(&mut next, name);
             following(next.materials.keys(), name).map(Target::Material)
         }
-        _ => {
-            let found = format!("{} belongs to every scene", subject.label(scene));
+        Target::Camera | Target::Settings(_) => {
+            let found = format!("{} belongs to every scene", target.label(scene));
             return Err(EditError::new(&found, "Only its values can be changed."));
         }
     };
@@ -150,22 +152,22 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
 
 /// Renames an object, a light, a material or a stored camera. Fails for a name that exists already
 /// or is not printable. Only objects and lights may have an empty name.
-pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
-    if !subject.exists(scene) {
-        return Err(EditError::gone(subject));
+pub fn rename(scene: &Scene, target: &Target, new: &str) -> Result<Edit, EditError> {
+    if !target.exists(scene) {
+        return Err(EditError::gone(target));
     }
     let new = name("name", new)?;
     let mut next = scene.clone();
     let needed = || EditError::new("the name must not be empty", "Type one.");
     let taken = |what| EditError::new(&format!("there is a {what} \"{new}\" already"), "");
-    let select = match subject {
+    let select = match target {
         Target::Object(i) => {
             next.objects[*i].name = new.clone();
-            subject.clone()
+            target.clone()
         }
         Target::Light(i) => {
             next.lights[*i].name = new.clone();
-            subject.clone()
+            target.clone()
         }
         Target::Material(_) | Target::View(_) if new.is_empty() => return Err(needed()),
         Target::Material(old) => {
@@ -185,41 +187,42 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
             next.cameras.extend(moved.map(|view| (new.clone(), view)));
             Target::View(new.clone())
         }
-        _ => {
-            let found = format!("{} has no name to change", subject.label(scene));
+        Target::Camera | Target::Settings(_) => {
+            let found = format!("{} has no name to change", target.label(scene));
             return Err(EditError::new(&found, ""));
         }
     };
-    Edit::checked(next, select, format!("rename {}", subject.label(scene)))
+    Edit::checked(next, select, format!("rename {}", target.label(scene)))
 }
 
 /// Gives an object a copy of its material that no other object uses.
-pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
-    let Target::Object(index) = subject else {
+pub fn own_material(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = target else {
         return Err(EditError::new("only objects have a material", "Select an object."));
     };
-    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(subject))?;
+    let object = scene.objects.get(*index).ok_or_else(|| EditError::gone(target))?;
     let mut next = scene.clone();
     let old = scene.materials.get(&object.material).cloned().unwrap_or_default();
     let wanted = if object.name.is_empty() { object.shape.key() } else { &object.name };
     let new = free_material(scene, wanted);
     next.materials.insert(new.clone(), old);
     next.objects[*index].material = new.clone();
-    let label = format!("own material for {}", subject.label(scene));
-    Ok(Edit::checked(next, subject.clone(), label)?
+    let label = format!("own material for {}", target.label(scene));
+    Ok(Edit::checked(next, target.clone(), label)?
         .with_note(Some(format!("Its material is {} now.", truncated(&new)))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::SceneSettings;
     use crate::testing::mirror_room;
 
     #[test]
     fn duplicates_are_apart_and_have_unique_names() {
         let scene = mirror_room();
         let edit = duplicate(&scene, &Target::Object(3)).unwrap();
-        assert_eq!(edit.subject, Target::Object(6));
+        assert_eq!(edit.target, Target::Object(6));
         let (old, new) = (&scene.objects[3], &edit.scene.objects[6]);
         assert_eq!((new.name.as_str(), &new.material), ("cube 2", &old.material));
         let (a, b) = (old.form().bounds().unwrap(), new.form().bounds().unwrap());
@@ -229,8 +232,8 @@ mod tests {
         assert_eq!(lamp.lights[1].name, "lamp 2");
         assert_ne!(lamp.lights[1].kind, lamp.lights[0].kind);
         let red = duplicate(&scene, &Target::Material("red".into())).unwrap();
-        assert_eq!(red.subject, Target::Material("red 2".into()));
-        assert!(duplicate(&scene, &Target::Film).is_err());
+        assert_eq!(red.target, Target::Material("red 2".into()));
+        assert!(duplicate(&scene, &Target::Settings(SceneSettings::Film)).is_err());
         assert!(duplicate(&scene, &Target::Light(7)).is_err());
     }
 
@@ -238,15 +241,15 @@ mod tests {
     fn delete_selects_neighbour_and_notes_lost_materials() {
         let scene = mirror_room();
         let edit = delete(&scene, &Target::Object(5)).unwrap();
-        assert_eq!((edit.subject, edit.scene.objects.len()), (Target::Object(4), 5));
+        assert_eq!((edit.target, edit.scene.objects.len()), (Target::Object(4), 5));
         let edit = delete(&scene, &Target::Object(2)).unwrap();
-        assert_eq!(edit.subject, Target::Object(2));
+        assert_eq!(edit.target, Target::Object(2));
         let edit = delete(&scene, &Target::Material("red".into())).unwrap();
         assert_eq!(edit.scene.objects[2].material, "");
         assert_eq!(edit.note.as_deref(), Some("ball has the default material now."));
-        assert_eq!(edit.subject, Target::Material("yellow".into()));
+        assert_eq!(edit.target, Target::Material("yellow".into()));
         let edit = delete(&scene, &Target::Light(0)).unwrap();
-        assert_eq!(edit.subject, Target::Camera);
+        assert_eq!(edit.target, Target::Camera);
         assert!(delete(&scene, &Target::Camera).is_err());
     }
 
@@ -256,20 +259,20 @@ mod tests {
         let red = Target::Material("red".into());
         let edit = rename(&scene, &red, " crimson ").unwrap();
         assert_eq!(edit.scene.objects[2].material, "crimson");
-        assert_eq!(edit.subject, Target::Material("crimson".into()));
+        assert_eq!(edit.target, Target::Material("crimson".into()));
         assert_eq!(rename(&scene, &red, "red").unwrap().scene, scene);
         assert_eq!(
             rename(&scene, &Target::Object(2), "bowl").unwrap().scene.objects[2].name,
             "bowl"
         );
-        for (subject, new) in [
+        for (target, new) in [
             (red.clone(), "green"),
             (red, ""),
             (Target::Object(2), "cube"),
             (Target::Object(2), "a\nb"),
             (Target::Camera, "x"),
         ] {
-            assert!(rename(&scene, &subject, new).is_err(), "{subject:?} {new:?}");
+            assert!(rename(&scene, &target, new).is_err(), "{target:?} {new:?}");
         }
     }
 

@@ -20,18 +20,18 @@ use crate::value::{
 /// then states the reason. Fails if there is no such key or number, or no value to start from.
 pub fn step(
     scene: &Scene,
-    subject: &Target,
+    target: &Target,
     key: &str,
     component: Option<usize>,
     steps: f64,
 ) -> Result<Edit, EditError> {
-    let part = part(scene, subject)?;
-    let field = lookup(subject, key)?;
+    let part = part(scene, target)?;
+    let field = lookup(target, key)?;
     let Some(rule) = StepRule::of(field, scene) else {
-        return toggle(scene, subject, key, steps > 0.0);
+        return toggle(scene, target, key, steps > 0.0);
     };
     let given = node_at(part, key).and_then(KeyNode::value);
-    let given = given.or_else(|| start(field, scene, subject));
+    let given = given.or_else(|| start(field, scene, target));
     let Some(KeyValue::Numbers(numbers)) = given else {
         return Err(EditError::new(&format!("{} has no value yet", field.name), "Type one."));
     };
@@ -53,10 +53,10 @@ pub fn step(
     // A direction of zeros is invalid.
     let is_zero = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
     let next = if is_zero { numbers } else { next };
-    replace(scene, subject, key, KeyValue::Numbers(next)).or_else(|refusal| {
-        let (scene, subject) = (scene.clone(), subject.clone());
-        let label = label(&scene, &subject, key);
-        Ok(Edit { scene, subject, label, note: Some(refusal.to_string()) })
+    replace(scene, target, key, KeyValue::Numbers(next)).or_else(|refusal| {
+        let (scene, target) = (scene.clone(), target.clone());
+        let label = label(&scene, &target, key);
+        Ok(Edit { scene, target, label, note: Some(refusal.to_string()) })
     })
 }
 
@@ -65,12 +65,12 @@ pub fn step(
 /// no such key, or it has no choices.
 pub fn toggle(
     scene: &Scene,
-    subject: &Target,
+    target: &Target,
     key: &str,
     forward: bool,
 ) -> Result<Edit, EditError> {
-    let part = part(scene, subject)?;
-    let field = lookup(subject, key)?;
+    let part = part(scene, target)?;
+    let field = lookup(target, key)?;
     let value = node_at(part, key).and_then(KeyNode::value);
     let word = match &value {
         Some(KeyValue::Text(word)) => Some(word.as_str()),
@@ -80,13 +80,13 @@ pub fn toggle(
     let (words, present): (Vec<&str>, Option<&str>) = match field.takes {
         ValueType::Switch => {
             let on = value == Some(KeyValue::Switch(true));
-            return crate::edit::set(scene, subject, key, if on { "false" } else { "true" });
+            return crate::edit::set(scene, target, key, if on { "false" } else { "true" });
         }
         ValueType::OneOf(kinds) => {
-            (kinds.iter().map(|k| k.name).collect(), word.or_else(|| given_key(part, subject)))
+            (kinds.iter().map(|k| k.name).collect(), word.or_else(|| given_key(part, target)))
         }
         ValueType::Choice(choices) => (choices.iter().map(|c| c.name).collect(), word),
-        _ if is_material(subject, field) => {
+        _ if is_material(target, field) => {
             let names = scene.materials.keys().map(String::as_str);
             (names.collect(), word)
         }
@@ -97,7 +97,7 @@ pub fn toggle(
     };
     let index = words.iter().position(|word| Some(*word) == present);
     let text = next(index, words.len(), forward, optional).map_or("", |index| words[index]);
-    crate::edit::set(scene, subject, key, text)
+    crate::edit::set(scene, target, key, text)
 }
 
 /// Returns the index of the next or previous of `n` choices in a cycle. `None` stands for "no
@@ -116,8 +116,8 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
 }
 
 /// Returns the value, given by other keys, from which steps of an absent `alpha` or `f0` start.
-fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<KeyValue> {
-    let material = match subject {
+fn start(field: &Field, scene: &Scene, target: &Target) -> Option<KeyValue> {
+    let material = match target {
         Target::Material(name) => scene.materials.get(name),
         _ => None,
     };

@@ -1,26 +1,26 @@
 //! Tests of the arrow keys that step a property's value: round values, steps back, limits.
 
 use crate::Scene;
-use crate::edit::{Property, Target, Widget, outline, rows, set, step, toggle};
+use crate::edit::{Property, SceneSettings, Target, Widget, outline, rows, set, step, toggle};
 use crate::testing::mirror_room;
 
 /// Returns the value of the property `key` as text, after `steps` steps of the arrow keys.
-fn after(scene: &Scene, subject: &Target, key: &str, steps: f64) -> String {
-    let edit = step(scene, subject, key, None, steps).unwrap_or_else(|e| panic!("{key}: {e}"));
-    value(&edit.scene, subject, key)
+fn after(scene: &Scene, target: &Target, key: &str, steps: f64) -> String {
+    let edit = step(scene, target, key, None, steps).unwrap_or_else(|e| panic!("{key}: {e}"));
+    value(&edit.scene, target, key)
 }
 
-fn value(scene: &Scene, subject: &Target, key: &str) -> String {
-    row(scene, subject, key).value
+fn value(scene: &Scene, target: &Target, key: &str) -> String {
+    row(scene, target, key).value
 }
 
-fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
-    let rows = rows(scene, subject).unwrap();
+fn row(scene: &Scene, target: &Target, key: &str) -> Property {
+    let rows = rows(scene, target).unwrap();
     rows.into_iter().find(|r| r.key == key).unwrap_or_else(|| panic!("no row {key}"))
 }
 
-fn with(subject: &Target, key: &str, text: &str) -> Scene {
-    set(&mirror_room(), subject, key, text).unwrap_or_else(|e| panic!("{key} = {text}: {e}")).scene
+fn with(target: &Target, key: &str, text: &str) -> Scene {
+    set(&mirror_room(), target, key, text).unwrap_or_else(|e| panic!("{key} = {text}: {e}")).scene
 }
 
 #[test]
@@ -28,7 +28,8 @@ fn arrow_steps_of_each_number_kind() {
     let ball = Target::Object(2);
     let red = Target::Material("red".into());
     let lamp = Target::Light(0);
-    for (subject, key, from, steps, to) in [
+    let [film, trace] = [SceneSettings::Film, SceneSettings::Integrator].map(Target::Settings);
+    for (target, key, from, steps, to) in [
         (&ball, "shape.sphere.radius", "0.5", 1.0, "0.55"),
         (&ball, "shape.sphere.radius", "0.5", -1.0, "0.45"),
         (&ball, "shape.sphere.radius", "0.5", 0.1, "0.505"),
@@ -63,19 +64,19 @@ fn arrow_steps_of_each_number_kind() {
         (&lamp, "intensity", "0", 1.0, "0.01"),
         (&lamp, "intensity", "0.01", -1.0, "0"),
         (&lamp, "color", "4 2 1", 1.0, "4.5, 2.25, 1.125"),
-        (&Target::IntegratorSettings, "max_depth", "16", 0.1, "17"),
-        (&Target::IntegratorSettings, "max_depth", "16", 1.0, "26"),
-        (&Target::IntegratorSettings, "max_depth", "3", -1.0, "0"),
-        (&Target::Film, "rays_per_pixel", "0", 1.0, "1"),
-        (&Target::Film, "rays_per_pixel", "64", 1.0, "128"),
-        (&Target::Film, "rays_per_pixel", "1", -1.0, "0"),
-        (&Target::Film, "size", "640 480", 1.0, "1280, 960"),
-        (&Target::Film, "size", "640 480", -0.1, "624, 468"),
-        (&Target::Film, "size", "8192 8192", 1.0, "16384, 16384"),
-        (&Target::Film, "size", "16384 16384", 1.0, "16384, 16384"),
+        (&trace, "max_depth", "16", 0.1, "17"),
+        (&trace, "max_depth", "16", 1.0, "26"),
+        (&trace, "max_depth", "3", -1.0, "0"),
+        (&film, "rays_per_pixel", "0", 1.0, "1"),
+        (&film, "rays_per_pixel", "64", 1.0, "128"),
+        (&film, "rays_per_pixel", "1", -1.0, "0"),
+        (&film, "size", "640 480", 1.0, "1280, 960"),
+        (&film, "size", "640 480", -0.1, "624, 468"),
+        (&film, "size", "8192 8192", 1.0, "16384, 16384"),
+        (&film, "size", "16384 16384", 1.0, "16384, 16384"),
     ] {
-        let scene = with(subject, key, from);
-        assert_eq!(after(&scene, subject, key, steps), to, "{key} {from} {steps:+}");
+        let scene = with(target, key, from);
+        assert_eq!(after(&scene, target, key, steps), to, "{key} {from} {steps:+}");
     }
 }
 
@@ -84,8 +85,9 @@ fn arrow_step_of_one_component() {
     let ball = Target::Object(2);
     let edit = step(&mirror_room(), &ball, "shape.sphere.center", Some(2), -1.0).unwrap();
     assert_eq!(value(&edit.scene, &ball, "shape.sphere.center"), "-0.9, 0.5, -0.1");
-    let edit = step(&mirror_room(), &Target::Film, "size", Some(0), 0.1).unwrap();
-    assert_eq!(value(&edit.scene, &Target::Film, "size"), "641, 480");
+    let film = Target::Settings(SceneSettings::Film);
+    let edit = step(&mirror_room(), &film, "size", Some(0), 0.1).unwrap();
+    assert_eq!(value(&edit.scene, &film, "size"), "641, 480");
     assert!(step(&mirror_room(), &ball, "shape.sphere.center", Some(3), 1.0).is_err());
     let mirror = Target::Object(1);
     let flat = with(&mirror, "shape.rectangle.normal", "0.05 0 0");
@@ -137,9 +139,9 @@ fn arrow_step_of_missing_key_starts_from_default() {
 #[test]
 fn arrow_steps_stop_at_range_ends() {
     let scene = mirror_room();
-    for (_, subject) in outline(&scene) {
-        for row in rows(&scene, &subject).unwrap() {
-            if !matches!(row.entry, Widget::Numbers | Widget::Color) {
+    for (_, target) in outline(&scene) {
+        for row in rows(&scene, &target).unwrap() {
+            if !matches!(row.widget, Widget::Numbers | Widget::Color) {
                 continue;
             }
             for component in std::iter::once(None).chain((0..row.components.len()).map(Some)) {
@@ -148,8 +150,8 @@ fn arrow_steps_stop_at_range_ends() {
                 {
                     let mut now = scene.clone();
                     for _ in 0..times {
-                        let edit = step(&now, &subject, &row.key, component, steps);
-                        let edit = edit.unwrap_or_else(|e| panic!("{subject:?} {}: {e}", row.key));
+                        let edit = step(&now, &target, &row.key, component, steps);
+                        let edit = edit.unwrap_or_else(|e| panic!("{target:?} {}: {e}", row.key));
                         let at_the_end = edit.scene == now;
                         now = edit.scene;
                         if at_the_end {

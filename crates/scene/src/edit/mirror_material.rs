@@ -17,8 +17,8 @@ use crate::shape::Shape;
 ///   increased from 0.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
-    let chosen = selected.and_then(|subject| {
-        let Target::Material(name) = subject.material(scene)? else { return None };
+    let chosen = selected.and_then(|target| {
+        let Target::Material(name) = target.material(scene)? else { return None };
         Some(name)
     });
     let is_specular = |material: &String| {
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn mirror_prefers_selection_then_rectangle() {
         let mut scene = mirror_room();
-        let at = |scene: &Scene, subject: Option<Target>| mirror(scene, subject.as_ref()).unwrap();
+        let at = |scene: &Scene, target: Option<Target>| mirror(scene, target.as_ref()).unwrap();
         assert_eq!(at(&scene, None), "mirror");
         assert_eq!(at(&scene, Some(Target::Object(2))), "red");
         assert_eq!(at(&scene, Some(Target::Object(3))), "mirror", "the cube does not reflect");

@@ -31,7 +31,7 @@ pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
 pub use rotate::rotate;
 pub use set::{set, set_component};
-pub use target::{Section, Target, outline};
+pub use target::{SceneSettings, Section, Target, outline};
 pub use translate::move_by;
 pub use viewpoints::{recall_view, store_view};
 
@@ -45,7 +45,7 @@ pub struct Edit {
     /// Edited scene, which is valid.
     pub scene: Scene,
     /// Target to select after the edit.
-    pub subject: Target,
+    pub target: Target,
     /// Label in the undo history, such as `move cube`. Only edits with the same label are
     /// coalesced.
     pub label: String,
@@ -76,13 +76,13 @@ impl EditError {
         Self { found: found.to_string(), help: help.to_string() }
     }
 
-    fn gone(subject: &Target) -> Self {
-        let what = match subject {
+    fn gone(target: &Target) -> Self {
+        let what = match target {
             Target::View(name) => format!("there is no camera \"{}\"", truncated(name)),
             Target::Material(name) => format!("there is no material \"{}\"", truncated(name)),
             Target::Light(i) => format!("there is no light {}", i + 1),
             Target::Object(i) => format!("there is no object {}", i + 1),
-            _ => "it cannot be read".to_string(),
+            Target::Camera | Target::Settings(_) => "it cannot be read".to_string(),
         };
         Self::new(&what, "")
     }
@@ -90,11 +90,11 @@ impl EditError {
 
 impl Edit {
     /// Creates the edit whose result is `scene`, or returns the first validation error.
-    fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
+    fn checked(mut scene: Scene, target: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {
             Some(fault) => Err(EditError { found: fault.found, help: fault.help }),
-            None => Ok(Self { scene, subject, label, note: None }),
+            None => Ok(Self { scene, target, label, note: None }),
         }
     }
 

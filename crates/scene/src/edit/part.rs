@@ -5,50 +5,46 @@ use crate::light::LightKind;
 use crate::value::{Field, KeyNode, ValueType};
 use crate::{FIELDS, Scene};
 
-/// Returns the keys that scene files permit for `subject`, with their types and defaults.
-pub(super) fn fields(subject: &Target) -> &'static [Field] {
-    match FIELDS.iter().find(|field| field.name == subject.path()[0]).map(|field| field.takes) {
+/// Returns the keys that scene files permit for `target`, with their types and defaults.
+pub(super) fn fields(target: &Target) -> &'static [Field] {
+    match FIELDS.iter().find(|field| field.name == target.path()[0]).map(|field| field.takes) {
         Some(ValueType::Table(fields) | ValueType::Named(fields)) => fields,
         Some(ValueType::Tables(fields)) => fields(),
         _ => &[],
     }
 }
 
-/// Returns the keys of `subject` of which at most one may be given.
-pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
-    match subject {
+/// Returns the keys of `target` of which at most one may be given.
+pub(super) fn exclusive_keys(target: &Target) -> &'static [&'static str] {
+    match target {
         Target::Camera | Target::View(_) => &["target", "direction"],
         Target::Light(_) => LightKind::KEYS,
         Target::Material(_) => &["f0", "metal"],
-        Target::Ambient
-        | Target::Background
-        | Target::Object(_)
-        | Target::Film
-        | Target::IntegratorSettings => &[],
+        Target::Object(_) | Target::Settings(_) => &[],
     }
 }
 
-/// Returns the part of `scene` that `subject` names.
-pub(super) fn part<'a>(scene: &'a Scene, subject: &Target) -> Result<&'a dyn KeyNode, EditError> {
+/// Returns the part of `scene` that `target` names.
+pub(super) fn part<'a>(scene: &'a Scene, target: &Target) -> Result<&'a dyn KeyNode, EditError> {
     let root: &dyn KeyNode = scene;
-    let part = subject.path().iter().try_fold(root, |node, key| node.child(key));
-    part.ok_or_else(|| EditError::gone(subject))
+    let part = target.path().iter().try_fold(root, |node, key| node.child(key));
+    part.ok_or_else(|| EditError::gone(target))
 }
 
 /// Returns [`part`] as a mutable reference.
 pub(super) fn part_mut<'a>(
     scene: &'a mut Scene,
-    subject: &Target,
+    target: &Target,
 ) -> Result<&'a mut dyn KeyNode, EditError> {
     let root: &mut dyn KeyNode = scene;
-    let part = subject.path().iter().try_fold(root, |node, key| node.child_mut(key));
-    part.ok_or_else(|| EditError::gone(subject))
+    let part = target.path().iter().try_fold(root, |node, key| node.child_mut(key));
+    part.ok_or_else(|| EditError::gone(target))
 }
 
 /// Returns the one of the [`exclusive_keys`] that is given; `None` if none is.
-pub(super) fn given_key(part: &dyn KeyNode, subject: &Target) -> Option<&'static str> {
+pub(super) fn given_key(part: &dyn KeyNode, target: &Target) -> Option<&'static str> {
     let is_given = |key: &&&str| part.child(key).is_some_and(|node| !node.is_absent());
-    exclusive_keys(subject).iter().find(is_given).copied()
+    exclusive_keys(target).iter().find(is_given).copied()
 }
 
 /// Returns the field of the dotted path `key` (keys, list indices); `None` if there is none.

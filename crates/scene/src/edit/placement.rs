@@ -13,12 +13,12 @@ use zerkalo_kernel::primitive::Form;
 /// Lowers an object onto the highest surface below its centre and its lowest corners, or raises it
 /// to the lowest surface above if there is none below. Fails for targets other than objects, for
 /// infinite objects, and if there is no surface at all.
-pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
-    let Target::Object(index) = subject else {
+pub fn snap_to_ground(scene: &Scene, target: &Target) -> Result<Edit, EditError> {
+    let Target::Object(index) = target else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
     };
-    if !subject.exists(scene) {
-        return Err(EditError::gone(subject));
+    if !target.exists(scene) {
+        return Err(EditError::gone(target));
     }
     let mut others: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let form = others.remove(*index);
@@ -52,8 +52,8 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
         let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
         lift(dropped, support_height - lowest);
     }
-    let label = format!("drop {}", subject.label(scene));
-    Edit::checked(next, subject.clone(), label)
+    let label = format!("drop {}", target.label(scene));
+    Edit::checked(next, target.clone(), label)
 }
 
 /// Moves an object up by exactly `by`.
@@ -193,9 +193,9 @@ mod tests {
         let scene = mirror_room();
         for i in 2..6 {
             for by in [[0.0, 1.23, 0.0], [0.0, -0.217, 0.0], [0.1, 0.777, 0.1]] {
-                let subject = Target::Object(i);
-                let up = move_by(&scene, &subject, by).unwrap().scene;
-                let down = snap_to_ground(&up, &subject).unwrap();
+                let target = Target::Object(i);
+                let up = move_by(&scene, &target, by).unwrap().scene;
+                let down = snap_to_ground(&up, &target).unwrap();
                 assert_eq!(lowest(&down.scene, i), 0.0, "object {i} {by:?}");
             }
         }

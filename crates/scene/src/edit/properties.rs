@@ -18,8 +18,8 @@ pub struct Word {
     pub doc: String,
 }
 
-/// Kind of a property's value, by which an inspector chooses the input element. Choices, kinds and
-/// lists take [`Property::words`].
+/// Input element for the value of a property in an inspector. Choices, kinds and lists take
+/// [`Property::words`].
 #[allow(missing_docs, reason = "the names say it")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Widget {
@@ -44,8 +44,8 @@ pub struct Property {
     pub label: String,
     /// Nesting depth of the property, by which its row is indented: 0, 1 or 2.
     pub depth: usize,
-    /// Kind of the value, which determines the input element of the inspector.
-    pub entry: Widget,
+    /// Input element of the inspector.
+    pub widget: Widget,
     /// Value as text, in the form in which it can be typed; empty if the key has no value.
     pub value: String,
     /// Each number of the value as text.
@@ -66,33 +66,28 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject` in the order of the manual, without the properties of an
+/// Returns the properties of `target` in the order of the manual, without the properties of an
 /// object's material.
-pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
-    let part = part(scene, subject)?;
-    let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };
-    let virtual_kind = match subject {
+pub fn rows(scene: &Scene, target: &Target) -> Result<Vec<Property>, EditError> {
+    let part = part(scene, target)?;
+    let mut walk = PropertyWalker { scene, target, rows: Vec::new() };
+    let virtual_kind = match target {
         Target::Light(_) => Some(&KIND),
         Target::Camera | Target::View(_) => Some(&AIM),
-        Target::Ambient
-        | Target::Background
-        | Target::Object(_)
-        | Target::Material(_)
-        | Target::Film
-        | Target::IntegratorSettings => None,
+        Target::Object(_) | Target::Material(_) | Target::Settings(_) => None,
     };
-    let given = given_key(part, subject);
+    let given = given_key(part, target);
     let hidden_key =
-        |name: &str| matches!(subject, Target::Light(i) if !scene.lights[*i].has_key(name));
-    for field in fields(subject) {
+        |name: &str| matches!(target, Target::Light(i) if !scene.lights[*i].has_key(name));
+    for field in fields(target) {
         if hidden_key(field.name) {
             continue;
         }
         if let Some(kind) = virtual_kind
-            && exclusive_keys(subject).contains(&field.name)
+            && exclusive_keys(target).contains(&field.name)
         {
             // One row chooses between the exclusive keys; the row of the key that is given follows.
-            if exclusive_keys(subject)[0] == field.name {
+            if exclusive_keys(target)[0] == field.name {
                 walk.kind(kind, given, kind.name.to_string(), 0);
             }
             if given == Some(field.name)
@@ -110,7 +105,7 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
 /// Collector of the rows of one edit target.
 struct PropertyWalker<'a> {
     scene: &'a Scene,
-    subject: &'a Target,
+    target: &'a Target,
     rows: Vec<Property>,
 }
 
@@ -148,7 +143,7 @@ impl PropertyWalker<'_> {
     ) {
         let steps: Vec<_> = (0..).map_while(|i: usize| list.child(&i.to_string())).collect();
         let mut row = self.row(field, key.to_string(), depth);
-        row.entry = Widget::List;
+        row.widget = Widget::List;
         row.value = match steps.len() {
             0 => String::new(),
             1 => "1 step".to_string(),
@@ -173,7 +168,7 @@ impl PropertyWalker<'_> {
         if let ValueType::OneOf(kinds) = field.takes {
             row.words = words(kinds);
         }
-        row.entry = Widget::Kind;
+        row.widget = Widget::Kind;
         row.value = given.unwrap_or_default().to_string();
         let optional = matches!(field.preset, DefaultValue::Without(_));
         row.default = row.default.filter(|_| optional);
@@ -198,20 +193,20 @@ impl PropertyWalker<'_> {
             }
         }
         match field.takes {
-            ValueType::Text => row.entry = Widget::Text,
-            ValueType::Switch => row.entry = Widget::Switch,
+            ValueType::Text => row.widget = Widget::Text,
+            ValueType::Switch => row.widget = Widget::Switch,
             ValueType::Choice(choices) => {
-                row.entry = Widget::Choice;
+                row.widget = Widget::Choice;
                 let word = |c: &Choice| Word { name: c.name.into(), doc: c.doc.into() };
                 row.words = choices.iter().map(word).collect();
             }
-            ValueType::Color(_) => row.entry = Widget::Color,
+            ValueType::Color(_) => row.widget = Widget::Color,
             // Edits can only read the parts of a compound.
             ValueType::Tables(_) => row.value = written(field.takes, node).to_string(),
             _ => {}
         }
-        if is_material(self.subject, field) {
-            row.entry = Widget::Choice;
+        if is_material(self.target, field) {
+            row.widget = Widget::Choice;
             let name = |name: &String| Word { name: name.clone(), doc: String::new() };
             row.words = self.scene.materials.keys().map(name).collect();
         }
@@ -244,9 +239,9 @@ fn given_kind<'a>(
     kinds.iter().find_map(|kind| Some((kind, node.child(kind.name)?)))
 }
 
-/// Returns `true` if the value of `field` in the edit target `subject` is the name of a material.
-pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
-    matches!(subject, Target::Object(_)) && field.name == "material"
+/// Returns `true` if the value of `field` in `target` is the name of a material.
+pub(super) fn is_material(target: &Target, field: &Field) -> bool {
+    matches!(target, Target::Object(_)) && field.name == "material"
 }
 
 /// Returns a [`Word`] for each of the fields `kinds`, with the name and the help text of the field.
@@ -280,16 +275,16 @@ mod tests {
     use crate::edit::{outline, set};
     use crate::testing::mirror_room;
 
-    fn row(scene: &Scene, subject: &Target, key: &str) -> Property {
-        let rows = rows(scene, subject).unwrap();
+    fn row(scene: &Scene, target: &Target, key: &str) -> Property {
+        let rows = rows(scene, target).unwrap();
         rows.into_iter().find(|r| r.key == key).unwrap_or_else(|| panic!("no row {key}"))
     }
 
     #[test]
     fn rows_flatten_nested_tables_and_show_kinds() {
         let scene = mirror_room();
-        let keys = |subject: &Target| -> Vec<String> {
-            rows(&scene, subject).unwrap().into_iter().map(|r| r.key).collect()
+        let keys = |target: &Target| -> Vec<String> {
+            rows(&scene, target).unwrap().into_iter().map(|r| r.key).collect()
         };
         let ball = ["name", "material", "shape", "shape.sphere.center", "shape.sphere.radius"];
         assert_eq!(keys(&Target::Object(2))[..5], ball);
@@ -313,13 +308,13 @@ mod tests {
         assert_eq!((radius.unit, radius.depth, radius.is_default), ("scene units", 1, false));
         assert_eq!(radius.expected, "a number greater than 0, at most 1e9");
         let shape = row(&scene, &Target::Object(2), "shape");
-        assert_eq!((shape.value.as_str(), shape.entry), ("sphere", Widget::Kind));
+        assert_eq!((shape.value.as_str(), shape.widget), ("sphere", Widget::Kind));
         assert_eq!(shape.words.len(), crate::shape::KINDS.len());
         let alpha = row(&scene, &Target::Material("red".into()), "alpha");
         assert!(alpha.value.is_empty() && alpha.components.is_empty() && alpha.is_default);
         assert_eq!(alpha.default.as_deref(), Some("roughness / (2 √2)"));
         let material = row(&scene, &Target::Object(2), "material");
-        assert_eq!((material.entry, material.words.len()), (Widget::Choice, 6));
+        assert_eq!((material.widget, material.words.len()), (Widget::Choice, 6));
     }
 
     /// Checks that setting a property to the text of its displayed value changes nothing.
@@ -332,14 +327,14 @@ mod tests {
         );
         scene.objects.extend(Scene::parse(&text, "").unwrap().objects);
         scene.cameras.insert("left".into(), scene.camera.clone());
-        for (_, subject) in outline(&scene) {
-            for row in rows(&scene, &subject).unwrap() {
-                if row.entry == Widget::List || row.value.is_empty() {
+        for (_, target) in outline(&scene) {
+            for row in rows(&scene, &target).unwrap() {
+                if row.widget == Widget::List || row.value.is_empty() {
                     continue;
                 }
-                let again = set(&scene, &subject, &row.key, &row.value);
-                let again = again.unwrap_or_else(|e| panic!("{subject:?} {}: {e}", row.key));
-                assert_eq!(again.scene, scene, "{subject:?} {}", row.key);
+                let again = set(&scene, &target, &row.key, &row.value);
+                let again = again.unwrap_or_else(|e| panic!("{target:?} {}: {e}", row.key));
+                assert_eq!(again.scene, scene, "{target:?} {}", row.key);
             }
         }
     }

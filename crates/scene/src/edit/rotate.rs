@@ -1,5 +1,7 @@
 //! Edits that rotate an object or a light about the vertical.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
 use crate::shape::wrapped_angle;
@@ -13,20 +15,20 @@ use glam::DVec3;
 /// An object with a transform, or with a shape that has no keys for the rotation, gets a rotation
 /// and a translation at the end of its transform; later rotations change these two steps. Fails for
 /// targets other than objects and lights.
-pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
+pub fn rotate(scene: &Scene, target: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("the angle is not a finite number", ""));
     }
     let mut next = scene.clone();
-    match subject {
+    match target {
         Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             if !object.transform.is_empty() || !object.shape.rotate_y(degrees) {
                 rotate_by_steps(object, degrees);
             }
         }
         Target::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             let handles = light.kind.handles();
             for direction in [handles.direction, handles.up].into_iter().flatten() {
                 *direction = rotated_y(*direction, degrees);
@@ -40,13 +42,13 @@ pub fn rotate(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, Edi
                 *position = [coordinate(0), position[1], coordinate(2)];
             }
         }
-        _ => {
-            let found = format!("{} cannot be rotated", subject.label(scene));
+        Target::Camera | Target::View(_) | Target::Material(_) | Target::Settings(_) => {
+            let found = format!("{} cannot be rotated", target.label(scene));
             return Err(EditError::new(&found, "Select an object or a light."));
         }
     }
-    let label = format!("rotate {}", subject.label(scene));
-    Edit::checked(next, subject.clone(), label)
+    let label = format!("rotate {}", target.label(scene));
+    Edit::checked(next, target.clone(), label)
 }
 
 /// Rotates the object by `degrees`: replaces or adds the steps `rotate_y` and `translate` at the

@@ -10,50 +10,50 @@ use crate::edit::properties::is_material;
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, KeyNode, KeyValue, ValueType, node_at, node_at_mut};
 
-/// Sets `key` of `subject` to the value in `text`. If the key is the transform of an object, `text`
+/// Sets `key` of `target` to the value in `text`. If the key is the transform of an object, `text`
 /// is a kind of step, and an identity step of this kind is appended. An empty `text` sets an
 /// optional key to its default, and removes a transform step. Returns the reason and the accepted
 /// values if this is refused.
-pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
+pub fn set(scene: &Scene, target: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
-    part(scene, subject)?;
-    let field = lookup(subject, key)?;
+    part(scene, target)?;
+    let field = lookup(target, key)?;
     let optional = matches!(field.preset, DefaultValue::Without(_));
     if text.is_empty() && !matches!(field.takes, ValueType::OneOf(_) if !optional) {
-        return clear(scene, subject, key, field);
+        return clear(scene, target, key, field);
     }
     if let ValueType::OneOf(kinds) = field.takes {
         let name = word(field, text, kinds.iter().map(|k| k.name))?;
-        return convert::switch(scene, subject, key, name);
+        return convert::switch(scene, target, key, name);
     }
-    if let (Target::Object(i), ValueType::ListOf(steps)) = (subject, field.takes) {
+    if let (Target::Object(i), ValueType::ListOf(steps)) = (target, field.takes) {
         let name = word(field, text, steps.iter().map(|k| k.name))?;
         let is_named = |step: &TransformOp| step.value() == Some(KeyValue::Text(name.to_string()));
         let mut next = scene.clone();
         next.objects[*i].transform.extend(TransformOp::IDENTITIES.into_iter().find(is_named));
-        return Edit::checked(next, subject.clone(), label(scene, subject, key));
+        return Edit::checked(next, target.clone(), label(scene, target, key));
     }
-    let value = if is_material(subject, field) {
+    let value = if is_material(target, field) {
         let names = scene.materials.keys().map(String::as_str);
         KeyValue::Text(word(field, text.trim_matches('"'), names)?.to_string())
     } else {
         parse(field, text)?
     };
-    if let (Target::Light(i), "falloff") = (subject, key) {
+    if let (Target::Light(i), "falloff") = (target, key) {
         return convert::switch_falloff(scene, *i, value);
     }
-    replace(scene, subject, key, value)
+    replace(scene, target, key, value)
 }
 
 /// Sets the number at index `component` of the value of `key`.
 pub fn set_component(
     scene: &Scene,
-    subject: &Target,
+    target: &Target,
     key: &str,
     component: usize,
     text: &str,
 ) -> Result<Edit, EditError> {
-    let list = match node_at(part(scene, subject)?, key).and_then(KeyNode::value) {
+    let list = match node_at(part(scene, target)?, key).and_then(KeyNode::value) {
         Some(KeyValue::Numbers(list)) => list,
         Some(KeyValue::Switch(_) | KeyValue::Text(_)) | None => Vec::new(),
     };
@@ -71,15 +71,15 @@ pub fn set_component(
         let found = format!("number {} of {key} cannot be \"{text}\"", component + 1);
         return Err(EditError::new(&found, "Expected one number."));
     }
-    set(scene, subject, key, &parts.join(" "))
+    set(scene, target, key, &parts.join(" "))
 }
 
 /// Returns the field of `key`, including [`KIND`] and [`AIM`].
-pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, EditError> {
-    match (subject, key) {
+pub(super) fn lookup(target: &Target, key: &str) -> Result<&'static Field, EditError> {
+    match (target, key) {
         (Target::Light(_), "kind") => Ok(&KIND),
         (Target::Camera | Target::View(_), "aim") => Ok(&AIM),
-        _ => field(fields(subject), key)
+        _ => field(fields(target), key)
             .ok_or_else(|| EditError::new(&format!("there is no key {key} here"), "")),
     }
 }
@@ -87,15 +87,15 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, Edit
 /// Sets `key` to `value` and removes the keys that cannot be given together with it.
 pub(super) fn replace(
     scene: &Scene,
-    subject: &Target,
+    target: &Target,
     key: &str,
     value: KeyValue,
 ) -> Result<Edit, EditError> {
     let mut next = scene.clone();
-    let part = part_mut(&mut next, subject)?;
+    let part = part_mut(&mut next, target)?;
     let mut gone = None;
     let first = key.split('.').next().unwrap_or(key);
-    let exclusive = exclusive_keys(subject);
+    let exclusive = exclusive_keys(target);
     if exclusive.contains(&first) {
         for rival in exclusive.iter().filter(|rival| **rival != first) {
             if let Some(node) = part.child_mut(rival).filter(|node| !node.is_absent()) {
@@ -108,19 +108,19 @@ pub(super) fn replace(
         return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
     let note = gone.map(|rival| format!("{first} replaces {rival}."));
-    Ok(Edit::checked(next, subject.clone(), label(scene, subject, key))?.with_note(note))
+    Ok(Edit::checked(next, target.clone(), label(scene, target, key))?.with_note(note))
 }
 
 /// Gives the optional `key` its default, or removes the transform step that it names.
-fn clear(scene: &Scene, subject: &Target, key: &str, field: &Field) -> Result<Edit, EditError> {
+fn clear(scene: &Scene, target: &Target, key: &str, field: &Field) -> Result<Edit, EditError> {
     let mut next = scene.clone();
-    if let (Target::Object(object), Some(step)) = (subject, key.strip_prefix("transform.")) {
+    if let (Target::Object(object), Some(step)) = (target, key.strip_prefix("transform.")) {
         let steps = &mut next.objects[*object].transform;
         match step.split('.').next().and_then(|index| index.parse::<usize>().ok()) {
             Some(i) if i < steps.len() => drop(steps.remove(i)),
             _ => return Err(EditError::new(&format!("there is no step {key}"), "")),
         }
-    } else if let Some(node) = node_at_mut(part_mut(&mut next, subject)?, key) {
+    } else if let Some(node) = node_at_mut(part_mut(&mut next, target)?, key) {
         match field.preset {
             DefaultValue::Required => {
                 let found = format!("{} must not be left out", field.name);
@@ -130,18 +130,19 @@ fn clear(scene: &Scene, subject: &Target, key: &str, field: &Field) -> Result<Ed
             DefaultValue::Without(_) => node.make_absent(),
         }
     }
-    Edit::checked(next, subject.clone(), label(scene, subject, key))
+    Edit::checked(next, target.clone(), label(scene, target, key))
 }
 
 /// Returns the label of an edit of `key` in the undo history: `radius of ball`.
-pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
+pub(super) fn label(scene: &Scene, target: &Target, key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
-    format!("{last} of {}", subject.label(scene))
+    format!("{last} of {}", target.label(scene))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::SceneSettings;
     use crate::shape::Shape;
     use crate::testing::mirror_room;
 
@@ -149,8 +150,8 @@ mod tests {
         Target::Object(2)
     }
 
-    fn refused(subject: &Target, key: &str, text: &str) -> String {
-        set(&mirror_room(), subject, key, text).unwrap_err().to_string()
+    fn refused(target: &Target, key: &str, text: &str) -> String {
+        set(&mirror_room(), target, key, text).unwrap_err().to_string()
     }
 
     #[test]
@@ -163,7 +164,7 @@ mod tests {
         let edit = set_component(&scene, &ball(), "shape.sphere.center", 1, "2").unwrap();
         let Shape::Sphere(sphere) = &edit.scene.objects[2].shape else { panic!() };
         assert_eq!(sphere.center, [-0.9, 2.0, 0.0]);
-        let edit = set(&scene, &Target::Film, "size", "320x200").unwrap();
+        let edit = set(&scene, &Target::Settings(SceneSettings::Film), "size", "320x200").unwrap();
         assert_eq!(edit.scene.film.size, [320, 200]);
         let edit = set(&scene, &ball(), "material", "gr").unwrap();
         assert_eq!(edit.scene.objects[2].material, "green");
@@ -173,7 +174,7 @@ mod tests {
 
     #[test]
     fn refused_values_name_finding_and_expectation() {
-        for (subject, key, text, words) in [
+        for (target, key, text, words) in [
             (ball(), "shape.sphere.radius", "-1", "radius is -1. Expected a number greater than 0"),
             (ball(), "shape.sphere.radius", "big", "radius cannot be \"big\". Expected a number"),
             (ball(), "shape.sphere.radius", "", "radius must not be left out"),
@@ -184,11 +185,11 @@ mod tests {
             (ball(), "no.such", "1", "there is no key no.such here"),
             (Target::Camera, "target", "0.6 1.4 4.5", "target is the eye itself"),
             (Target::Camera, "view_angle.vertical", "180", "Expected a number between 0 and 180"),
-            (Target::Film, "size", "99999 1", "size cannot be"),
+            (Target::Settings(SceneSettings::Film), "size", "99999 1", "size cannot be"),
             (Target::Object(99), "name", "x", "there is no object 100"),
             (Target::Material("rot".into()), "color", "1 1 1", "there is no material \"rot\""),
         ] {
-            let message = refused(&subject, key, text);
+            let message = refused(&target, key, text);
             assert!(message.contains(words), "{message}");
         }
         let one =

@@ -1,5 +1,7 @@
 //! Edit targets: parts of a scene that can be selected and edited.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
 use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
@@ -13,16 +15,23 @@ pub enum Target {
     Camera,
     /// Stored camera, by its name.
     View(String),
-    Ambient,
-    Background,
     /// Light, by its index.
     Light(usize),
     /// Object, by its index.
     Object(usize),
     /// Material, by its name.
     Material(String),
+    Settings(SceneSettings),
+}
+
+/// Table of settings, which every scene has exactly once.
+#[allow(missing_docs, reason = "the names say it")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum SceneSettings {
+    Ambient,
+    Background,
     Film,
-    IntegratorSettings,
+    Integrator,
 }
 
 /// Section of the outline of all targets.
@@ -58,8 +67,8 @@ impl Section {
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
-    list.push((Section::Surroundings, Target::Ambient));
-    list.push((Section::Surroundings, Target::Background));
+    list.push((Section::Surroundings, Target::Settings(SceneSettings::Ambient)));
+    list.push((Section::Surroundings, Target::Settings(SceneSettings::Background)));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
     let (mirrors, others): (Vec<_>, Vec<_>) =
         (0..scene.objects.len()).partition(|i| reflects(scene, *i));
@@ -67,8 +76,8 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list.extend(others.into_iter().map(|i| (Section::Objects, Target::Object(i))));
     let materials = scene.materials.keys();
     list.extend(materials.map(|name| (Section::Materials, Target::Material(name.clone()))));
-    list.push((Section::Picture, Target::Film));
-    list.push((Section::Picture, Target::IntegratorSettings));
+    list.push((Section::Picture, Target::Settings(SceneSettings::Film)));
+    list.push((Section::Picture, Target::Settings(SceneSettings::Integrator)));
     list
 }
 
@@ -96,10 +105,10 @@ impl Target {
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
-            Self::Ambient => &["ambient"],
-            Self::Background => &["background"],
-            Self::Film => &["film"],
-            Self::IntegratorSettings => &["trace"],
+            Self::Settings(SceneSettings::Ambient) => &["ambient"],
+            Self::Settings(SceneSettings::Background) => &["background"],
+            Self::Settings(SceneSettings::Film) => &["film"],
+            Self::Settings(SceneSettings::Integrator) => &["trace"],
             Self::View(name) => &["cameras", name],
             Self::Material(name) => &["materials", name],
             Self::Light(i) => &["light", &i.to_string()],
@@ -121,8 +130,8 @@ impl Target {
                 let kind = object.map_or("object", |o| o.shape.key());
                 named(object.map(|o| &o.name)).unwrap_or_else(|| format!("{kind} {}", i + 1))
             }
-            // The other targets are tables, named by their key.
-            other => other.path().concat(),
+            // These targets are tables, named by their key.
+            Self::Camera | Self::Settings(_) => self.path().concat(),
         }
     }
 
@@ -137,7 +146,7 @@ impl Target {
         let name = match self {
             Self::Material(name) => name,
             Self::Object(i) => &scene.objects.get(*i)?.material,
-            _ => return None,
+            Self::Camera | Self::View(_) | Self::Light(_) | Self::Settings(_) => return None,
         };
         scene.materials.contains_key(name).then(|| Self::Material(name.clone()))
     }
@@ -154,10 +163,10 @@ mod tests {
         let mut scene = mirror_room();
         scene.cameras.insert("left".into(), scene.camera.clone());
         let list = outline(&scene);
-        let once: HashSet<_> = list.iter().map(|(_, subject)| subject).collect();
+        let once: HashSet<_> = list.iter().map(|(_, target)| target).collect();
         assert_eq!(once.len(), list.len());
         assert!(list.is_sorted_by_key(|(section, _)| *section));
-        assert!(list.iter().all(|(_, subject)| subject.exists(&scene)));
+        assert!(list.iter().all(|(_, target)| target.exists(&scene)));
         let labels: Vec<_> = list.iter().map(|(_, s)| s.label(&scene)).collect();
         let expected = "camera left ambient background lamp floor mirror ball cube pyramid prism \
                         blue floor green mirror red yellow film trace";

@@ -1,5 +1,8 @@
 //! Edits that move an object, a light or a camera by a vector, in scene units.
 
+#![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
+
+use crate::camera::Camera;
 use crate::edit::bounds::scene_bounds;
 use crate::edit::{Edit, EditError, Target};
 use crate::light::Light;
@@ -11,36 +14,32 @@ use glam::DVec3;
 /// without coordinates in its shape, gets a translation as the last step. A directional light is
 /// treated as a lamp, three radii of the scene from the origin, that moves by `by` and stays aimed
 /// at the origin. Fails for other targets, and for coordinates out of range.
-pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
+pub fn move_by(scene: &Scene, target: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("the distance is not a finite number", ""));
     }
     let mut next = scene.clone();
-    match subject {
+    match target {
         Target::Object(i) => {
-            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let object = next.objects.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             move_object(object, by);
         }
         Target::Light(i) => {
-            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
+            let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(target))?;
             move_light(light, by, scene);
         }
-        Target::Camera | Target::View(_) => {
-            let camera = match subject {
-                Target::View(name) => next.cameras.get_mut(name),
-                _ => Some(&mut next.camera),
-            };
-            let camera = camera.ok_or_else(|| EditError::gone(subject))?;
-            camera.eye = moved(camera.eye, by);
-            camera.target = camera.target.map(|target| moved(target, by));
+        Target::Camera => move_camera(&mut next.camera, by),
+        Target::View(name) => {
+            let view = next.cameras.get_mut(name).ok_or_else(|| EditError::gone(target))?;
+            move_camera(view, by);
         }
-        _ => {
-            let found = format!("{} cannot be moved", subject.label(scene));
+        Target::Material(_) | Target::Settings(_) => {
+            let found = format!("{} cannot be moved", target.label(scene));
             return Err(EditError::new(&found, "Select an object, a light or the camera."));
         }
     }
-    let label = format!("move {}", subject.label(scene));
-    Edit::checked(next, subject.clone(), label)
+    let label = format!("move {}", target.label(scene));
+    Edit::checked(next, target.clone(), label)
 }
 
 /// Returns `at + by`. A coordinate that changes is rounded to about a thousandth of the change.
@@ -70,6 +69,11 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
     }
 }
 
+fn move_camera(camera: &mut Camera, by: [f64; 3]) {
+    camera.eye = moved(camera.eye, by);
+    camera.target = camera.target.map(|target| moved(target, by));
+}
+
 /// Moves a light as [`move_by`] describes.
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
     let handles = light.kind.handles();
@@ -89,6 +93,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edit::SceneSettings;
     use crate::light::Directional;
     use crate::shape::Shape;
     use crate::testing::mirror_room;
@@ -128,7 +133,7 @@ mod tests {
         let scene = mirror_room();
         assert!(move_by(&scene, &Target::Object(2), [1e10, 0.0, 0.0]).is_err());
         assert!(move_by(&scene, &Target::Object(2), [f64::NAN, 0.0, 0.0]).is_err());
-        assert!(move_by(&scene, &Target::Film, [1.0, 0.0, 0.0]).is_err());
+        assert!(move_by(&scene, &Target::Settings(SceneSettings::Film), [1.0, 0.0, 0.0]).is_err());
         let camera = move_by(&scene, &Target::Camera, [0.5, 0.0, 0.0]).unwrap().scene.camera;
         assert_eq!((camera.eye, camera.target), ([1.1, 1.4, 4.5], Some([0.5, 0.8, -0.5])));
     }

@@ -25,10 +25,10 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
 
 /// Makes the stored camera `name` the current camera.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
-    let subject = Target::View(name.to_string());
-    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;
+    let target = Target::View(name.to_string());
+    let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&target))?;
     let next = Scene { camera: view.clone(), ..scene.clone() };
-    Edit::checked(next, Target::Camera, format!("recall camera {}", subject.label(scene)))
+    Edit::checked(next, Target::Camera, format!("recall camera {}", target.label(scene)))
 }
 
 #[cfg(test)]
@@ -40,13 +40,13 @@ mod tests {
     fn cameras_are_stored_and_recalled() {
         let scene = mirror_room();
         let edit = store_view(&scene, None).unwrap();
-        assert_eq!(edit.subject, Target::View("view".into()));
+        assert_eq!(edit.target, Target::View("view".into()));
         let edit = store_view(&edit.scene, None).unwrap();
-        assert_eq!(edit.subject, Target::View("view 2".into()));
+        assert_eq!(edit.target, Target::View("view 2".into()));
         let mut moved = edit.scene;
         moved.camera.eye = [3.0, 2.0, 1.0];
         let back = recall_view(&moved, "view").unwrap();
-        assert_eq!((back.scene.camera, back.subject), (scene.camera.clone(), Target::Camera));
+        assert_eq!((back.scene.camera, back.target), (scene.camera.clone(), Target::Camera));
         let edit = store_view(&moved, Some(" view ")).unwrap();
         assert_eq!(edit.scene.cameras["view"], moved.camera);
         assert!(edit.note.is_some());

@@ -127,7 +127,7 @@ fn adding(model: &mut Model, problem: Option<&str>) {
     let form = Form {
         title: "new sphere".to_string(),
         scene: Arc::new(edit.scene),
-        subject: edit.subject,
+        subject: edit.target,
         label: edit.label,
         fields: FieldList {
             cursor: 2,
