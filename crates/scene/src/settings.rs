@@ -31,7 +31,7 @@ description! {
         ray_types: RayTypes = "full";
         /// Largest number of surfaces that a path hits after the first, or after a diffuse bounce;
         /// 0: no reflection, no transmission.
-        max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
+        max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces", step Units(10.0);
         /// Largest number of diffuse bounces of a path; 0: no indirect diffuse light. Ambient light
         /// stands for further bounces.
         max_diffuse_depth: u32 = 0, in closed(0.0, 100.0) "bounces";

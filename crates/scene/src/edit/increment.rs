@@ -7,7 +7,7 @@ use crate::edit::properties::is_material;
 use crate::edit::set::{label, lookup, replace};
 use crate::edit::{Edit, EditError, Target};
 use crate::value::{
-    DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, floor_log10, node_at,
+    DefaultValue, Field, KeyNode, KeyValue, NumberRange, Step, ValueType, floor_log10, node_at,
     rounded_to,
 };
 
@@ -27,25 +27,22 @@ pub fn step(
 ) -> Result<Edit, EditError> {
     let part = part(scene, target)?;
     let field = lookup(target, key)?;
-    let Some(rule) = StepRule::of(field, scene) else {
-        return toggle(scene, target, key, steps > 0.0);
-    };
     let given = node_at(part, key).and_then(KeyNode::value);
-    let given = given.or_else(|| start(field, scene, target));
-    let Some(KeyValue::Numbers(numbers)) = given else {
-        return Err(EditError::new(&format!("{} has no value yet", field.name), "Type one."));
+    let Some(KeyValue::Numbers(numbers)) = given.or_else(|| start(field, scene, target)) else {
+        return toggle(scene, target, key, steps > 0.0);
     };
     if component.is_some_and(|c| c >= numbers.len()) {
         return Err(EditError::new(&format!("{key} has no such number"), ""));
     }
+    let rule = StepRule::of(field, scene, &numbers);
     let count = StepCount::of(steps);
     let next = match (component, field.takes) {
-        (None, ValueType::Color(range)) => brightened(&numbers, range, count),
+        (None, ValueType::Color(_)) => brightened(&numbers, rule, count),
         (None, ValueType::Wholes(_, range)) => resized(&numbers, range, count),
         _ => {
             let moved = |(i, x): (usize, &f64)| match component {
                 Some(c) if c != i => *x,
-                _ => rule.stepped(*x, &numbers, count),
+                _ => rule.stepped(*x, count),
             };
             numbers.iter().enumerate().map(moved).collect()
         }
@@ -63,12 +60,7 @@ pub fn step(
 /// Changes `key` cyclically to the next or previous choice: a word, a switch, a kind, or the
 /// material of an object. For an optional key, "no value" is one of the choices. Fails if there is
 /// no such key, or it has no choices.
-pub fn toggle(
-    scene: &Scene,
-    target: &Target,
-    key: &str,
-    forward: bool,
-) -> Result<Edit, EditError> {
+pub fn toggle(scene: &Scene, target: &Target, key: &str, forward: bool) -> Result<Edit, EditError> {
     let part = part(scene, target)?;
     let field = lookup(target, key)?;
     let value = node_at(part, key).and_then(KeyNode::value);
@@ -91,7 +83,7 @@ pub fn toggle(
             (names.collect(), word)
         }
         _ => {
-            let found = format!("{} has no words to choose from", field.name);
+            let found = format!("arrow keys do not change {}", field.name);
             return Err(EditError::new(&found, &format!("Type {}.", field.takes)));
         }
     };
@@ -117,15 +109,11 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
 
 /// Returns the value, given by other keys, from which steps of an absent `alpha` or `f0` start.
 fn start(field: &Field, scene: &Scene, target: &Target) -> Option<KeyValue> {
-    let material = match target {
-        Target::Material(name) => scene.materials.get(name),
-        _ => None,
-    };
-    match (field.name, material) {
-        ("alpha", Some(material)) => {
-            Some(KeyValue::Numbers(vec![rounded_to(material.microfacet_alpha(), -4)]))
-        }
-        ("f0", Some(material)) => material.f0().value(),
+    let Target::Material(name) = target else { return None };
+    let material = scene.materials.get(name)?;
+    match field.name {
+        "alpha" => rounded_to(material.microfacet_alpha(), -4).value(),
+        "f0" => material.f0().value(),
         _ => None,
     }
 }
@@ -148,96 +136,60 @@ impl StepCount {
     }
 }
 
-/// Rule by which an arrow step changes a number.
+/// Rule by which an arrow step changes the numbers of a key.
 #[derive(Clone, Copy)]
-enum StepRule {
-    /// Geometric step along the rungs: 1, 1.1, 1.2 ... 9, times any power of ten. There are no
-    /// rungs between 0 and `floor`.
-    Rungs { floor: f64, range: NumberRange },
-    /// Step by `unit`; a fine step is a tenth of it.
-    Units { unit: f64, range: NumberRange },
-    /// Step by 5 degrees, or by 0.5 in fine steps.
-    Degrees { range: NumberRange },
-    /// Step of a component by 0.05 P; P is the largest power of ten up to the largest component.
-    Direction,
-    /// Geometric step: the magnitude moves along the rungs; the sign stays.
-    Factor,
-    /// Step by 10, or by 1 in fine steps.
-    Tens { range: NumberRange },
-    /// Step by doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.
-    Doubles { range: NumberRange },
+struct StepRule {
+    step: Step,
+    range: NumberRange,
 }
 
 impl StepRule {
-    /// Returns the rule of arrow steps for the key `field`; `None` if it has no numbers.
-    fn of(field: &Field, scene: &Scene) -> Option<Self> {
-        Some(match field.takes {
-            ValueType::Number(range) | ValueType::Numbers(_, range) => {
-                let rungs = |floor| Self::Rungs { floor, range };
-                let units = |unit| Self::Units { unit, range };
-                match (field.name, field.unit) {
-                    (_, "degrees") => Self::Degrees { range },
-                    // Repetitions of a texture.
-                    ("scale", _) => rungs(0.0),
-                    _ if range == NumberRange::SIZE => rungs(0.0),
-                    _ if range == NumberRange::COORDINATE => units(step_length(scene)),
-                    // The height of useful bumps is at most a hundredth of the size of the surface.
-                    ("height", _) => units(0.005),
-                    // The blur of roughness 0.001 is just visible at the far end of a room.
-                    ("roughness" | "alpha", _) => rungs(0.001),
-                    ("offset", _) => units(0.05),
-                    _ if [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range) => {
-                        units(0.05)
-                    }
-                    (_, "scene units") => rungs(step_length(scene) / 10.0),
-                    _ if range == NumberRange::LIGHT => rungs(0.01),
-                    // Phong exponent, or another number without a unit.
-                    _ => rungs(1.0),
-                }
+    /// Returns the rule of arrow steps for the key `field`, whose value is `numbers`.
+    fn of(field: &Field, scene: &Scene, numbers: &[f64]) -> Self {
+        let range = match field.takes {
+            ValueType::Factor => NumberRange::closed(1e-6, 1e6),
+            takes => takes.range(),
+        };
+        let usual = || match field.takes {
+            ValueType::Direction => {
+                let largest = numbers.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                Step::Units(0.05 * 10f64.powi(floor_log10(largest)))
             }
-            ValueType::Direction => Self::Direction,
-            ValueType::Factor => Self::Factor,
-            ValueType::Color(range) => Self::Units { unit: 0.05, range },
-            ValueType::Whole(range)
-                if matches!(field.name, "rays_per_pixel" | "max_diffuse_depth") =>
-            {
-                Self::Doubles { range }
+            ValueType::Factor => Step::Rungs(0.0),
+            ValueType::Color(_) => Step::Units(0.05),
+            ValueType::Whole(_) | ValueType::Wholes(..) => Step::Doubles,
+            _ if field.unit == "degrees" => Step::Units(5.0),
+            _ if range.low == 0.0 && !range.low_in => Step::Rungs(0.0),
+            _ if range == NumberRange::COORDINATE => Step::Units(step_length(scene)),
+            _ if [NumberRange::SHARE, NumberRange::COEFFICIENT].contains(&range) => {
+                Step::Units(0.05)
             }
-            ValueType::Wholes(_, range) => Self::Doubles { range },
-            ValueType::Whole(range) => Self::Tens { range },
-            _ => return None,
-        })
+            _ if field.unit == "scene units" => Step::Rungs(step_length(scene) / 10.0),
+            _ if range == NumberRange::LIGHT => Step::Rungs(0.01),
+            // Phong exponent, or another number without a unit.
+            _ => Step::Rungs(1.0),
+        };
+        Self { step: field.step.unwrap_or_else(usual), range }
     }
 
-    /// Returns `x`, one of the numbers `all` of the value, after `count` steps.
-    fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
-        let StepCount { steps, fine } = count;
-        match self {
-            Self::Rungs { floor, range } => next_nice(x, floor, range, count),
-            Self::Units { unit, range } if range == NumberRange::COEFFICIENT && x > 2.0 => {
+    /// Returns `x` after `count` steps.
+    fn stepped(self, x: f64, count: StepCount) -> f64 {
+        let Self { step, range } = self;
+        match step {
+            Step::Rungs(floor) if x < 0.0 => -next_nice(-x, floor, range, count),
+            Step::Rungs(floor) => next_nice(x, floor, range, count),
+            Step::Units(unit) if range == NumberRange::COEFFICIENT && x > 2.0 => {
                 next_nice(x, unit, range, count)
             }
-            Self::Units { unit, range } => within(added(x, unit, count), range, x),
-            Self::Degrees { range } => {
-                let moved = added(x, 5.0, count);
-                // The range of an opening angle excludes its ends.
-                let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
-                if range.low.is_finite() { within(moved, ends, x) } else { moved }
-            }
-            Self::Direction => {
-                let largest = all.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-                let unit = rounded_to(0.05, -2) * 10f64.powi(floor_log10(largest));
+            Step::Units(unit) => {
                 let moved = added(x, unit, count);
-                if moved.is_finite() { moved } else { x }
+                // A fine step inside an end that the range excludes, such as 180 degrees.
+                let margin = |is_in: bool| if is_in { 0.0 } else { 0.1 * unit };
+                let low = range.low + margin(range.low_in);
+                let high = range.high - margin(range.high_in);
+                if moved.is_finite() { within(moved, NumberRange::closed(low, high), x) } else { x }
             }
-            Self::Factor => {
-                let range = NumberRange::closed(1e-6, 1e6);
-                next_nice(x.abs(), 0.0, range, count) * x.signum()
-            }
-            Self::Tens { range } => {
-                within(x + (if fine { 1 } else { 10 } * steps) as f64, range, x)
-            }
-            Self::Doubles { range } => doubled(x, range, count),
+            Step::Doubles => doubled(x, range, count),
         }
     }
 }
@@ -304,25 +256,21 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let mantissa = x * format!("1e{}", 3 - e).parse().unwrap_or(1.0);
-    let rungs = if fine { fine_rungs() } else { RUNGS.to_vec() };
+    let (rungs, below) = if fine { (fine_rungs(), 995) } else { (RUNGS.to_vec(), 900) };
     // Rounding errors may move a number slightly off its rung.
     let next = match up {
         true => rungs.into_iter().find(|r| *r as f64 > mantissa + 1e-5).unwrap_or(10_000),
-        false => {
-            let below = if fine { 995 } else { 900 };
-            rungs.into_iter().rfind(|r| (*r as f64) < mantissa - 1e-5).unwrap_or(below)
-        }
+        false => rungs.into_iter().rfind(|r| (*r as f64) < mantissa - 1e-5).unwrap_or(below),
     };
     format!("{next}e{}", e - 3).parse().unwrap_or(x)
 }
 
 /// Returns a colour with its brightness changed by `count` steps. Upwards, black becomes dark grey.
-fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
+fn brightened(channels: &[f64], rule: StepRule, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
-    let rule = StepRule::Units { unit: 0.05, range };
     let next = match largest > 2.0 {
-        true => next_nice(largest, 0.0, range, count),
-        false => rule.stepped(largest, channels, count),
+        true => next_nice(largest, 0.0, rule.range, count),
+        false => rule.stepped(largest, count),
     };
     if largest == 0.0 {
         return vec![next; channels.len()];

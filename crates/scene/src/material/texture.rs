@@ -61,7 +61,8 @@ description! {
         /// surface.
         file: String = "";
         /// Height of white above black, before the object's transform; negative: depth below black.
-        height: f64 = 0.02, in closed(-1e3, 1e3) "scene units";
+        // The height of useful bumps is at most a hundredth of the size of the surface.
+        height: f64 = 0.02, in closed(-1e3, 1e3) "scene units", step Units(0.005);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
         flatten placement: Placement, after 2;
@@ -80,7 +81,7 @@ description! {
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
         /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
         /// values move the image left and down.
-        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
+        offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6), step Units(0.05);
     }
 }
 

@@ -211,6 +211,8 @@ pub(crate) use choices;
 ///         alpha: Option<f64>, or "roughness / (2 √2)", in SHARE;
 ///         /// A value type other than that of the Rust type.
 ///         normal: [f64; 3], as Direction;
+///         /// A key whose range and unit do not determine the step of arrow keys.
+///         offset: f64 = 0.0, in closed(-1e6, 1e6), step Units(0.05);
 ///         // The keys of another table, as if they were declared here after the first three.
 ///         flatten placement: Placement, after 3;
 ///         // A private field for the content of the key `file`.
@@ -232,7 +234,8 @@ macro_rules! description {
                 $key:ident: $type:ty $(= $default:expr)? $(=> $value:expr, written $toml:literal)?
                 $(, or $absent:literal)?
                 $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
-                $(, as $value_type:ident)?;
+                $(, as $value_type:ident)?
+                $(, step $step:ident($width:literal))?;
             )+
             $(flatten $flat:ident: $flat_type:ty, after $position:literal;)?
             $(loads $hidden:ident: $hidden_type:ty;)?
@@ -285,7 +288,8 @@ macro_rules! description {
                     )
                     $(.with_default(stringify!($default)))?
                     $(.with_default($toml))?
-                    $(.or($absent))?,
+                    $(.or($absent))?
+                    $(.stepped($crate::value::Step::$step($width)))?,
                 )+];
                 $crate::value::description!(@fields OWN $(, <$flat_type>::FIELDS, $position)?)
             };

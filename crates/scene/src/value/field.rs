@@ -14,6 +14,8 @@ pub struct Field {
     pub unit: &'static str,
     /// Default, or what omitting the key means.
     pub preset: DefaultValue,
+    /// Step of the numbers by arrow keys; `None` if type, range and unit determine it.
+    pub step: Option<Step>,
     /// Help text of the key, one sentence.
     pub doc: &'static str,
 }
@@ -27,6 +29,18 @@ pub enum DefaultValue {
     Is(&'static str),
     /// The key may be omitted; a phrase describes the result.
     Without(&'static str),
+}
+
+/// Step by which an arrow key changes a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Step by this number; a fine step is a tenth of it.
+    Units(f64),
+    /// Geometric step along the rungs: 1, 1.1, 1.2 ... 9, times any power of ten. The sign stays.
+    /// There are no rungs between 0 and this number.
+    Rungs(f64),
+    /// Step by doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.
+    Doubles,
 }
 
 /// One of the words that a key accepts, such as `"ggx"`.
@@ -82,7 +96,7 @@ impl Field {
         unit: &'static str,
         doc: &'static str,
     ) -> Self {
-        Self { name, takes, unit, preset: DefaultValue::Required, doc }
+        Self { name, takes, unit, preset: DefaultValue::Required, step: None, doc }
     }
 
     /// Returns the key with the default `value`, given as TOML text.
@@ -95,19 +109,18 @@ impl Field {
         Self { preset: DefaultValue::Without(instead), ..self }
     }
 
+    /// Returns the key with the given step of its numbers.
+    pub const fn stepped(self, step: Step) -> Self {
+        Self { step: Some(step), ..self }
+    }
+
     /// Returns an error if one of `values` is out of range.
     pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
-        let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
-        let valid = match self.takes {
-            ValueType::Number(range)
-            | ValueType::Numbers(_, range)
-            | ValueType::Whole(range)
-            | ValueType::Wholes(_, range)
-            | ValueType::Color(range) => each(range),
-            ValueType::Direction => each(NumberRange::FINITE) && values.iter().any(|x| *x != 0.0),
-            ValueType::Factor => each(NumberRange::FINITE) && values.iter().all(|x| *x != 0.0),
-            _ => true,
-        };
+        let range = self.takes.range();
+        let mut zeros = values.iter().map(|x| *x == 0.0);
+        let vanishes = matches!(self.takes, ValueType::Direction) && zeros.all(|zero| zero)
+            || matches!(self.takes, ValueType::Factor) && zeros.any(|zero| zero);
+        let valid = values.iter().all(|x| range.holds(*x)) && !vanishes;
         let name = self.name;
         let found = || match values {
             [x] => format!("{name} is {}", number(*x)),
@@ -121,6 +134,25 @@ impl Field {
 }
 
 impl ValueType {
+    /// Returns the range of each number; all finite numbers for types without a range.
+    pub const fn range(self) -> NumberRange {
+        match self {
+            Self::Whole(range)
+            | Self::Wholes(_, range)
+            | Self::Number(range)
+            | Self::Numbers(_, range)
+            | Self::Color(range) => range,
+            Self::Direction | Self::Factor | Self::Text | Self::Switch | Self::Choice(_) => {
+                NumberRange::FINITE
+            }
+            Self::Table(_)
+            | Self::OneOf(_)
+            | Self::ListOf(_)
+            | Self::Tables(_)
+            | Self::Named(_) => NumberRange::FINITE,
+        }
+    }
+
     /// Returns the value type with the number range `range`.
     pub const fn within(self, range: NumberRange) -> Self {
         match self {

@@ -21,7 +21,7 @@ pub use color::{Color, linear_from_srgb, srgb_from_linear};
 pub use description::{Description, FieldValue, FromWritten};
 pub(crate) use description::{children, choices, description, doc_text, single_value};
 pub use direction::unit;
-pub use field::{Choice, DefaultValue, Field, ValueType};
+pub use field::{Choice, DefaultValue, Field, Step, ValueType};
 pub(crate) use field::{inserted, names};
 pub use hash::{Fnv1a64, fnv1a64};
 pub use key_node::{KeyNode, KeyValue, node_at, node_at_mut};
