@@ -28,7 +28,7 @@ impl Object {
 
     /// Returns `true` if the object or a part of it has the material `name`.
     pub fn names_material(&self, name: &str) -> bool {
-        self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
+        self.material == name || self.shape.names_material(name)
     }
 
     /// Replaces the material name `old` of the object and its parts by `new`. An empty name means

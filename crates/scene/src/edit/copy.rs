@@ -2,7 +2,6 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
-use crate::Scene;
 use crate::edit::bounds::bounds;
 use crate::edit::parse_value::name;
 use crate::edit::placement::place_for;
@@ -10,6 +9,7 @@ use crate::edit::translate::move_object;
 use crate::edit::unique_name::{free_light, free_material, free_object, free_view};
 use crate::edit::{Edit, EditError, Target};
 use crate::value::truncated;
+use crate::{Object, Scene};
 use glam::DVec3;
 
 /// Duplicates an object, a light, a material or a stored camera under a name such as `cube 2`. An
@@ -119,18 +119,10 @@ fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) ->
 /// Removes the material `name` from all objects and parts. Returns a note that names them; `None`
 /// if there are none.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
-    let (mut whole, mut parts) = (Vec::new(), Vec::new());
-    for i in 0..scene.objects.len() {
-        if !scene.objects[i].names_material(name) {
-            continue;
-        }
-        let label = Target::Object(i).label(scene);
-        let object = &mut scene.objects[i];
-        if object.material == name { &mut whole } else { &mut parts }.push(label);
-        object.rename_material(name, "");
-    }
-    let note_for = |labels: &[String], [one, many]: [&str; 2]| {
-        let names = labels.iter().take(3).cloned().collect::<Vec<_>>().join(", ");
+    let note_of = |uses: fn(&Object, &str) -> bool, [one, many]: [&str; 2]| {
+        let users = (0..scene.objects.len()).filter(|i| uses(&scene.objects[*i], name));
+        let labels: Vec<_> = users.map(|i| Target::Object(i).label(scene)).collect();
+        let names = labels[..labels.len().min(3)].join(", ");
         match labels.len() {
             0 => None,
             1 => Some(format!("{names} {one} now.")),
@@ -138,16 +130,17 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
             n => Some(format!("{names} and {} more {many} now.", n - 3)),
         }
     };
-    let whole = note_for(&whole, ["has the default material", "have the default material"]);
-    let parts = note_for(
-        &parts,
-        [
-            "has the material of the whole in its parts",
-            "have the material of the whole in their parts",
-        ],
-    );
-    let notes: Vec<_> = whole.into_iter().chain(parts).collect();
-    (!notes.is_empty()).then(|| notes.join(" "))
+    let whole = ["has the default material", "have the default material"];
+    let in_parts = [
+        "has the material of the whole in its parts",
+        "have the material of the whole in their parts",
+    ];
+    let notes = [
+        note_of(|object, name| object.material == name, whole),
+        note_of(|object, name| object.shape.names_material(name), in_parts),
+    ];
+    scene.objects.iter_mut().for_each(|object| object.rename_material(name, ""));
+    notes.into_iter().flatten().reduce(|whole, in_parts| format!("{whole} {in_parts}"))
 }
 
 /// Renames an object, a light, a material or a stored camera. Fails for a name that exists already

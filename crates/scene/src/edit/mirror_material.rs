@@ -2,10 +2,11 @@
 
 #![cfg_attr(not(test), deny(clippy::wildcard_enum_match_arm))]
 
-use crate::Scene;
 use crate::edit::target::mirror_of;
 use crate::edit::{Edit, EditError, Target, step};
 use crate::shape::Shape;
+use crate::{Object, Scene};
+use std::slice;
 
 /// Returns the name of the material that the mirror commands change: the first of the following.
 ///
@@ -16,7 +17,6 @@ use crate::shape::Shape;
 /// - The selected material, or the material of the first rectangle, so that a reflection can be
 ///   increased from 0.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
-    let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|target| {
         let Target::Material(name) = target.material(scene)? else { return None };
         Some(name)
@@ -24,27 +24,23 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let is_specular = |material: &String| {
         scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
     };
-    if let Some(chosen) = chosen.clone().filter(is_specular) {
-        return Some(chosen);
-    }
-    if let Some(Target::Object(i)) = selected
-        && let Some(part) = reflecting(*i)
-    {
-        return Some(part);
-    }
+    let reflecting = |objects: &[Object]| mirror_of(scene, objects).map(str::to_string);
+    let selected_object = || match selected {
+        Some(Target::Object(i)) => scene.objects.get(*i),
+        _ => None,
+    };
     // Rectangles of any orientation count; the ground (`platform`) does not.
-    let rectangle = |i: &usize| matches!(scene.objects[*i].shape, Shape::Rectangle(_));
-    let mut all = 0..scene.objects.len();
-    if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {
-        return Some(name);
-    }
-    let strengths = all.clone().filter_map(|i| mirror_of(scene, i));
-    if let Some((name, _)) = strengths.reduce(|a, b| if b.1 > a.1 { b } else { a }) {
-        return Some(name.to_string());
-    }
-    let name = |i: usize| Some(scene.objects[i].material.clone());
-    let named = |i: &usize| scene.materials.contains_key(&scene.objects[*i].material);
-    chosen.or_else(|| all.find(|i| rectangle(i) && named(i)).and_then(name))
+    let rectangles = || scene.objects.iter().filter(|o| matches!(o.shape, Shape::Rectangle(_)));
+    let specular = chosen.clone().filter(is_specular);
+    specular
+        .or_else(|| reflecting(slice::from_ref(selected_object()?)))
+        .or_else(|| rectangles().find_map(|object| reflecting(slice::from_ref(object))))
+        .or_else(|| reflecting(&scene.objects))
+        .or(chosen)
+        .or_else(|| {
+            let mut names = rectangles().map(|object| &object.material);
+            names.find(|name| scene.materials.contains_key(*name)).cloned()
+        })
 }
 
 /// Changes `key` of the [`mirror`] by arrow steps, as [`step`] does. Fails if there is no mirror.

@@ -8,7 +8,7 @@ use crate::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use crate::{Object, Scene, TransformOp};
 use glam::{DVec2, DVec3};
-use zerkalo_kernel::primitive::Form;
+use zerkalo_kernel::primitive::{Form, HalfSpace};
 
 /// Lowers an object onto the highest surface below its centre and its lowest corners, or raises it
 /// to the lowest surface above if there is none below. Fails for targets other than objects, for
@@ -143,19 +143,22 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if the flat object `form` intersects a space diagonal of the slightly shrunk box,
-/// as every plane through its inside does.
+/// Returns `true` if the flat object `form` intersects the slightly shrunk box: no axis separates
+/// them. An infinite plane has no corners and no edges.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
-    let shrink = (high - low) * 1e-6;
-    let (low, high) = (low + shrink, high - shrink);
-    let edge = high - low;
-    let corners = [low, low + DVec3::X * edge.x, low + DVec3::Z * edge.z, high - DVec3::Y * edge.y];
-    let diagonals =
-        [high, high - DVec3::X * edge.x, high - DVec3::Z * edge.z, low + DVec3::Y * edge.y];
-    corners
-        .iter()
-        .zip(diagonals)
-        .any(|(from, to)| form.cast(*from, to - from).is_some_and(|t| t < 1.0))
+    let (center, half) = ((low + high) / 2.0, (high - low) * (0.5 - 1e-6));
+    let reach = |axis: DVec3| half.dot(axis.abs());
+    let crosses =
+        |plane: HalfSpace| (plane.normal.dot(center) - plane.offset).abs() < reach(plane.normal);
+    let corners = form.corners();
+    let edges = corners.iter().skip(1).take(2).map(|corner| corner - corners[0]);
+    let across = edges.flat_map(|edge| DVec3::AXES.map(|axis| axis.cross(edge)));
+    let is_separated = |axis: DVec3| {
+        let along = || corners.iter().map(|corner| axis.dot(corner - center));
+        along().all(|x| x > reach(axis)) || along().all(|x| x < -reach(axis))
+    };
+    form.plane().is_some_and(crosses)
+        && (corners.is_empty() || !DVec3::AXES.into_iter().chain(across).any(is_separated))
 }
 
 fn overlap(a: Extent, b: Extent) -> bool {
@@ -181,8 +184,21 @@ fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::TomlText;
     use crate::edit::move_by;
+    use crate::shape::Shape;
     use crate::testing::mirror_room;
+    use glam::DAffine3;
+
+    #[test]
+    fn rectangles_in_a_box_intersect_it() {
+        let text =
+            "rectangle = { center = [0.3, 0.5, 0.1], size = [0.1, 0.1], normal = [1, 0, 0] }";
+        let small = Shape::from_text(text).unwrap().form();
+        let far = small.clone().transformed(&DAffine3::from_translation(DVec3::X));
+        let room = (DVec3::new(-0.5, 0.0, -0.5), DVec3::new(0.5, 1.0, 0.5));
+        assert!(intersects(&small, room) && !intersects(&far, room));
+    }
 
     fn lowest(scene: &Scene, i: usize) -> f64 {
         scene.objects[i].form().bounds().unwrap().0.y

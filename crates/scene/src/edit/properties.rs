@@ -6,7 +6,7 @@ use crate::edit::parse_value::{color, parse, show};
 use crate::edit::part::{exclusive_keys, fields, given_key, part};
 use crate::edit::{EditError, Target};
 use crate::value::{
-    Choice, DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number, written,
+    DefaultValue, Field, KeyNode, KeyValue, NumberRange, ValueType, names, number, written,
 };
 
 /// Word that a property accepts as its value.
@@ -143,13 +143,11 @@ impl PropertyWalker<'_> {
     ) {
         let steps: Vec<_> = (0..).map_while(|i: usize| list.child(&i.to_string())).collect();
         let mut row = self.row(field, key.to_string(), depth);
-        row.widget = Widget::List;
         row.value = match steps.len() {
             0 => String::new(),
             1 => "1 step".to_string(),
             n => format!("{n} steps"),
         };
-        row.words = words(kinds);
         row.is_default = steps.is_empty();
         self.rows.push(row);
         for (i, step) in steps.into_iter().enumerate() {
@@ -165,10 +163,6 @@ impl PropertyWalker<'_> {
     /// Adds a row for the choice of a kind; `given` is the present kind.
     fn kind(&mut self, field: &'static Field, given: Option<&str>, key: String, depth: usize) {
         let mut row = self.row(field, key, depth);
-        if let ValueType::OneOf(kinds) = field.takes {
-            row.words = words(kinds);
-        }
-        row.widget = Widget::Kind;
         row.value = given.unwrap_or_default().to_string();
         let optional = matches!(field.preset, DefaultValue::Without(_));
         row.default = row.default.filter(|_| optional);
@@ -192,32 +186,37 @@ impl PropertyWalker<'_> {
                 row.components = numbers.into_iter().map(number).collect();
             }
         }
-        match field.takes {
-            ValueType::Text => row.widget = Widget::Text,
-            ValueType::Switch => row.widget = Widget::Switch,
-            ValueType::Choice(choices) => {
-                row.widget = Widget::Choice;
-                let word = |c: &Choice| Word { name: c.name.into(), doc: c.doc.into() };
-                row.words = choices.iter().map(word).collect();
-            }
-            ValueType::Color(_) => row.widget = Widget::Color,
+        if let ValueType::Tables(_) = field.takes {
             // Edits can only read the parts of a compound.
-            ValueType::Tables(_) => row.value = written(field.takes, node).to_string(),
-            _ => {}
-        }
-        if is_material(self.target, field) {
-            row.widget = Widget::Choice;
-            let name = |name: &String| Word { name: name.clone(), doc: String::new() };
-            row.words = self.scene.materials.keys().map(name).collect();
+            row.value = written(field.takes, node).to_string();
         }
         self.rows.push(row);
     }
 
+    /// Returns the row of `key` without its value.
     fn row(&self, field: &'static Field, key: String, depth: usize) -> Property {
+        let word = |name: &str, doc: &str| Word { name: name.to_string(), doc: doc.to_string() };
+        let (widget, words) = match field.takes {
+            ValueType::Text if is_material(self.target, field) => {
+                let names = self.scene.materials.keys();
+                (Widget::Choice, names.map(|name| word(name, "")).collect())
+            }
+            ValueType::Text => (Widget::Text, Vec::new()),
+            ValueType::Switch => (Widget::Switch, Vec::new()),
+            ValueType::Choice(choices) => {
+                (Widget::Choice, choices.iter().map(|c| word(c.name, c.doc)).collect())
+            }
+            ValueType::OneOf(kinds) => (Widget::Kind, words(kinds)),
+            ValueType::ListOf(kinds) => (Widget::List, words(kinds)),
+            ValueType::Color(_) => (Widget::Color, Vec::new()),
+            _ => (Widget::Numbers, Vec::new()),
+        };
         Property {
             key,
             label: field.name.replace('_', " "),
             depth,
+            widget,
+            words,
             unit: field.unit,
             expected: expected(field.takes),
             doc: field.doc,

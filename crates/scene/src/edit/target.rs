@@ -5,6 +5,7 @@
 use crate::edit::part::part;
 use crate::value::truncated;
 use crate::{Object, Scene};
+use std::slice;
 
 /// Target of an edit: a part of the scene that can be selected and edited.
 #[allow(missing_docs, reason = "the names say it")]
@@ -70,8 +71,8 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Ambient)));
     list.push((Section::Surroundings, Target::Settings(SceneSettings::Background)));
     list.extend((0..scene.lights.len()).map(|i| (Section::Lights, Target::Light(i))));
-    let (mirrors, others): (Vec<_>, Vec<_>) =
-        (0..scene.objects.len()).partition(|i| reflects(scene, *i));
+    let reflects = |i: &usize| mirror_of(scene, slice::from_ref(&scene.objects[*i])).is_some();
+    let (mirrors, others): (Vec<_>, Vec<_>) = (0..scene.objects.len()).partition(reflects);
     list.extend(mirrors.into_iter().map(|i| (Section::Mirrors, Target::Object(i))));
     list.extend(others.into_iter().map(|i| (Section::Objects, Target::Object(i))));
     let materials = scene.materials.keys();
@@ -81,18 +82,13 @@ pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     list
 }
 
-/// Returns `true` if the object at `index`, or a part of it, has a reflecting material.
-pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
-    mirror_of(scene, index).is_some()
-}
-
-/// Returns the material with the largest reflection coefficient in an object and its parts, and
-/// this coefficient; `None` if none reflects.
-pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
-    let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
-    let known =
-        names.into_iter().filter_map(|name| Some((name, scene.materials.get(name)?.reflection)));
-    known.filter(|(_, k)| *k > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a })
+/// Returns the material with the largest reflection coefficient among those of `objects` and their
+/// parts; `None` if none reflects.
+pub(super) fn mirror_of<'a>(scene: &'a Scene, objects: &'a [Object]) -> Option<&'a str> {
+    let names = objects.iter().flat_map(Object::materials);
+    let known = names.filter_map(|name| Some((name, scene.materials.get(name)?.reflection)));
+    let reflecting = known.filter(|(_, k)| *k > 0.0);
+    reflecting.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(name, _)| name)
 }
 
 impl Target {

@@ -228,6 +228,11 @@ impl Shape {
         names
     }
 
+    /// Returns `true` if a part of the shape, nested ones too, names the material `name`.
+    pub fn names_material(&self, name: &str) -> bool {
+        self.named_materials().iter().any(|(_, own)| *own == name)
+    }
+
     /// Returns the materials that the parts of the shape, nested ones too, name.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
